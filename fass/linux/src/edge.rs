@@ -12,11 +12,9 @@ use std::sync::{Arc, Barrier, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use fass::edge::RecordedValue;
 use fass::edge::{BootRecord, Drain, Edge, Outgoing, Sink};
-use fass::platform::{Clock, LaunchError, Plan, RunConfig};
+use sched_dag::Instance;
 use sched_dag::engine::Run;
-use sched_dag::{DriverNotice, Instance};
 
 use crate::sys;
 
@@ -27,9 +25,6 @@ const LOOK: Duration = Duration::from_millis(1);
 const EVENTS: u64 = 10;
 
 static EDGE: Mutex<Edge> = Mutex::new(Edge::new());
-
-/// Whether a plan has been launched with it, so that events are of interest.
-static IS_ON: AtomicBool = AtomicBool::new(false);
 
 /// When the run's time begins, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
@@ -95,47 +90,6 @@ pub(crate) fn get() -> MutexGuard<'static, Edge> {
     unpoisoned(&EDGE)
 }
 
-fn of_run(clock_ns: u64) -> u64 {
-    clock_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
-}
-
-/// Whether the time that functions are told is recorded or replayed.
-static TELLS: AtomicBool = AtomicBool::new(false);
-
-static CLOCK: Clock = sys::now_ns;
-
-/// Returns the clock of functions.
-pub(crate) fn clock() -> &'static Clock {
-    match TELLS.load(Ordering::Relaxed) {
-        true => &TOLD,
-        false => &CLOCK,
-    }
-}
-
-/// Tells functions the time where that is recorded or replayed.
-static TOLD: Clock = || {
-    let clock_ns = sys::now_ns();
-    get().tell_time(RUNNING.get(), clock_ns, of_run(clock_ns))
-};
-
-/// Sets recording or replay of a plan up, if it was asked for.
-pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
-    let mut edge = get();
-    let mut file = unpoisoned(&FILE);
-    let launched = edge.launch(plan, file.as_mut().map(BootRecord::file));
-    let tells = launched.map_err(LaunchError::new)?;
-    TELLS.fetch_or(tells, Ordering::Relaxed);
-    IS_ON.store(edge.is_on(), Ordering::Relaxed);
-    Ok(())
-}
-
-/// Takes what is committed.
-pub(crate) fn commit(plan: &Plan, terms: &RunConfig) {
-    if let Some(file) = &mut *unpoisoned(&FILE) {
-        file.commit(plan, &terms.scheduler, terms.overheads);
-    }
-}
-
 /// Takes note of what this thread runs from now on.
 pub(crate) fn note_running(instance: Option<Instance>) {
     RUNNING.set(instance);
@@ -148,27 +102,8 @@ pub(crate) fn running() -> Option<Instance> {
 
 /// Returns what this thread runs, and the time of the run.
 pub(crate) fn here() -> (Option<Instance>, u64) {
-    (running(), of_run(sys::now_ns()))
-}
-
-/// Takes note that an instance has failed. The cluster's lock is held.
-pub(crate) fn failed(instance: Instance) {
-    if IS_ON.load(Ordering::Relaxed) {
-        let clock_ns = sys::now_ns();
-        get().failed(instance, of_run(clock_ns), clock_ns);
-    }
-}
-
-/// Takes a value that is not read where it was written. The cluster's lock is held.
-pub(crate) fn record(value: &RecordedValue<'_>) {
-    get().record(value, of_run(value.completed_ns));
-}
-
-/// Takes what became of a job or an instance. The cluster's lock is held.
-pub(crate) fn happened(notice: &DriverNotice) {
-    if IS_ON.load(Ordering::Relaxed) {
-        get().happened(notice);
-    }
+    let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
+    (running(), sys::now_ns().saturating_sub(epoch_ns))
 }
 
 /// A thread that sends what waits, as long as a run goes on.

@@ -383,7 +383,7 @@ impl Linux {
             app,
             bytes: ROOM_BYTES,
         };
-        edge::get().set_wish(Box::leak(Box::new(wish)));
+        edge::get().set_wish(wish);
     }
 
     /// Keeps a record without values, each run of it when that is over.
@@ -406,7 +406,7 @@ impl Linux {
     /// Has the run to come replay a recording, which may begin with this job of a DAG, or before.
     pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
         let bytes = recording;
-        edge::get().set_wish(Box::leak(Box::new(EdgeMode::Replay { bytes, from })));
+        edge::get().set_wish(EdgeMode::Replay { bytes, from });
     }
 
     /// Writes the rest of what a run has recorded. Returns what a replay has found, and how

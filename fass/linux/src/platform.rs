@@ -9,15 +9,17 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use fass::Occupation;
-use fass::edge::{BootRecord, Edge, RecordedValue};
+use fass::edge::{BootRecord, Edge};
 use fass::log::LogLine;
-use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig, SubtaskRunner};
+use fass::platform::{
+    Clock, LaunchError, LockWords, Plan, Platform, RunConfig, SubtaskRunner, at_edge,
+};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request, WaitId};
 use sched_dag::{DagId, Instance, Journal, Scheduler};
 
 use crate::control::{self, Control};
-use crate::edge::{self, File, Sending};
+use crate::edge::{self, FILE, File, Sending, unpoisoned};
 use crate::level::Levels;
 use crate::office::Office;
 use crate::section;
@@ -68,7 +70,8 @@ impl Platform for Host {
     }
 
     fn clock(&self) -> &'static Clock {
-        edge::clock()
+        static CLOCK: Clock = sys::now_ns;
+        &CLOCK
     }
 
     fn may_call_app(&self) -> bool {
@@ -124,10 +127,6 @@ impl Platform for Host {
         work(&mut edge::get());
     }
 
-    fn record(&self, value: &RecordedValue<'_>) {
-        edge::record(value);
-    }
-
     fn log(&self, mut line: LogLine) {
         (line.instance, line.at_ns) = edge::here();
         line.keep();
@@ -143,9 +142,7 @@ impl Platform for Host {
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
         }
-        edge::launch(&mut plan)?;
-        plan.restore().map_err(LaunchError::new)?;
-        edge::commit(&plan, &threads.terms);
+        at_edge::launch(self, &mut plan, unpoisoned(&FILE).as_mut())?;
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
         let office = Office::new(plan.number, &plan.task_set, letters, threads.levels);

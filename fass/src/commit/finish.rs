@@ -165,7 +165,7 @@ pub fn finish_create_dags_with(
         Arc::clone(&staleness),
     );
     let launched = platform.launch(plan);
-    platform::clock::set_clock(platform.clock());
+    platform::clock::settle_clock(platform);
     match launched {
         Ok(()) => Ok(Commit {
             warnings,

@@ -302,19 +302,23 @@ pub type Outgoing = Option<Box<dyn Drain>>;
 ///
 /// let mut edge = Edge::new();
 /// assert!(!edge.is_wished());
-/// edge.set_wish(&EdgeMode::Latest { app: "pump", jobs: 4 });
+/// edge.set_wish(EdgeMode::Latest { app: "pump", jobs: 4 });
 /// assert!(edge.is_wished() && !edge.has_results());
 /// ```
 #[derive(Default)]
 pub struct Edge {
     /// The mode that the command line states.
-    wish: Option<&'static EdgeMode>,
+    wish: Option<EdgeMode>,
     /// Whether people can look at what crosses.
     shows: bool,
     crossing: Option<Box<dyn Crossing>>,
     echo: Option<Box<dyn Echoing>>,
-    /// Whether a plan has been launched with it, so that events are of interest.
+    /// Whether a plan has been launched with it.
     is_on: bool,
+    /// Whether the time that functions are told is recorded or replayed.
+    tells: bool,
+    /// When the run's time begins, on the clock.
+    epoch_ns: u64,
     /// The sender of the next run's recording.
     outgoing: Outgoing,
     /// Whether the jobs before a fault have been sent.
@@ -335,6 +339,8 @@ impl Edge {
             crossing: None,
             echo: None,
             is_on: false,
+            tells: false,
+            epoch_ns: 0,
             outgoing: None,
             has_sent_latest: false,
             refusal: None,
@@ -343,7 +349,7 @@ impl Edge {
     }
 
     /// Takes what the command line says, once.
-    pub fn set_wish(&mut self, wish: &'static EdgeMode) {
+    pub fn set_wish(&mut self, wish: EdgeMode) {
         self.wish = Some(wish);
     }
 
@@ -371,16 +377,20 @@ impl Edge {
     }
 
     /// Reports whether a plan has been launched with a wish, so that events are of interest.
-    #[must_use]
-    pub const fn is_on(&self) -> bool {
+    pub(crate) const fn is_on(&self) -> bool {
         self.is_on
+    }
+
+    /// Reports whether the time that functions are told is recorded or replayed.
+    pub(crate) const fn tells(&self) -> bool {
+        self.tells
     }
 
     /// Takes the recorded topics of a DAG, and reports whether their values are read where they
     /// are written.
     pub fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
         if self.is_wished() && self.crossing.is_none() && self.echo.is_none() {
-            (self.crossing, self.echo) = begin(self.wish.copied(), self.shows);
+            (self.crossing, self.echo) = begin(self.wish, self.shows);
         }
         if let Some(echo) = &mut self.echo {
             echo.open(channels);
@@ -392,26 +402,26 @@ impl Edge {
     }
 
     /// Sets recording or replay of a plan up, if it was asked for, and begins a recording in the
-    /// file, if there is one. Returns whether the time that functions are told is recorded, too.
-    ///
-    /// # Errors
-    ///
-    /// If nothing of the plan is recorded, it does not fit a replay, or it is a second one.
-    pub fn launch(&mut self, plan: &mut Plan, to: Option<&mut Record>) -> Result<bool, String> {
+    /// file, if there is one.
+    pub(crate) fn launch(
+        &mut self,
+        plan: &mut Plan,
+        to: Option<&mut Record>,
+    ) -> Result<(), String> {
         if let Some(echo) = &mut self.echo {
             echo.launch();
         }
         let (is_asked_for, replays) = match self.wish {
-            None => return Ok(false),
+            None => return Ok(()),
             Some(EdgeMode::Record { .. }) => (true, false),
             Some(EdgeMode::Replay { .. }) => (true, true),
             Some(EdgeMode::Latest { .. }) => (false, false),
         };
         let is_second = is_asked_for && self.is_on;
         let launched = match &mut self.crossing {
-            None if !replays => return Ok(false),
+            None if !replays => return Ok(()),
             // Of the other commits all is kept but values.
-            Some(_) if is_second && !replays => return Ok(false),
+            Some(_) if is_second && !replays => return Ok(()),
             None => Err("`replay`: no topic of the app is recorded; name topics by `Dag::record`".into()),
             Some(_) if is_second => Err(
                 "`replay`: a recording is of one commit, and this is another one; leave the word out".into()
@@ -430,12 +440,18 @@ impl Edge {
             drain.send_header(to);
         }
         self.is_on = true;
-        Ok(is_asked_for)
+        self.tells |= is_asked_for;
+        Ok(())
     }
 
-    /// Returns the time and records it, or returns the recorded one. `clock_ns` is the clock's
-    /// time, `at_ns` the run's.
-    pub fn tell_time(&mut self, instance: Option<Instance>, clock_ns: u64, at_ns: u64) -> u64 {
+    /// Converts a time on the clock to the run's.
+    const fn of_run(&self, clock_ns: u64) -> u64 {
+        clock_ns.saturating_sub(self.epoch_ns)
+    }
+
+    /// Returns the time and records it, or returns the recorded one.
+    pub(crate) fn tell_time(&mut self, instance: Option<Instance>, clock_ns: u64) -> u64 {
+        let at_ns = self.of_run(clock_ns);
         match (&mut self.crossing, instance) {
             (Some(crossing), Some(instance)) => crossing.tell_time(instance, clock_ns, at_ns),
             _ => clock_ns,
@@ -444,6 +460,7 @@ impl Edge {
 
     /// Takes what sends the recording of the run that begins, whose time begins then.
     pub fn begin_run(&mut self, epoch_ns: u64) -> Outgoing {
+        self.epoch_ns = epoch_ns;
         let mut outgoing = self.outgoing.take();
         if let Some(drain) = &mut outgoing {
             drain.begin_run(epoch_ns);
@@ -469,18 +486,16 @@ impl Edge {
         is_first.then_some(drain)
     }
 
-    /// Takes note that an instance has failed, on the run's time and the clock's.
-    pub fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
-        if self.is_on
-            && let Some(crossing) = &mut self.crossing
-        {
+    pub(crate) fn failed(&mut self, instance: Instance, clock_ns: u64) {
+        let at_ns = self.of_run(clock_ns);
+        if let Some(crossing) = &mut self.crossing {
             crossing.failed(instance, at_ns, clock_ns);
         }
     }
 
-    /// Takes a value that is not read where it was written, and when that was in the time of the
-    /// run.
-    pub fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64) {
+    /// Takes a value that is not read where it was written.
+    pub(crate) fn record(&mut self, value: &RecordedValue<'_>) {
+        let at_ns = self.of_run(value.completed_ns);
         if let Some(echo) = &mut self.echo {
             echo.record(value);
         }
@@ -489,11 +504,8 @@ impl Edge {
         }
     }
 
-    /// Takes what became of a job or an instance, if it is of interest.
-    pub fn happened(&mut self, notice: &DriverNotice) {
-        if self.is_on
-            && let Some(crossing) = &mut self.crossing
-        {
+    pub(crate) fn happened(&mut self, notice: &DriverNotice) {
+        if let Some(crossing) = &mut self.crossing {
             crossing.happened(notice);
         }
     }

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::expect_installed;
+use super::{Platform, ask_edge, expect_installed, with_edge};
 use crate::run::cell::CurrentIndex;
 
 /// How a subtask occupies its core in [`execute_for`].
@@ -94,7 +94,16 @@ pub fn now_ns() -> u64 {
     CLOCK.get()()
 }
 
-/// Replaces the clock behind [`now_ns`].
-pub(crate) fn set_clock(clock: &'static Clock) {
-    CLOCK.set(clock);
+/// Tells functions the time where that is recorded or replayed.
+static TOLD: Clock = || {
+    let platform = expect_installed();
+    let clock_ns = platform.now_ns();
+    let running = platform.running().map(|(_, instance)| instance);
+    with_edge(|edge| edge.tell_time(running, clock_ns)).unwrap_or(clock_ns)
+};
+
+/// Settles the clock behind [`now_ns`].
+pub(crate) fn settle_clock(platform: &dyn Platform) {
+    let tells = ask_edge(platform, |edge| edge.tells()).unwrap_or(false);
+    CLOCK.set(if tells { &TOLD } else { platform.clock() });
 }

@@ -61,6 +61,7 @@
 //! }
 //! ```
 
+pub mod at_edge;
 pub(crate) mod clock;
 mod run_config;
 
@@ -129,9 +130,8 @@ pub trait Platform: Sync {
     fn now_ns(&self) -> u64;
 
     /// Returns the clock behind [`crate::now_ns`], which is [`now_ns`](Self::now_ns) at first. It is
-    /// asked for at the installation and after each launch: a platform that records the time which
-    /// functions are told has a clock that does so, and any other one that takes fewer
-    /// instructions.
+    /// asked for at the installation and after each launch, for one that takes fewer instructions.
+    /// Where the [edge](Self::at_edge) records the time that functions are told, its clock does so.
     fn clock(&self) -> &'static Clock {
         &clock::ASK_THE_PLATFORM
     }
@@ -224,10 +224,10 @@ pub trait Platform: Sync {
     }
 
     /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had
-    /// sampled of one, at the end of that instance; without a
-    /// definition it is forgotten. Must not wait.
+    /// sampled of one, at the end of that instance; without
+    /// an edge it is forgotten. Must not wait.
     fn record(&self, value: &RecordedValue<'_>) {
-        let _ = value;
+        ask_edge(self, |edge| edge.record(value));
     }
 
     /// Reports whether the plan to come shall take the values of recorded sources from
@@ -334,7 +334,7 @@ impl core::error::Error for AlreadyInstalled {}
 /// ```
 pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
     if PLATFORM.set(platform) {
-        clock::set_clock(platform.clock());
+        clock::settle_clock(platform);
         guard(|| expect_installed().may_call_app());
         Ok(())
     } else {

@@ -25,7 +25,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
-use fass::platform::SubtaskRunner;
+use fass::platform::{SubtaskRunner, at_edge};
 use sched_dag::engine::{Engine, FaultCost, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, PendingRequests, Request};
@@ -156,7 +156,7 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
     fn hear(&mut self, notice: &DriverNotice) {
-        edge::happened(notice);
+        at_edge::happened(notice);
     }
 
     fn now_ns(&self) -> u64 {
@@ -313,7 +313,7 @@ impl State {
             FaultCause::Overrun => ("its budget was exceeded".into(), true),
         };
         let instance = self.engine.scheduler.instance_of(vertex);
-        edge::failed(instance);
+        at_edge::failed(instance, sys::now_ns());
         let (engine, mut port) = self.parts(workers);
         let now_ns = port.now_ns();
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);

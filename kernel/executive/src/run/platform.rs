@@ -4,9 +4,9 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::Occupation;
-use fass::edge::{BootRecord, Edge, RecordedValue};
+use fass::edge::Edge;
 use fass::log::LogLine;
-use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig};
+use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig, at_edge};
 use sched_dag::lifecycle::WaitId;
 use sched_dag::{DagId, Instance};
 
@@ -22,8 +22,6 @@ pub struct Kernel {
     coincidence_ns: AtomicU64,
     /// Whether a commit is the kernel's own, to measure overheads with.
     calibrates: AtomicBool,
-    /// Whether the time that functions are told is recorded or replayed.
-    tells: AtomicBool,
     /// The number of the latest plan.
     plan: AtomicU64,
 }
@@ -33,7 +31,6 @@ pub static KERNEL: Kernel = Kernel {
     terms: SpinLock::new(RunConfig::of_cores(1)),
     coincidence_ns: AtomicU64::new(0),
     calibrates: AtomicBool::new(false),
-    tells: AtomicBool::new(false),
     plan: AtomicU64::new(0),
 };
 
@@ -57,15 +54,6 @@ impl Kernel {
 
 static CLOCK: Clock = clock::now_ns;
 
-/// Tells functions the time where that is recorded or replayed.
-static TOLD: Clock = || {
-    let clock_ns = clock::now_ns();
-    let mut edge = edge::get();
-    // Interrupts are off, so it stays here.
-    let running = execution::running(this_core::get());
-    edge.tell_time(running, clock_ns, execution::since_epoch(clock_ns))
-};
-
 impl Platform for Kernel {
     fn terms(&self) -> RunConfig {
         let mut terms = self.terms.lock().clone();
@@ -81,10 +69,7 @@ impl Platform for Kernel {
     }
 
     fn clock(&self) -> &'static Clock {
-        match self.tells.load(Ordering::Relaxed) {
-            true => &TOLD,
-            false => &CLOCK,
-        }
+        &CLOCK
     }
 
     fn may_call_app(&self) -> bool {
@@ -124,10 +109,6 @@ impl Platform for Kernel {
         work(&mut edge::get());
     }
 
-    fn record(&self, value: &RecordedValue<'_>) {
-        edge::record(value, execution::since_epoch(value.completed_ns));
-    }
-
     fn log(&self, mut line: LogLine) {
         line.instance = self.running().map(|(_, instance)| instance);
         line.at_ns = execution::since_epoch(clock::now_ns());
@@ -139,16 +120,7 @@ impl Platform for Kernel {
         let terms = self.terms();
         let coincidence_ns = self.coincidence_ns.load(Ordering::Relaxed);
         if !self.calibrates.load(Ordering::Relaxed) {
-            let launched = record::with(|mut record| {
-                let launched =
-                    edge::launch(&mut plan, record.as_deref_mut().map(BootRecord::file))?;
-                if let Some(record) = record {
-                    record.commit(&plan, &terms.scheduler, terms.overheads);
-                }
-                Ok(launched)
-            });
-            self.tells.fetch_or(launched?, Ordering::Relaxed);
-            plan.restore().map_err(LaunchError::new)?;
+            record::with(|record| at_edge::launch(self, &mut plan, record))?;
             stacks::watch(&mut plan);
         }
         let number = plan.number;

@@ -20,7 +20,7 @@ use super::status::note_running;
 use crate::machine::clock;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::run::{contexts, edge};
+use crate::run::contexts;
 
 /// A step of the engine on this core.
 pub(super) struct SmpPort<'a> {
@@ -88,7 +88,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 
     fn hear(&mut self, notice: &DriverNotice) {
-        edge::happened(notice);
+        fass::platform::at_edge::happened(notice);
     }
 }
 

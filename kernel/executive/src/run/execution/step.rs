@@ -34,7 +34,7 @@ use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, section, turns};
-use crate::run::{contexts, edge};
+use crate::run::contexts;
 
 impl ClusterRun {
     /// Returns the engine, and the port for a step of it.
@@ -310,7 +310,7 @@ pub fn fail(left: &AbandonedContext) -> Option<FaultCost> {
     let clock_ns = clock::now_ns();
     let ended_ns = since_epoch(clock_ns);
     note_running(core, None);
-    edge::failed(lost.instance, ended_ns, clock_ns);
+    fass::platform::at_edge::failed(lost.instance, clock_ns);
     let mut woken = CoreSet::default();
     let (engine, mut port) = execution.parts(&mut woken);
     let cost = engine.tell_fault((ended_ns, here), lost.vertex, Some(lost), &mut port);
