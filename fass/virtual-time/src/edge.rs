@@ -7,11 +7,10 @@
 //! other recorded values are compared.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 
 use fass::edge::{self, Replay};
 use fass::edge::{LatestJobs, RecordedValue};
-use fass::platform::{Plan, RunConfig};
+use fass::platform::Plan;
 use recording::{Channel, Entry, EntryKind, Header, Malformed};
 use sched_dag::engine::Run;
 use sched_dag::journal::{self, Event};
@@ -28,15 +27,13 @@ pub(crate) struct Edge {
     header: RefCell<Header>,
     /// The values so far, in the order in which they were complete.
     values: RefCell<Vec<Kept>>,
-    /// Times that the running instance was told, if they are recorded.
-    told: RefCell<Option<Told>>,
-    /// How many times each instance was told before its wait.
-    told_before: RefCell<BTreeMap<Instance, usize>>,
+    /// The times that the running instance was told in its turn, if they are recorded.
+    told: RefCell<Vec<u64>>,
     /// The inputs of the last jobs, if not all is kept.
     latest: RefCell<Option<LatestJobs>>,
     replay: RefCell<Option<Replay>>,
     /// The begin of the record: what was committed.
-    committed: RefCell<Option<edge::BootRecord<Vec<u8>>>>,
+    pub(crate) committed: RefCell<Option<edge::BootRecord<Vec<u8>>>>,
 }
 
 /// An entry of the recording to be, without its value, and the value.
@@ -44,17 +41,6 @@ pub(crate) struct Edge {
 struct Kept {
     entry: Entry<'static>,
     bytes: Vec<u8>,
-}
-
-/// Answers to an instance that asks for the time.
-#[derive(Debug)]
-struct Told {
-    /// Those of this run.
-    answers: Vec<u64>,
-    /// Those of the recorded run.
-    recorded: Vec<u64>,
-    /// How many of these were for earlier turns.
-    before: usize,
 }
 
 /// Returns an entry without its value, of a job whose release is not known yet.
@@ -185,54 +171,27 @@ impl Edge {
         Ok(())
     }
 
-    /// Takes what is committed.
-    pub(crate) fn commit(&self, plan: &Plan, terms: &RunConfig) {
-        let mut record = edge::BootRecord::new(Vec::new());
-        record.commit(plan, &terms.scheduler, terms.overheads);
-        self.committed.replace(Some(record));
-    }
-
-    /// Begins a turn of an instance, its first or a later one.
-    pub(crate) fn start_turn(&self, instance: Instance, is_later: bool) {
-        let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
+    /// Answers a function that asks for the time: with what was answered in the recorded run, if
+    /// that is recorded.
+    pub(crate) fn answer_ns(&self, instance: Option<Instance>, now_ns: u64) -> u64 {
+        let header = self.header.borrow();
         // Only for DAGs of which something is recorded: the others are never replayed.
-        let is_noted = self.header.borrow().channels.iter().any(of_dag);
-        let recorded = self.of_replay(|replay| replay.clock(instance).map(<[u64]>::to_vec));
-        let before = self.told_before.borrow_mut().remove(&instance);
-        self.told.replace(is_noted.then(|| Told {
-            answers: Vec::new(),
-            recorded: recorded.unwrap_or_default(),
-            before: before.filter(|_| is_later).unwrap_or(0),
-        }));
-    }
-
-    /// Answers a function that asks for the time: with what was answered then, if it is
-    /// recorded.
-    pub(crate) fn answer_ns(&self, now_ns: u64) -> u64 {
-        let mut told = self.told.borrow_mut();
-        let Some(told) = &mut *told else {
+        let is_noted = |of: &Instance| {
+            let mut channels = header.channels.iter();
+            channels.any(|channel| usize::from(channel.dag) == of.dag.index())
+        };
+        let Some(instance) = instance.filter(is_noted) else {
             return now_ns;
         };
-        let place = told.before + told.answers.len();
-        // By its place among the answers. A function that asks more often than it did is told this
-        // run's time.
-        let answer_ns = told.recorded.get(place).copied().unwrap_or(now_ns);
-        told.answers.push(answer_ns);
+        let told_ns = self.of_replay(|replay| replay.next_told_ns(instance));
+        let answer_ns = told_ns.unwrap_or(now_ns);
+        self.told.borrow_mut().push(answer_ns);
         answer_ns
     }
 
-    /// Ends a turn of an instance, which began then, and which a wait and others follow or not.
-    pub(crate) fn finish_turn(&self, instance: Instance, start_ns: u64, goes_on: bool) {
-        let Some(Told {
-            answers, before, ..
-        }) = self.told.take()
-        else {
-            return;
-        };
-        if goes_on {
-            let told = before + answers.len();
-            self.told_before.borrow_mut().insert(instance, told);
-        }
+    /// Ends a turn of an instance, which began then.
+    pub(crate) fn finish_turn(&self, instance: Instance, start_ns: u64) {
+        let answers = self.told.take();
         if answers.is_empty() {
             return;
         }

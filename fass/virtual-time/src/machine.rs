@@ -382,14 +382,11 @@ impl Workload<SubtaskRunner> for Calls {
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         machine.running.set(Some(instance));
-        let is_later = runner.body.goes_on(instance.job);
-        machine.edge.start_turn(instance, is_later);
         let settings = machine.settings.borrow();
         let mut faults = settings.faults.iter();
         let fails = faults.any(|fault| fault.is(instance, &self.task_set));
         let mut result = self.call(runner, fails);
-        let goes_on = runner.body.goes_on(instance.job);
-        machine.edge.finish_turn(instance, now_ns, goes_on);
+        machine.edge.finish_turn(instance, now_ns);
         machine.running.set(None);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);

@@ -11,9 +11,9 @@ use std::thread;
 use std::time::Duration;
 
 use fass::Occupation;
-use fass::edge::{Begin, RecordedValue};
+use fass::edge::{Begin, BootRecord, RecordedValue};
 use fass::log::{Level, LogLine, set_level};
-use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig};
+use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig, at_edge};
 use fass::shared::{DeviceDriver, Wire};
 use recording::{Channel, Entry, EntryKind};
 use sched_dag::lifecycle::{Request, WaitId};
@@ -42,7 +42,8 @@ impl Drop for Held<'_> {
 /// The clock of functions, whose answers are recorded.
 static TOLD: Clock = || {
     let machine = expect_current();
-    machine.edge.answer_ns(machine.now_ns.get())
+    let running = machine.running.get();
+    machine.edge.answer_ns(running, machine.now_ns.get())
 };
 
 /// Makes a machine and makes it this thread's.
@@ -316,10 +317,10 @@ impl Platform for HostPlatform {
             )));
         }
         let launched = machine.edge.launch(&mut plan, settings.most_jobs);
-        launched
-            .and_then(|()| plan.restore())
-            .map_err(LaunchError::new)?;
-        machine.edge.commit(&plan, &settings.terms);
+        launched.map_err(LaunchError::new)?;
+        let mut record = BootRecord::new(Vec::new());
+        at_edge::launch(self, &mut plan, Some(&mut record))?;
+        machine.edge.committed.replace(Some(record));
         machine.plan.set(Some(plan.number));
         let session = Session::new(plan, settings.terms.scheduler, &machine);
         machine.session.replace(Some(session));

@@ -240,16 +240,8 @@ impl Replay {
         u16::try_from(dag.0).is_ok_and(|dag| self.passed.is_of(dag))
     }
 
-    /// Returns the times that an instance was told, in the order in which it asked.
-    #[must_use]
-    pub fn clock(&self, instance: Instance) -> Option<&[u64]> {
-        let (dag, subtask) = narrow(instance)?;
-        let told = self.clock.get(&(dag, subtask, instance.job))?;
-        Some(&told.times)
-    }
-
-    /// Takes the next one of these times.
-    pub(super) fn next_told_ns(&mut self, instance: Instance) -> Option<u64> {
+    /// Takes the next one of the times that an instance was told, in the order in which it asked.
+    pub fn next_told_ns(&mut self, instance: Instance) -> Option<u64> {
         let (dag, subtask) = narrow(instance)?;
         let told = self.clock.get_mut(&(dag, subtask, instance.job))?;
         let time_ns = told.times.get(told.taken).copied();
