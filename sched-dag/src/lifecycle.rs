@@ -503,26 +503,28 @@ pub fn divide(
         let is_here = |dag| cluster_of(dag) == cluster;
         lifecycle.map(|whole| whole.part(&is_here, cluster == first))
     };
-    let letters = Mailboxes {
-        dags: (task_set.dags().iter())
-            .map(|dag| DagMailbox {
-                cluster: dag.cluster(),
-                signals: AtomicU32::new(0),
-                change: AtomicU32::new(NOTHING),
-                end: AtomicU32::new(NOTHING),
-                answers: answers(dag),
-            })
-            .collect(),
-        clusters: task_set
-            .clusters()
-            .map(|_| ClusterMailbox::default())
-            .collect(),
-        of_modes: first,
-    };
+    let letters = Mailboxes::new(task_set, first);
     Ok((letters, task_set.clusters().map(part).collect()))
 }
 
 impl Mailboxes {
+    /// Makes room for the letters of a run, of which one cluster serves modes.
+    pub(crate) fn new(task_set: &TaskSet, of_modes: ClusterId) -> Self {
+        let mailbox = |dag: &Dag| DagMailbox {
+            cluster: dag.cluster(),
+            signals: AtomicU32::new(0),
+            change: AtomicU32::new(NOTHING),
+            end: AtomicU32::new(NOTHING),
+            answers: answers(dag),
+        };
+        let clusters = task_set.clusters();
+        Self {
+            dags: task_set.dags().iter().map(mailbox).collect(),
+            clusters: clusters.map(|_| ClusterMailbox::default()).collect(),
+            of_modes,
+        }
+    }
+
     /// Leaves a request for the clusters that it concerns, other than the one that it comes `from`,
     /// if any; calls `sent` for each of them, and reports whether it does not concern that one.
     pub fn send(

@@ -54,7 +54,7 @@ use crate::engine::{Engine, FaultCost, NextAction, PlatformPort, Run, SubtaskBod
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{Lifecycle, LifecycleChange, PendingRequests, Request, WaitId};
+use crate::lifecycle::{self, Lifecycle, Mailboxes, PendingRequests, Request, WaitId};
 use crate::placement::NextWork;
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{DriverNotice, Moment, Scheduler};
@@ -66,10 +66,7 @@ pub struct VirtualTime<B: SubtaskBody = Instance> {
     now_ns: u64,
     /// Instances that fail at the present instant.
     failing: Vec<(Instance, CoreId, B)>,
-    lifecycle: Option<Box<dyn Lifecycle>>,
-    has_begun: bool,
-    /// Whether a request waits for jobs to end.
-    waits: bool,
+    letters: Arc<Mailboxes>,
 }
 
 /// Why a run in virtual time has ended.
@@ -125,9 +122,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
             failing: Vec::with_capacity(clusters.iter().map(cores).sum()),
             now_ns: 0,
             clusters,
-            lifecycle: None,
-            has_begun: false,
-            waits: false,
+            letters: Arc::new(Mailboxes::new(task_set, ClusterId(0))),
         };
         for body in bodies {
             let instance = body.subject().instance();
@@ -138,9 +133,22 @@ impl<B: SubtaskBody> VirtualTime<B> {
     }
 
     /// Takes what serves requests other than signals.
-    #[must_use]
-    pub fn with_lifecycle(self, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
-        Self { lifecycle, ..self }
+    ///
+    /// # Errors
+    ///
+    /// Why it cannot be divided among the clusters.
+    pub fn with_lifecycle(
+        mut self,
+        lifecycle: Option<Box<dyn Lifecycle>>,
+    ) -> Result<Self, &'static str> {
+        let task_set = &self.clusters[0].engine.task_set;
+        let dags = task_set.dags().len();
+        let (letters, parts) = lifecycle::divide(task_set, lifecycle.as_deref())?;
+        self.letters = Arc::new(letters);
+        for (cluster, part) in self.clusters.iter_mut().zip(parts) {
+            cluster.engine.requests = PendingRequests::new(dags, part);
+        }
+        Ok(self)
     }
 
     /// Writes all that happens down.
@@ -188,6 +196,8 @@ impl<B: SubtaskBody> VirtualTime<B> {
             now_ns: self.now_ns,
             workload,
             begun_ns,
+            letters: &Arc::clone(&self.letters),
+            has_letters: false,
         };
         while !now.workload.stops() {
             let of_scheduler = |cluster: &ClusterRun<B>| cluster.engine.scheduler.next_event_ns();
@@ -262,12 +272,9 @@ impl<B: SubtaskBody> VirtualTime<B> {
         }
         // The list goes back for its memory.
         self.failing = failing;
-        if !core::mem::replace(&mut self.has_begun, true) {
-            self.serve(Request::Begin, now);
-        }
-        if core::mem::take(&mut self.waits) {
-            self.serve(Request::GoOn, now);
-        }
+        let asked =
+            (self.clusters.iter_mut()).filter(|cluster| !cluster.engine.requests.are_none());
+        asked.for_each(|cluster| cluster.tell(now, |_| ()));
         while let Some(request) = now.workload.take_request(now.now_ns) {
             self.serve(request, now);
         }
@@ -289,7 +296,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
                     [self.next_finish_ns(), now.workload.next_request_ns()].into_iter();
                 let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now.now_ns));
                 // The short way is right only if this finish is all that happens at this instant.
-                let is_alone = core::mem::take(&mut is_first) && is_last && !self.waits;
+                let is_alone = core::mem::take(&mut is_first) && is_last;
                 let (cluster, instance) = (&mut self.clusters[place], body.subject().instance());
                 if now.workload.fails(instance) {
                     self.failing.push((instance, core, body));
@@ -301,55 +308,12 @@ impl<B: SubtaskBody> VirtualTime<B> {
         Ok(false)
     }
 
-    /// Serves a request at this instant.
+    /// Serves a request at this instant, in the clusters that it concerns.
     fn serve(&mut self, request: Request, now: &mut VirtualInstant<'_, impl Workload<B>>) {
-        let mut changes = Vec::new();
-        match (request, &mut self.lifecycle) {
-            // A signal concerns one DAG, as an answer does, and no lifecycle.
-            (Request::Signal(dag), _) => _ = self.change(dag, request, now),
-            (Request::Answer(wait), _) => _ = self.change(wait.instance.dag, request, now),
-            (_, Some(lifecycle)) => lifecycle.serve(request, &mut changes),
-            (_, None) => {}
-        }
-        // Between clusters the journals know no order within an instant; what is entered comes
-        // after what has led to it.
-        let mut latest = 0;
-        for change in changes {
-            let (dag, request) = match change {
-                LifecycleChange::Pause(dag) => (dag, Request::Pause(dag)),
-                LifecycleChange::Resume(dag) => (dag, Request::Resume(dag)),
-                LifecycleChange::Close(dag) => (dag, Request::Close(dag)),
-                LifecycleChange::Await(dag) if self.scheduler_of(dag).in_flight(dag) == 0 => {
-                    continue;
-                }
-                LifecycleChange::Await(_) => {
-                    self.waits = true;
-                    break;
-                }
-                LifecycleChange::Enter(mode) => {
-                    self.waits = false;
-                    self.clusters[latest].tell(now, |moment| moment.entered(mode));
-                    continue;
-                }
-            };
-            latest = self.change(dag, request, now).unwrap_or(latest);
-        }
-    }
-
-    /// Has the cluster of a DAG serve a request, and returns its place if anything has changed.
-    fn change(
-        &mut self,
-        dag: DagId,
-        request: Request,
-        now: &mut VirtualInstant<'_, impl Workload<B>>,
-    ) -> Option<usize> {
-        let place = self.cluster_index(dag);
-        let cluster = &mut self.clusters[place];
-        // A request that changes nothing writes nothing.
-        let before = cluster.engine.scheduler.log.journal.written();
-        cluster.tell(now, |moment| moment.serve(request));
-        let is_written = cluster.engine.scheduler.log.journal.written() > before;
-        is_written.then_some(place)
+        self.letters.send(None, request, |cluster| {
+            now.has_letters = true;
+            self.clusters[cluster.index()].tell(now, |_| ());
+        });
     }
 
     /// Returns the place of the cluster that runs a DAG.
@@ -490,6 +454,9 @@ struct VirtualInstant<'a, W> {
     workload: &'a mut W,
     /// How long the instance that has begun last executes.
     begun_ns: Result<u64, RunOutcome>,
+    letters: &'a Mailboxes,
+    /// Whether there is one, for the cluster that is told next.
+    has_letters: bool,
 }
 
 impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
@@ -515,11 +482,19 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
 
     /// All requests of an instant are served after all its completions.
     fn forward(&mut self, request: Request) -> bool {
-        let is_asked = request != Request::Step;
-        if is_asked {
+        let is_own = matches!(request, Request::Step | Request::Begin | Request::GoOn);
+        if !is_own {
             self.workload.request(request, self.now_ns);
         }
-        is_asked
+        !is_own
+    }
+
+    fn has_letters(&self) -> bool {
+        self.has_letters
+    }
+
+    fn take_letters(&mut self) -> Option<&Mailboxes> {
+        core::mem::take(&mut self.has_letters).then_some(self.letters)
     }
 
     fn hear(&mut self, notice: &DriverNotice) {

@@ -194,7 +194,11 @@ fn dags(task_set: &TaskSet) -> impl Iterator<Item = (DagId, &Dag)> + Clone {
 }
 
 impl Session {
-    pub(crate) fn new(plan: Plan, options: SchedulerOptions, machine: &Rc<Machine>) -> Self {
+    pub(crate) fn new(
+        plan: Plan,
+        options: SchedulerOptions,
+        machine: &Rc<Machine>,
+    ) -> Result<Self, &'static str> {
         let task_set: Arc<TaskSet> = plan.task_set;
         // In a replay, the first signal of each; the others follow one by one.
         for (dag, _) in dags(&task_set).filter(|(_, model)| model.is_sporadic()) {
@@ -202,12 +206,12 @@ impl Session {
         }
         let bodies = SubtaskRunner::all(&task_set, plan.bodies);
         let driver = Driver::of_bodies(&task_set, options, bodies, &plan.after_fault);
-        Self {
+        Ok(Self {
             may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
-            driver: driver.with_lifecycle(plan.lifecycle).recording(),
+            driver: driver.with_lifecycle(plan.lifecycle)?.recording(),
             calls: Calls::new(&task_set, machine),
             until_ns: 0,
-        }
+        })
     }
 
     /// Returns the number of the DAG of this name.

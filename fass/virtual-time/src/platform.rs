@@ -323,7 +323,7 @@ impl Platform for HostPlatform {
         machine.edge.committed.replace(Some(record));
         machine.plan.set(Some(plan.number));
         let session = Session::new(plan, settings.terms.scheduler, &machine);
-        machine.session.replace(Some(session));
+        (machine.session).replace(Some(session.map_err(LaunchError::new)?));
         Ok(())
     }
 }

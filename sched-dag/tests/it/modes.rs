@@ -14,7 +14,8 @@ use crate::support::{Run, Script, Spec, TWO_CORES, Takes, dag, driver, number};
 /// Runs all jobs of DAGs on two cores.
 fn run(specs: &[DagSpec], lifecycle: LifecyclePlan, script: Script<'_, impl Takes>) -> Run {
     let in_virtual_time = driver(specs, TWO_CORES);
-    let run = script.run(in_virtual_time.with_lifecycle(Some(Box::new(lifecycle))));
+    let driver = in_virtual_time.with_lifecycle(Some(Box::new(lifecycle)));
+    let run = script.run(driver.expect("there is one cluster"));
     assert!(run.driver.is_finished());
     run
 }

@@ -272,7 +272,8 @@ impl Case {
         let count = u32::try_from(self.task_set.dags().len()).expect("few DAGs");
         let plan = LifecyclePlan::new(count, true).with_modes(scenario.modes.clone());
         let run = VirtualTime::of_bodies(&self.task_set, options, bodies, &[]);
-        let mut run = run.with_lifecycle(Some(Box::new(plan))).recording();
+        let run = run.with_lifecycle(Some(Box::new(plan)))?;
+        let mut run = run.recording();
         let _ = run.run_until(scenario.until_ns, &mut world);
         let events = run.events();
         if is_judged {
