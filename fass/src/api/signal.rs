@@ -191,7 +191,7 @@ impl Dag {
     /// finish_create_dags(&[brakes, steering]).unwrap();
     /// let report = machine.run();
     /// assert_eq!(report.panics.len(), 1);
-    /// assert_eq!(report.jobs.last().unwrap().release_ns, 30_000_000); // at the fault
+    /// assert_eq!(report.jobs.last().unwrap().release_ns, Some(30_000_000)); // at the fault
     /// assert_eq!(report.dag("brakes").statistics().completed, 1);
     /// ```
     #[track_caller]

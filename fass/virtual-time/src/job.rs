@@ -165,7 +165,7 @@ impl fmt::Display for JobShown {
             Some(JobOutcome::Failed) => "cut by a fault",
             Some(JobOutcome::DagEnded) => "cut by the end of its dag",
         };
-        let release_ns = times.release_ns;
+        let release_ns = times.release_ns.unwrap_or_default();
         write!(
             f,
             "job {job} of dag `{dag}`, due at {release_ns} ns: {outcome}"

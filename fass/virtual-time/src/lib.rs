@@ -99,7 +99,7 @@ pub use settings::Silent;
 /// let report = machine.run();
 /// assert_eq!(report.violations(), []);
 /// assert_eq!(report.jobs[0].response_time_ns(), Some(5_000_000));
-/// assert_eq!(report.jobs[1].release_ns, 10_000_000);
+/// assert_eq!(report.jobs[1].release_ns, Some(10_000_000));
 /// ```
 #[derive(Debug)]
 pub struct VirtualTime {
@@ -262,7 +262,7 @@ impl VirtualTime {
     ///
     /// let report = machine.run();
     /// assert_eq!(report.violations(), []);
-    /// assert_eq!(report.jobs[1].release_ns, 57_000_000);
+    /// assert_eq!(report.jobs[1].release_ns, Some(57_000_000));
     /// ```
     ///
     /// # Panics

@@ -100,7 +100,10 @@ impl Report {
                 times: *run.record().instance(instance)?,
             })
         });
-        let jobs = of(EventKind::Released).filter_map(|event| JobRecord::new(&run, event));
+        let jobs = of(EventKind::Released).filter_map(|&Event { dag, job, .. }| {
+            let times = *run.record().job(dag, job)?;
+            Some(JobRecord { dag, job, times })
+        });
         let shown = |line: &LogLine| line.shown(Some(run.task_set())).to_string();
         Self {
             instances: instances.collect(),
@@ -341,10 +344,6 @@ pub struct JobRecord {
     pub dag: DagId,
     /// The job.
     pub job: u64,
-    /// The nominal release time, in nanoseconds, from which the deadline counts.
-    pub release_ns: u64,
-    /// The absolute deadline of the whole job, the latest one of its sinks'.
-    pub deadline_ns: u64,
     pub(crate) times: law::JobRecord,
 }
 
@@ -361,31 +360,6 @@ impl Deref for JobRecord {
 
     fn deref(&self) -> &law::JobRecord {
         &self.times
-    }
-}
-
-impl JobRecord {
-    /// Takes the job of a release.
-    pub(crate) fn new(run: &Run, release: &Event) -> Option<Self> {
-        let Event { dag, job, .. } = *release;
-        let times = *run.record().job(dag, job)?;
-        let release_ns = times.release_ns.unwrap_or(release.time_ns);
-        let deadline_ns = run.task_set().dag(dag).relative_deadline_ns();
-        Some(Self {
-            dag,
-            job,
-            release_ns,
-            deadline_ns: release_ns.saturating_add(deadline_ns),
-            times,
-        })
-    }
-
-    /// Returns the time from the nominal release to the end, if there was one.
-    ///
-    /// See [`Report`].
-    #[must_use]
-    pub fn response_time_ns(&self) -> Option<u64> {
-        self.ended_ns.map(|ended_ns| ended_ns - self.release_ns)
     }
 }
 

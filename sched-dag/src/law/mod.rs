@@ -83,6 +83,14 @@ pub struct JobRecord {
     pub outcome: Option<JobOutcome>,
 }
 
+impl JobRecord {
+    /// Returns the time from the nominal release to the end, if there was one.
+    #[must_use]
+    pub fn response_time_ns(&self) -> Option<u64> {
+        Some(self.ended_ns?.saturating_sub(self.release_ns?))
+    }
+}
+
 /// Options of the judge: whether a journal is whole and complete, and the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JudgeOptions {

@@ -543,7 +543,7 @@ fn a_late_job_of_a_long_recording_is_computed_at_once() {
     let machine = replaying(&bytes).from("filter", LAST);
     commit(&[long()]);
     let job = machine.until("filter", LAST).expect("it is there");
-    let release_ns = job.times.map(|times| times.release_ns);
+    let release_ns = job.times.and_then(|times| times.release_ns);
     assert_eq!(release_ns, Some(LAST * 1_000_000));
     let report = machine.run();
     assert_eq!(found(&report), (vec![], None, None));
