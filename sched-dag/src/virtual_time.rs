@@ -112,9 +112,16 @@ impl<B: SubtaskBody> VirtualTime<B> {
         bodies: impl IntoIterator<Item = B>,
         after_fault: &[Option<DagId>],
     ) -> Self {
-        let clusters = task_set.clusters().map(|cluster| {
-            let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
-            ClusterRun::new(scheduler, cluster, after_fault.to_vec())
+        type Any<'a> = VirtualInstant<'a, ExecutionTimes<fn(Instance) -> u64>>;
+        let none = task_set.clusters().map(|_| None).collect();
+        let no_journal = |_| Journal::none();
+        let engines =
+            Engine::of_clusters::<Any<'_>>(task_set, options, none, after_fault, no_journal);
+        let clusters = engines.map(|engine| ClusterRun {
+            running: (0..engine.scheduler.options().cores)
+                .map(|_| None)
+                .collect(),
+            engine,
         });
         let clusters: Box<[ClusterRun<B>]> = clusters.collect();
         let cores = |cluster: &ClusterRun<B>| cluster.engine.scheduler.options().cores as usize;
@@ -503,16 +510,6 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
 }
 
 impl<B: SubtaskBody> ClusterRun<B> {
-    fn new(scheduler: Scheduler, cluster: ClusterId, after_fault: Vec<Option<DagId>>) -> Self {
-        type Any<'a> = VirtualInstant<'a, ExecutionTimes<fn(Instance) -> u64>>;
-        let cores = scheduler.options().cores;
-        let (journal, none) = (Journal::none(), PendingRequests::new(0, None));
-        Self {
-            engine: Engine::new::<Any<'_>>(cluster, scheduler, journal, none, after_fault),
-            running: (0..cores).map(|_| None).collect(),
-        }
-    }
-
     fn next_finish_ns(&self) -> Option<u64> {
         let running = self.running.iter().flatten();
         running.map(|(finish_ns, _)| *finish_ns).min()

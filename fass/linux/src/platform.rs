@@ -14,16 +14,16 @@ use fass::log::LogLine;
 use fass::platform::{
     Clock, LaunchError, LockWords, Plan, Platform, RunConfig, SubtaskRunner, at_edge,
 };
-use sched_dag::engine::{self, ProvenBounds};
-use sched_dag::lifecycle::{self, Parts, PendingRequests, Request, WaitId};
-use sched_dag::{DagId, Instance, Journal, Scheduler};
+use sched_dag::engine::{self, Engine, ProvenBounds};
+use sched_dag::lifecycle::{self, Parts, Request, WaitId};
+use sched_dag::{DagId, Instance, Journal};
 
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, Sending, unpoisoned};
 use crate::level::Levels;
 use crate::office::Office;
 use crate::section;
-use crate::state::{Fault, Number, RunTime, State};
+use crate::state::{Fault, Number, RunTime, State, ThreadPort};
 use crate::sys;
 use crate::team::{self, Budgets, Team, with_own_worker};
 
@@ -167,7 +167,6 @@ impl Platform for Host {
 /// Makes what the threads of each cluster share.
 fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> Arc<[Arc<Team>]> {
     let (task_set, options) = (&plan.task_set, threads.terms.scheduler);
-    let dags = task_set.dags().len();
     let mut runners: Vec<Vec<SubtaskRunner>> = task_set.clusters().map(|_| Vec::new()).collect();
     for runner in SubtaskRunner::all(task_set, plan.bodies) {
         let cluster = task_set.dag(runner.instance.dag).cluster();
@@ -175,19 +174,14 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
     }
     let share = JOURNAL_BYTES / runners.len();
     let most_events = threads.terms.most_events / runners.len() as u64;
-    let clusters = task_set.clusters().zip(runners).zip(parts);
-    let team = |((cluster, runners), lifecycle)| {
-        let cores = task_set.cores_of(cluster, options.cores);
-        let requests = PendingRequests::new(dags, lifecycle);
-        let state = State::new(
-            (cluster, office),
-            Scheduler::of_cluster(Arc::clone(task_set), options, cluster),
-            runners,
-            (requests, plan.after_fault.clone()),
-            Journal::of_cluster(task_set, cluster, share, most_events),
-            threads.processors[cores.start as usize..cores.end as usize].into(),
-            threads.levels,
-        );
+    let journal = |cluster| Journal::of_cluster(task_set, cluster, share, most_events);
+    let after_fault = &plan.after_fault;
+    let engines =
+        Engine::of_clusters::<ThreadPort<'_>>(task_set, options, parts, after_fault, journal);
+    let team = |(engine, runners): (Engine<_, _>, _)| {
+        let cores = task_set.cores_of(engine.cluster, options.cores);
+        let processors = &threads.processors[cores.start as usize..cores.end as usize];
+        let state = State::new(engine, office, runners, processors.into());
         Arc::new(Team::new(
             state,
             office,
@@ -195,7 +189,7 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
             threads.terms.budget_factor,
         ))
     };
-    clusters.map(team).collect()
+    engines.zip(runners).map(team).collect()
 }
 
 /// The stack of each worker. All of it is locked in memory, if memory is.

@@ -17,7 +17,7 @@
 //!   platforms alike.
 //! - The journal is in the order in which things were decided. A [start](PlatformPort::start) is
 //!   written before the function begins.
-//! - After [`Engine::new`] nothing is allocated here, and no step is unbounded but by the releases
+//! - After [`Engine::of_clusters`] nothing is allocated here, and no step is unbounded but by the releases
 //!   and deadlines that have passed since the last one.
 
 mod run;
@@ -30,8 +30,9 @@ use core::ops::DerefMut;
 use crate::ids::{ClusterId, CoreId, DagId, Vertex};
 use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{Mailboxes, PendingRequests, Request};
+use crate::lifecycle::{Mailboxes, Parts, PendingRequests, Request};
 use crate::placement::{NextWork, Placement};
+use crate::policy::SchedulerOptions;
 use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
 use crate::task_set::{Dag, TaskSet};
 
@@ -65,13 +66,29 @@ pub struct Engine<B: SubtaskBody, P> {
 }
 
 impl<B: SubtaskBody, P> Engine<B, P> {
-    /// Makes one without bodies, and takes all memory that it will need.
-    pub fn new<C: PlatformPort<B>>(
+    /// Makes one without bodies for each cluster of a task set, which has its part of what serves
+    /// requests, and takes all memory that they will need. By DAG, `after_fault` is the one that gets a
+    /// signal when a fault ends it.
+    pub fn of_clusters<C: PlatformPort<B>>(
+        task_set: &Arc<TaskSet>,
+        options: SchedulerOptions,
+        parts: Parts,
+        after_fault: &[Option<DagId>],
+        journal: impl Fn(ClusterId) -> Journal,
+    ) -> impl Iterator<Item = Self> {
+        task_set.clusters().zip(parts).map(move |(cluster, part)| {
+            let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
+            let requests = PendingRequests::new(task_set.dags().len(), part);
+            Self::new::<C>(cluster, scheduler, journal(cluster), requests, after_fault)
+        })
+    }
+
+    fn new<C: PlatformPort<B>>(
         cluster: ClusterId,
         mut scheduler: Scheduler,
         journal: Journal,
         requests: PendingRequests,
-        after_fault: Vec<Option<DagId>>,
+        after_fault: &[Option<DagId>],
     ) -> Self {
         let task_set = Arc::clone(scheduler.task_set());
         let (vertices, cores) = (task_set.vertices(), scheduler.options().cores as usize);
@@ -87,7 +104,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             requests,
             lost: Vec::with_capacity(vertices),
             alternates: (0..vertices).map(|_| None).collect(),
-            after_fault,
+            after_fault: after_fault.to_vec(),
             notices: Vec::with_capacity(room),
             // No more instances are in flight, and each is cancelled once at most.
             undiscarded: Vec::with_capacity(instances),

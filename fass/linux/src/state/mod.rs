@@ -28,11 +28,9 @@ use std::sync::atomic::AtomicU32;
 use fass::platform::{SubtaskRunner, at_edge};
 use sched_dag::engine::{Engine, FaultCost, PlatformPort};
 use sched_dag::journal::EventKind;
-use sched_dag::lifecycle::{Mailboxes, PendingRequests, Request};
+use sched_dag::lifecycle::{Mailboxes, Request};
 use sched_dag::placement::NextWork;
-use sched_dag::{
-    ClusterId, CoreId, DagId, DriverNotice, Instance, Journal, Moment, Scheduler, Vertex,
-};
+use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::office::Office;
@@ -197,19 +195,14 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
 impl State {
     /// Makes that of a cluster, for its DAGs' bodies and its processors.
     pub(crate) fn new(
-        (cluster, office): (ClusterId, &Arc<Office>),
-        scheduler: Scheduler,
+        mut engine: Engine<Box<SubtaskRunner>, Number>,
+        office: &Arc<Office>,
         runners: Vec<SubtaskRunner>,
-        (requests, after_fault): (PendingRequests, Vec<Option<DagId>>),
-        journal: Journal,
         processors: Box<[u32]>,
-        levels: Option<Levels>,
     ) -> Self {
-        let dags = scheduler.task_set().dags().len();
+        let dags = engine.task_set.dags().len();
         let cores = processors.len();
         let workers = cores + runners.len();
-        let mut engine =
-            Engine::new::<ThreadPort<'_>>(cluster, scheduler, journal, requests, after_fault);
         for runner in runners {
             engine.put(runner.vertex, Box::new(runner));
         }
@@ -233,7 +226,7 @@ impl State {
             called: Vec::with_capacity(2 * cores),
             rung: Vec::with_capacity(workers),
             processors,
-            levels,
+            levels: office.levels,
             time: RunTime::NOT_BEGUN,
             preemptions: 0,
         }

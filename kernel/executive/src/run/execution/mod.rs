@@ -25,8 +25,7 @@ use alloc::vec::Vec;
 
 use fass::platform::{LaunchError, Plan, RunConfig};
 use sched_dag::engine::{Engine, ProvenBounds, Run};
-use sched_dag::lifecycle::PendingRequests;
-use sched_dag::{Dag, Journal, Scheduler, TaskSet};
+use sched_dag::{Dag, Journal, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::this_core;
@@ -99,25 +98,21 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
     port::provide(&plan.task_set, options)?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
-    let (letters, lifecycles) = divided::divide(task_set, lifecycle)?;
-    let mut lifecycles = lifecycles.into_iter();
+    let (letters, parts) = divided::divide(task_set, lifecycle)?;
     let heap = crate::memory::heap::usage();
     // Each cluster's journal gets its share of what is free now.
     let share = task_set.clusters().count();
     let free_bytes = (heap.capacity_bytes - heap.in_use_bytes) / share;
     let most_events = terms.most_events / share as u64;
-    let mut executions: Vec<ClusterRun> = task_set
-        .clusters()
-        .map(|id| ClusterRun {
-            engine: Engine::new::<SmpPort<'_>>(
-                id,
-                Scheduler::of_cluster(Arc::clone(task_set), options, id),
-                Journal::of_cluster(task_set, id, free_bytes, most_events),
-                PendingRequests::new(plan.bodies.len(), lifecycles.next().flatten()),
-                plan.after_fault.clone(),
-            ),
+    let journal = |id| Journal::of_cluster(task_set, id, free_bytes, most_events);
+    let after_fault = &plan.after_fault;
+    let engines =
+        Engine::of_clusters::<SmpPort<'_>>(task_set, options, parts, after_fault, journal);
+    let mut executions: Vec<ClusterRun> = engines
+        .map(|engine| ClusterRun {
             loans: RunnerTable::new(task_set.vertices()),
-            cluster: cluster::nth(id.index()),
+            cluster: cluster::nth(engine.cluster.index()),
+            engine,
             background: None,
             dispatch_due_ns: None,
             coincidence_ns,
