@@ -2,16 +2,16 @@
 //! lines of the log, which come meanwhile.
 
 use alloc::sync::Arc;
-use core::fmt::{self, Write};
+use core::fmt::{self, Display, Write};
 use core::iter;
 
 use fass::edge::{RecordingState, ReplayOutcome, Sink};
 use fass::log::LogLine;
 use fass::shared::{Wire, WireCounts};
-use sched_dag::engine::Run;
-use sched_dag::{Dag, DagId, DagSnapshot, TaskSet};
+use sched_dag::engine::{FaultCost, Run};
+use sched_dag::{Dag, DagId, DagSnapshot, Instance, TaskSet};
 
-use crate::text::json;
+use crate::text::json::{self, JsonObject};
 
 pub use crate::text::Ns;
 pub use sched_dag::law::Distribution;
@@ -105,6 +105,36 @@ impl HeapUsage {
                 .number("allocations", self.allocations);
         });
     }
+}
+
+/// Tells of a contained fault: of an instance, with the names of its DAG and subtask; its cause, in a
+/// word and in a message; the core and the place; and what it has cost.
+pub fn fault(
+    (instance, [dag, subtask]): (Instance, [&dyn Display; 2]),
+    (cause, message): (&str, &dyn Display),
+    (core, place): (u32, &dyn Display),
+    cost: FaultCost,
+    more: impl Fn(&mut JsonObject<'_, '_>),
+) {
+    crate::println!(
+        "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; at \
+         {place}; {}",
+        instance.job,
+        cost.consequence()
+    );
+    json::report("fault", |line| {
+        line.text("cause", cause)
+            .number("dag", instance.dag.0)
+            .text("dag_name", dag)
+            .number("subtask", instance.subtask.0)
+            .text("subtask_name", subtask)
+            .number("job", instance.job)
+            .text("cost", cost.word())
+            .number("cpu", core)
+            .text("place", place)
+            .text("message", message);
+        more(line);
+    });
 }
 
 /// Tells how complete a recording is.

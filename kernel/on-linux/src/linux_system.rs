@@ -18,7 +18,6 @@ use fass::platform::RunConfig;
 use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
 use front::app::machine::System;
-use front::json;
 use front::options::{CommandLine, UsageError};
 use front::report::{self, HeapUsage, tell_log};
 use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, ShellSession};
@@ -202,28 +201,20 @@ fn tell_faults(run: &linux::Run) {
             "panic"
         };
         let dag = run.task_set().dag(instance.dag);
-        let subtask = dag.subtask(instance.subtask).name();
-        let place = fault.place.as_deref();
-        crate::println!(
-            "fault: {cause} in subtask `{subtask}` of dag `{}`, job {}: {}; {}{}",
-            dag.name(),
-            instance.job,
-            fault.cause,
-            fmt::from_fn(|f| place.map_or(Ok(()), |place| write!(f, "at {place}; "))),
-            fault.cost.consequence()
+        let names: [&dyn fmt::Display; 2] = [&dag.name(), &dag.subtask(instance.subtask).name()];
+        let first = run
+            .task_set()
+            .cores_of(dag.cluster(), run.options().cores)
+            .start;
+        let place = fault.place.as_deref().unwrap_or("an unknown place");
+        let place = (first + fault.core.0, &place as _);
+        report::fault(
+            (instance, names),
+            (cause, &fault.cause),
+            place,
+            fault.cost,
+            |_| (),
         );
-        json::report("fault", |line| {
-            line.text("cause", cause)
-                .number("dag", instance.dag.0)
-                .text("dag_name", dag.name())
-                .number("subtask", instance.subtask.0)
-                .text("subtask_name", subtask)
-                .number("job", instance.job)
-                .text("cost", fault.cost.word())
-                .number("cpu", 0_u32)
-                .text("place", place.unwrap_or("unknown"))
-                .text("message", &fault.cause);
-        });
     }
 }
 

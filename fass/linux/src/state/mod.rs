@@ -61,6 +61,8 @@ pub(crate) enum FaultCause {
 pub struct Fault {
     /// The instance that failed.
     pub instance: Instance,
+    /// The core, counted within its cluster.
+    pub core: CoreId,
     /// Why.
     pub cause: String,
     /// Where, if it has panicked: `file:line:column`.
@@ -312,6 +314,7 @@ impl State {
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
         self.faults.push(Fault {
             instance,
+            core,
             cause,
             place: edge::place_of(instance),
             is_overrun,

@@ -331,46 +331,23 @@ impl FaultNote {
     }
 
     fn tell(&self) {
-        let Self {
-            instance,
-            cause,
-            message,
-            place,
-            core,
-            ..
-        } = self;
+        let (instance, core) = (self.instance, self.core);
         let model = execution::task_set();
         let names = model.as_ref().map(|model| {
             let dag = model.dag(instance.dag);
-            (dag.name(), dag.subtask(instance.subtask).name())
+            [dag.name(), dag.subtask(instance.subtask).name()]
         });
-        let (dag, subtask) = names.unwrap_or_default();
-        let dag = Excerpt::<NAME_BYTES>::of(dag);
-        let subtask = Excerpt::<NAME_BYTES>::of(subtask);
+        let [dag, subtask] = names.unwrap_or_default().map(Excerpt::<NAME_BYTES>::of);
+        let of = (instance, [&dag as _, &subtask as _]);
+        let cause = (self.cause, &self.message as _);
         let cost = self.cost.unwrap_or(FaultCost::Dag);
-        let consequence = cost.consequence();
-        front::println!(
-            "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: \
-             {message}; at {place}; {consequence}",
-            instance.job
-        );
-        json::report("fault", |line| {
-            line.text("cause", cause)
-                .number("dag", instance.dag.0)
-                .text("dag_name", &dag)
-                .number("subtask", instance.subtask.0)
-                .text("subtask_name", &subtask)
-                .number("job", instance.job)
-                .text("cost", cost.word())
-                .number("cpu", *core)
-                .text("place", place)
-                .text("message", message)
-                .number("stack_used_bytes", self.stack_used)
+        front::report::fault(of, cause, (core, &self.place), cost, |line| {
+            line.number("stack_used_bytes", self.stack_used)
                 .number("stack_bytes", self.stack_bytes);
             if let Some(address) = self.address {
                 line.text("address", format_args!("{address:#x}"));
             }
         });
-        json::report("backtrace", |line| self.calls.write(*core, line));
+        json::report("backtrace", |line| self.calls.write(core, line));
     }
 }
