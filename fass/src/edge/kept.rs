@@ -18,7 +18,7 @@ use sched_dag::engine::Run;
 use sched_dag::law::Histogram;
 use sched_dag::{
     Dag, DagId, Instance, Journal, LockUse, OnFault, OverrunPolicy, Policy, Preemption,
-    SchedulerOptions, SubtaskId, TaskSet, Vertex,
+    SchedulerOptions, Subtask, SubtaskId, TaskSet, Vertex, Wait,
 };
 
 use super::{Outgoing, Record, RecordingState};
@@ -175,14 +175,19 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
     }
 }
 
+/// Returns all subtasks with the numbers of their DAGs and their own.
+fn subtasks(task_set: &TaskSet) -> impl Iterator<Item = (u32, u32, &Subtask)> {
+    let dags = (0..).zip(task_set.dags());
+    dags.flat_map(|(dag, of_dag)| {
+        (0..)
+            .zip(of_dag.subtasks())
+            .map(move |(subtask, of)| (dag, subtask, of))
+    })
+}
+
 fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
-    let mut all = Vec::new();
-    for (dag, of_dag) in (0..).zip(task_set.dags()) {
-        for (subtask, of_subtask) in (0..).zip(of_dag.subtasks()) {
-            all.extend(of_subtask.core().map(|core| (dag, subtask, core)));
-        }
-    }
-    all
+    let pins = subtasks(task_set).filter_map(|(dag, subtask, of)| Some((dag, subtask, of.core()?)));
+    pins.collect()
 }
 
 fn affinities(task_set: &TaskSet) -> Vec<(u32, u32)> {
@@ -205,15 +210,11 @@ fn locks(task_set: &TaskSet) -> Vec<(u32, u32, String, Option<u64>, u32)> {
 }
 
 fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {
-    let mut all = Vec::new();
-    for (dag, of_dag) in (0..).zip(task_set.dags()) {
-        for (subtask, of_subtask) in (0..).zip(of_dag.subtasks()) {
-            for wait in of_subtask.waits() {
-                all.push((dag, subtask, wait.limit_ns, wait.segment_ns));
-            }
-        }
-    }
-    all
+    let waits = subtasks(task_set).flat_map(|(dag, subtask, of)| {
+        let told = move |wait: &Wait| (dag, subtask, wait.limit_ns, wait.segment_ns);
+        of.waits().iter().map(told)
+    });
+    waits.collect()
 }
 
 fn of_dag(dag: &Dag) -> CommittedDag {
