@@ -80,7 +80,7 @@ use crate::order::sorted;
 use crate::scheduler::Moment;
 use crate::task_set::{Dag, TaskSet};
 
-pub use crate::request::{ModeEntry, Request, WaitId};
+pub use crate::request::{ModeEntry, Request, WaitId, WaitLimit};
 
 /// The change that a request makes in a scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +137,7 @@ impl PendingRequests {
     pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
         let room = lifecycle.as_ref().map(|lifecycle| lifecycle.room());
         let (others, changes) = room.unwrap_or_default();
-        let mut kept = Vec::with_capacity(dags.saturating_add(others).saturating_add(2));
+        let mut kept = Vec::with_capacity(dags.saturating_add(others).saturating_add(1));
         // So that what is paused at first is paused in the very first step, before any release.
         kept.extend(lifecycle.as_ref().map(|_| Request::Begin));
         Self {
@@ -156,37 +156,11 @@ impl PendingRequests {
         }
     }
 
-    /// Keeps the request of a turn that ends in a wait, which is [taken](Self::take_wait) at once.
-    #[inline]
-    pub(crate) fn keep_wait(&mut self, request: Request) {
-        self.kept.push(request);
-    }
-
     /// Reports whether none is on its way: then a completion may be all of a step.
     #[inline]
     #[must_use]
     pub const fn are_none(&self) -> bool {
         self.kept.is_empty()
-    }
-
-    /// Takes the latest request, if it is for a wait, and returns the limit of that, which begins
-    /// now. The time of the job's release is asked for if the wait is until an instant of it.
-    #[inline]
-    pub(crate) fn take_wait(
-        &mut self,
-        now_ns: u64,
-        release_ns: impl FnOnce() -> u64,
-    ) -> Option<u64> {
-        let is_wait =
-            |request: &mut Request| matches!(request, Request::Wait(_) | Request::WaitUntil(_));
-        match self.kept.pop_if(is_wait)? {
-            Request::Wait(limit_ns) => Some(limit_ns),
-            Request::WaitUntil(after_ns) => {
-                let until_ns = release_ns().saturating_add(after_ns);
-                Some(until_ns.saturating_sub(now_ns))
-            }
-            _ => None,
-        }
     }
 
     /// Gives away the requests that `take` takes, which concern other schedulers only.
@@ -396,8 +370,6 @@ impl Lifecycle for LifecyclePlan {
             | Request::Signal(_)
             | Request::Close(_)
             | Request::End(_)
-            | Request::Wait(_)
-            | Request::WaitUntil(_)
             | Request::Answer(_)
             | Request::Step => {}
         }
@@ -550,11 +522,7 @@ impl Mailboxes {
                 }
                 return false;
             }
-            Request::Begin
-            | Request::GoOn
-            | Request::Wait(_)
-            | Request::WaitUntil(_)
-            | Request::Step => return false,
+            Request::Begin | Request::GoOn | Request::Step => return false,
         };
         if Some(to) == from {
             return false;
@@ -577,12 +545,7 @@ impl Mailboxes {
                 // Of two, the older one comes too late: its instance waits for the other by now.
                 place.map(|of| of.1.fetch_max(wait_word(wait), Ordering::Release));
             }
-            Request::ShutDown
-            | Request::Begin
-            | Request::GoOn
-            | Request::Wait(_)
-            | Request::WaitUntil(_)
-            | Request::Step => {}
+            Request::ShutDown | Request::Begin | Request::GoOn | Request::Step => {}
         }
         sent(to);
         true

@@ -25,12 +25,6 @@ pub enum Request {
     /// Waiting requests may take effect. A driver asks for that in each step until they have,
     /// before all else.
     GoOn,
-    /// The instance that asks waits, for so many nanoseconds at most, instead of finishing. Always
-    /// the only request of its turn.
-    Wait(u64),
-    /// As [`Wait`](Self::Wait), until so many nanoseconds after the release of its job; for none if
-    /// that is past.
-    WaitUntil(u64),
     /// A wait has its answer.
     Answer(WaitId),
     /// Nothing but a step. An engine asks for that, lest a completion take the short way.
@@ -44,13 +38,7 @@ impl Request {
     pub const fn is_of_lifecycle(self) -> bool {
         !matches!(
             self,
-            Self::Signal(_)
-                | Self::Close(_)
-                | Self::End(_)
-                | Self::Wait(_)
-                | Self::WaitUntil(_)
-                | Self::Answer(_)
-                | Self::Step
+            Self::Signal(_) | Self::Close(_) | Self::End(_) | Self::Answer(_) | Self::Step
         )
     }
 }
@@ -62,6 +50,15 @@ pub struct WaitId {
     pub instance: Instance,
     /// The number of the wait among those of the instance, from 0 on.
     pub number: u32,
+}
+
+/// The longest time that a wait takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WaitLimit {
+    /// So many nanoseconds.
+    For(u64),
+    /// Until so many nanoseconds after the release of the job; none if that is past.
+    SinceRelease(u64),
 }
 
 /// When a mode is entered.

@@ -54,7 +54,7 @@ use crate::engine::{Engine, FaultCost, NextAction, PlatformPort, Run, SubtaskBod
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{self, Lifecycle, Mailboxes, PendingRequests, Request, WaitId};
+use crate::lifecycle::{self, Lifecycle, Mailboxes, PendingRequests, Request, WaitId, WaitLimit};
 use crate::placement::NextWork;
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{DriverNotice, Moment, Scheduler};
@@ -438,7 +438,9 @@ impl SubtaskBody for Instance {
         false
     }
 
-    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) {}
+    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
+        None
+    }
 
     fn alternate(&self) -> Option<()> {
         Some(())

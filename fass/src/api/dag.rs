@@ -54,7 +54,7 @@ pub fn create_dag() -> Dag {
 /// Every method panics, at its caller's line, if the DAG has been committed:
 /// the graph that was verified is the graph that runs, and an addition that
 /// would silently not run is a mistake in the program.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Dag {
     pub(crate) draft: Rc<RefCell<DagDraft>>,
 }
@@ -343,6 +343,8 @@ impl Dag {
         draft
     }
 }
+
+shown_as!(Dag, |of| of.draft.borrow().spec.name);
 
 /// After the commit a handle names its DAG, wherever one is asked for.
 ///

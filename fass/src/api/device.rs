@@ -44,10 +44,12 @@ use sched_dag::{Instance, SubtaskId};
 
 use super::dag::Dag;
 use super::record::EDGE;
-use super::signal::Signal;
+use super::signal::{Signal, unknown_signal};
 use super::uses::{Uses, sealed};
+use crate::draft::fault::Fault;
+use crate::draft::part::{CheckedDag, DraftPart, PartKind};
 use crate::platform;
-use crate::run::answers::{AnyAnswers, AnyDevice, RecordedAnswers};
+use crate::run::answers::{AnyAnswers, AnyDevice, AskedDevice, RecordedAnswers};
 use crate::run::cell::turn::turn_of;
 use crate::run::cell::{SetOnce, SharedCell};
 use crate::run::effect::{Effect, RequestTarget};
@@ -335,6 +337,7 @@ struct QuestionPost<Q, A> {
     cell: Arc<DeviceCell<Q, A>>,
     /// Whether a thread sleeps that is to be woken for it.
     rings: bool,
+    is_muted: bool,
 }
 
 impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
@@ -358,7 +361,7 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
         cell.latest.store(number, Ordering::Relaxed);
         // Release: the question is in its place.
         cell.posted.store(number, Ordering::Release);
-        if let Some(server) = cell.server.get() {
+        if let Some(server) = cell.server.get().filter(|_| !self.is_muted) {
             ask(Request::Signal(server.dag()));
         }
         if let Some(bell) = cell.bell.get() {
@@ -379,6 +382,10 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
 
     fn withdraw(&mut self) {
         self.cell.posted.store(0, Ordering::Release);
+    }
+
+    fn mute(&mut self) {
+        self.is_muted = true;
     }
 }
 
@@ -503,6 +510,12 @@ impl<Q: Send + Sync, A: Send + Sync> AnyDevice for DeviceCell<Q, A> {
     }
 }
 
+impl DraftPart for AskedDevice {
+    fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
+        unknown_signal(of, self.0, self.1.server()?)
+    }
+}
+
 impl<Q, A> sealed::Sealed for DeviceUse<Q, A> {}
 
 impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A> {
@@ -516,16 +529,22 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
         let id = SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX));
         // A fault of the commit, as all are, and not a panic where the subtask is registered.
         if !cell.asking.set((Arc::clone(&draft.target), id)) {
-            draft.asked_twice.push((subtask, cell.name.clone()));
+            let name = cell.name.clone();
+            draft.add(PartKind::SecondAsker, move |of: &CheckedDag<'_>| {
+                let says = format_args!(
+                    "asks device `{name}`, which another subtask asks; make a device for each"
+                );
+                Some(of.fault("device_asked_twice", subtask, says))
+            });
         }
-        draft
-            .devices
-            .push((subtask, Arc::<DeviceCell<Q, A>>::clone(&cell)));
+        let device: Arc<dyn AnyDevice> = Arc::<DeviceCell<Q, A>>::clone(&cell);
+        draft.add(PartKind::Device, AskedDevice(subtask, device));
         let post = QuestionPost {
             cell: Arc::clone(&cell),
             rings: false,
+            is_muted: false,
         };
-        draft.effects.push((subtask, Box::new(post)));
+        draft.act(subtask, Box::new(post));
         Asker(cell)
     }
 

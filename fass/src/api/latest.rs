@@ -25,11 +25,15 @@
 //!   the value along an edge to have one for all.
 //! - Values may be sampled several times, or never.
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
+use core::ptr;
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
-use crate::run::latest::{SampledSlot, Sampler, SharedLatest};
+use crate::draft::fault::Fault;
+use crate::draft::part::{CheckedDag, DraftPart, Drafts, PartKind, TiedDag};
+use crate::run::latest::{AnyLatest, SampledSlot, Sampler, SharedLatest};
 use crate::run::message::Message;
 
 /// The latest value of a topic, for subtasks of any DAG. Made by [`Dag::latest`].
@@ -142,9 +146,8 @@ impl Dag {
     #[must_use = "a latest value that no subtask samples is a fault at commit"]
     pub fn latest<T: Message + Sync>(&self, topic: &str) -> Latest<T> {
         let shared = Rc::new(SharedLatest::new(topic));
-        self.open()
-            .latest
-            .push(Rc::<SharedLatest<T>>::clone(&shared));
+        let latest: Rc<dyn AnyLatest> = Rc::<SharedLatest<T>>::clone(&shared);
+        self.open().add(PartKind::Effect, latest);
         Latest { shared }
     }
 }
@@ -158,8 +161,8 @@ impl<T: Message + Sync> Uses for LatestUse<T> {
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let (sampler, number) = self.0.shared.sampler();
-        let mut draft = dag.draft.borrow_mut();
-        draft.samples.push((subtask, self.0.shared, number));
+        let sample = SampleUse(subtask, self.0.shared, number);
+        dag.draft.borrow_mut().add(PartKind::Sample, sample);
         sampler
     }
 
@@ -174,6 +177,49 @@ impl<T: Message + Sync> Uses for LatestUse<T> {
             completed_ns: entry.completed_ns,
         })
     }
+}
+
+/// Its values show with the completions of its topic's writer.
+impl DraftPart for Rc<dyn AnyLatest> {
+    fn tie(self: Box<Self>, dag: &mut TiedDag<'_>) {
+        if let Some(writer) = writer(dag.verified, self.topic()) {
+            dag.bodies[writer].add_effects(self.effects());
+        }
+    }
+}
+
+/// Returns the subtask that writes a topic.
+pub(super) fn writer(dag: &sched_dag::Dag, topic: &str) -> Option<usize> {
+    let mut topics = dag.topics().iter();
+    Some(topics.find(|of| of.name == topic)?.writer.index())
+}
+
+/// A subtask, the latest value that it samples, of whatever DAG, and the number that it has there.
+pub(crate) struct SampleUse(
+    pub(crate) usize,
+    pub(crate) Rc<dyn AnyLatest>,
+    pub(crate) usize,
+);
+
+impl DraftPart for SampleUse {
+    fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
+        let Self(subtask, latest, _) = self;
+        // The value's DAG has to be in this very commit, or nobody ever writes it.
+        writer_of(of.drafts, latest).is_none().then(|| {
+            let says = format_args!(
+                "samples the latest value of topic `{}`, whose dag is not in the commit; commit both \
+                 dags in one call",
+                latest.topic()
+            );
+            of.fault("latest_not_committed", *subtask, says)
+        })
+    }
+}
+
+/// Returns the position of the DAG whose topic a latest value is of.
+pub(crate) fn writer_of(drafts: &Drafts, latest: &Rc<dyn AnyLatest>) -> Option<usize> {
+    let is_it = |offered: &Rc<dyn AnyLatest>| ptr::addr_eq(Rc::as_ptr(offered), Rc::as_ptr(latest));
+    (drafts.iter()).position(|draft| draft.borrow().all().any(is_it))
 }
 
 shown_as!(Latest<T>, |of| of.shared.topic);

@@ -8,21 +8,28 @@
 //! rules, M1 to M7.
 
 use alloc::boxed::Box;
+use alloc::format;
 use alloc::rc::Rc;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::fmt;
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use sched_dag::lifecycle::{Lifecycle, LifecyclePlan};
+use sched_dag::lifecycle::LifecyclePlan;
 use sched_dag::{DagId, ModeId};
 
 use super::dag::Dag;
+use super::signal::FaultSignal;
 use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::DagDraft;
-use crate::draft::checks::{self, ModeDraft, dags_of_modes};
+use crate::draft::fault::Fault;
+use crate::draft::part::{
+    self, CheckedDag, CommitCheck, DraftPart, Drafts, PartKind, Planner, dag_of,
+};
 use crate::run::effect::{AT_ONCE, GO, RequestKind, RequestTarget, STOP, WHEN_IDLE, Wish};
+use crate::run::plan::Plan;
 
 /// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
 /// Made by [`Dag::switching`].
@@ -188,38 +195,51 @@ impl Dag {
     #[track_caller]
     pub fn starts_paused(&self) -> &Self {
         let mut draft = self.open();
-        draft.starts_paused = true;
-        draft.lifecycle = Some(lifecycle);
+        draft.add(PartKind::Lifecycle, Paused);
+        draft.add(PartKind::Lifecycle, plan_lifecycle as Planner);
         drop(draft);
         self
     }
 }
 
-/// Makes what serves the requests of DAGs. Only what is stated here names it, so an app that
+/// Makes what serves the requests of all DAGs. Only what is stated here names it, so an app that
 /// states nothing of that kind has no code for it.
-fn lifecycle(dags: &[Rc<RefCell<DagDraft>>]) -> Box<dyn Lifecycle> {
-    let drafts = || (0..).map(DagId).zip(dags);
-    let paused = drafts().filter(|(_, draft)| draft.borrow().starts_paused);
+fn plan_lifecycle(drafts: &Drafts, plan: &mut Plan) {
+    let dags = || (0..).map(DagId).zip(drafts);
+    let paused = dags().filter(|(_, draft)| draft.borrow().has::<Paused>());
     let paused: Vec<DagId> = paused.map(|(dag, _)| dag).collect();
-    let may_shut_down = drafts().any(|(_, draft)| draft.borrow().may_shut_down);
-    let count = u32::try_from(dags.len()).unwrap_or(u32::MAX);
+    let may_shut_down = dags().any(|(_, draft)| draft.borrow().has::<ShutdownUse>());
+    let count = u32::try_from(drafts.len()).unwrap_or(u32::MAX);
     let changes = LifecyclePlan::new(count, may_shut_down).with_paused(paused);
-    Box::new(changes.with_modes(dags_of_modes(dags)))
+    plan.lifecycle = Some(Box::new(changes.with_modes(dags_of_modes(drafts))));
 }
 
+/// The DAG is paused at the beginning.
+struct Paused;
+
+impl DraftPart for Paused {}
+
+/// A subtask may end the run.
+impl DraftPart for ShutdownUse {}
+
 implement_asking!(SwitchUse, Switch, |switching, draft, subtask| {
-    (draft.switches).push((subtask, Arc::clone(&switching.target)));
+    let target = Arc::clone(&switching.target);
+    draft.add(PartKind::Switch, move |of: &CheckedDag<'_>| {
+        let says = "may pause a dag that is not in the commit; commit both dags in one call";
+        let is_unknown = dag_of(of.drafts, &target).is_none();
+        is_unknown.then(|| of.fault("switched_not_committed", subtask, says))
+    });
     ask(draft, subtask, RequestKind::Dag(switching.target))
 });
 
-implement_asking!(ShutdownUse, Shutdown, |_, draft, subtask| {
-    draft.may_shut_down = true;
+implement_asking!(ShutdownUse, Shutdown, |stated, draft, subtask| {
+    draft.add(PartKind::Lifecycle, stated);
     ask(draft, subtask, RequestKind::Run)
 });
 
 /// Notes that completions of a subtask may ask for a change of what is on.
 fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
-    draft.lifecycle = Some(lifecycle);
+    draft.add(PartKind::Lifecycle, plan_lifecycle as Planner);
     draft.ask(subtask, of)
 }
 
@@ -275,7 +295,7 @@ fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
 /// ```
 #[derive(Clone, Default)]
 pub struct Modes {
-    modes: checks::ModeSets,
+    modes: ModeSet,
 }
 
 /// A mode. Clones are handles of the same one. Made by [`Modes::mode`].
@@ -283,7 +303,7 @@ pub struct Modes {
 /// See [`Modes`].
 #[derive(Clone)]
 pub struct Mode {
-    modes: checks::ModeSets,
+    modes: ModeSet,
     number: ModeId,
 }
 
@@ -338,10 +358,9 @@ impl Modes {
         let mut named = Vec::with_capacity(dags.len());
         for dag in dags {
             let mut draft = dag.open();
-            draft.modes.push(Rc::clone(&self.modes));
-            draft.check_modes = Some(checks::check_modes);
-            draft.lifecycle = Some(lifecycle);
-            named.push((Rc::downgrade(&dag.draft), draft.spec.name.clone()));
+            state(&mut draft, &self.modes);
+            draft.add(PartKind::Lifecycle, plan_lifecycle as Planner);
+            named.push((Arc::clone(&draft.target), draft.spec.name.clone()));
         }
         let mut modes = self.modes.borrow_mut();
         let number = ModeId(u32::try_from(modes.len()).unwrap_or(u32::MAX));
@@ -367,10 +386,111 @@ impl Mode {
 }
 
 implement_asking!(ModeUse, ModeSwitch, |entering, draft, subtask| {
-    draft.modes.push(entering.0.modes);
-    draft.check_modes = Some(checks::check_modes);
+    state(draft, &entering.0.modes);
     ask(draft, subtask, RequestKind::Mode(entering.0.number))
 });
+
+/// A mode as stated so far.
+struct ModeDraft {
+    name: String,
+    /// With the names that they had when the mode was made.
+    dags: Vec<(Arc<RequestTarget>, String)>,
+}
+
+/// The modes of one handle.
+type ModeSet = Rc<RefCell<Vec<ModeDraft>>>;
+
+impl DraftPart for ModeSet {}
+
+/// Notes that a DAG is in modes, or has a subtask that may enter one.
+fn state(draft: &mut DagDraft, modes: &ModeSet) {
+    draft.add(PartKind::Modes, Rc::clone(modes));
+    draft.add(PartKind::Modes, check_modes as CommitCheck);
+}
+
+/// Returns the DAGs of each mode of a commit.
+pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
+    let found = of_commit(drafts);
+    let modes = found.first().map(|modes| modes.borrow());
+    let id = |(dag, _): &(_, _)| dag_of(drafts, dag);
+    let dags = |mode: &ModeDraft| mode.dags.iter().filter_map(id).collect();
+    modes.map_or(Vec::new(), |modes| modes.iter().map(dags).collect())
+}
+
+/// Adds all that is wrong with the modes of a commit.
+fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
+    let mut add = |code, text| faults.push(Fault::Worded { code, text });
+    let found = of_commit(drafts);
+    // Two sets of modes would switch the same DAGs without knowing of each other.
+    if found.len() > 1 {
+        let text = "the commit has modes of more than one `Modes`; make all of them by one";
+        add("several_sets_of_modes", text.into());
+    }
+    for modes in &found {
+        let modes = modes.borrow();
+        for (number, mode) in modes.iter().enumerate() {
+            let name = &mode.name;
+            if modes[..number].iter().any(|other| other.name == *name) {
+                let text = format!("two modes are called `{name}`; give each a name of its own");
+                add("duplicate_mode", text);
+            }
+            let unknown = (mode.dags.iter()).filter(|(dag, _)| dag_of(drafts, dag).is_none());
+            for (_, dag) in unknown {
+                let text = format!(
+                    "mode `{name}` has dag `{dag}`, which is not in the commit; commit all dags of \
+                     its modes in one call"
+                );
+                add("mode_not_committed", text);
+            }
+        }
+    }
+    let modes = dags_of_modes(drafts);
+    let in_some = |dag: DagId| modes.iter().any(|mode| mode.contains(&dag));
+    for dag in (0..).map(DagId).take(drafts.len()) {
+        let draft = drafts[dag.index()].borrow();
+        if draft.has::<Paused>() && in_some(dag) {
+            let text = format!(
+                "{} starts paused and is in a mode, and the first mode says what is paused at the \
+                 start; drop `starts_paused`",
+                part::label(drafts, dag)
+            );
+            add("mode_starts_paused", text);
+        }
+        // What brings about a safe state is on wherever the DAG is that may need it.
+        let handler = draft.all().next();
+        let handler = handler.and_then(|FaultSignal(target)| dag_of(drafts, target));
+        // A handler in no mode is never paused by one.
+        let Some(handler) = handler.filter(|&handler| in_some(handler)) else {
+            continue;
+        };
+        let lacks =
+            |mode: &Vec<DagId>| (mode.contains(&dag) || !in_some(dag)) && !mode.contains(&handler);
+        if let Some(number) = modes.iter().position(lacks) {
+            let text = format!(
+                "a fault of {} releases {}, which is off in mode `{}`; add it to that mode, or to \
+                 none",
+                part::label(drafts, dag),
+                part::label(drafts, handler),
+                found[0].borrow()[number].name
+            );
+            add("mode_without_handler", text);
+        }
+    }
+}
+
+/// Returns the modes that a commit names, each handle once.
+fn of_commit(drafts: &Drafts) -> Vec<ModeSet> {
+    let mut found: Vec<ModeSet> = Vec::new();
+    for draft in drafts {
+        for modes in draft.borrow().all() {
+            // Each set once, however many DAGs name it.
+            if !found.iter().any(|other| Rc::ptr_eq(other, modes)) {
+                found.push(Rc::clone(modes));
+            }
+        }
+    }
+    found
+}
 
 impl fmt::Debug for Modes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -24,7 +24,8 @@ use core::str::FromStr;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use super::dag::Dag;
-use super::uses::{Uses, sealed};
+use super::uses::{OutsideInput, Uses, sealed};
+use crate::draft::part::PartKind;
 
 /// A number, or a truth value, that can be set while DAGs run. A handle; clones are the same one.
 ///
@@ -330,7 +331,8 @@ impl<T: ParameterValue> Uses for ParameterUse<T> {
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let takes = format!("reads parameter `{}`", self.0.0.name);
-        dag.draft.borrow_mut().outside.push((subtask, takes));
+        let input = OutsideInput { subtask, takes };
+        dag.draft.borrow_mut().add(PartKind::Input, input);
         self.0
     }
 

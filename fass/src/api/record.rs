@@ -1,21 +1,33 @@
 //! Recording topics: stating which values shall be written down.
 
+use alloc::format;
 use alloc::rc::Rc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
 
-use recording::Recordable;
+use recording::{Channel, Recordable, Role, Schema};
+use sched_dag::DagId;
+use sched_dag::wcets::graph_hash;
 
 use super::dag::Dag;
-use crate::draft::checks::check_recorded;
+use super::latest::{SampleUse, writer, writer_of};
+use super::state::StateOptions;
+use crate::draft::DagDraft;
+use crate::draft::fault::Fault;
+use crate::draft::part::{self, CommitCheck, DraftPart, Drafts, PartKind, Planner};
 use crate::edge::{self, Begin, ReplayHost};
 use crate::platform::{expect_installed, record};
-use crate::run::line::TopicEdge;
+use crate::run::answers::AskedDevice;
+use crate::run::latest::AnyLatest;
+use crate::run::line::{ChannelState, LineOf, TopicEdge};
 use crate::run::message::Message;
-use crate::run::record::RecordedTopic;
+use crate::run::plan::Plan;
+use crate::run::record::{
+    AnyRecorded, Around, RecordedTopic, defer_replayed, finding, looking, narrow,
+};
 
 pub(super) static EDGE: TopicEdge = TopicEdge {
-    crosses: || expect_installed().crosses(),
-    has_results: || expect_installed().results_cross(),
-    open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, BEGIN),
     record,
     replays: || expect_installed().replays(),
     replay: |channel, job, take| expect_installed().replay(channel, job, take),
@@ -79,10 +91,208 @@ impl Dag {
     #[track_caller]
     pub fn record<T: Message + Recordable>(&self, topic: &str) -> &Self {
         let recorded = Rc::new(RecordedTopic::<T>::new(topic, &EDGE));
+        let latest: Rc<dyn AnyLatest> = Rc::<RecordedTopic<T>>::clone(&recorded);
+        let recorded: Rc<dyn AnyRecorded> = recorded;
         let mut draft = self.open();
-        draft.latest.push(Rc::<RecordedTopic<T>>::clone(&recorded));
-        draft.recorded.push(recorded);
-        draft.check_recorded = Some(check_recorded);
+        draft.add(PartKind::Effect, latest);
+        draft.add(PartKind::Recording, recorded);
+        draft.add(PartKind::Recording, check_recorded as CommitCheck);
+        draft.add(PartKind::Recording, plan_channels as Planner);
+        drop(draft);
         self
     }
+}
+
+impl DraftPart for Rc<dyn AnyRecorded> {}
+
+/// Opens the channels of all DAGs, before bodies are made: a tap is made only of an open channel.
+fn plan_channels(drafts: &Drafts, plan: &mut Plan) {
+    // Nobody records or replays: no channel is opened, and no value is copied.
+    if !expect_installed().crosses() {
+        return;
+    }
+    for (dag, draft) in (0..).map(DagId).zip(drafts) {
+        let around = open_channels(drafts, dag, plan);
+        let mut draft = draft.borrow_mut();
+        if expect_installed().replays() {
+            replay_sources(&mut draft);
+        }
+        // Last, so that what is put around a body is around all that it does.
+        for (subtask, around) in around {
+            draft.tie(move |dag| {
+                let body = dag.bodies.swap_remove(subtask);
+                let last = dag.bodies.len();
+                dag.bodies.push(around(body));
+                dag.bodies.swap(subtask, last);
+            });
+        }
+    }
+}
+
+/// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
+/// recorded states, tells the platform, and adds their lines to those before. Returns what is
+/// put around subtasks for that.
+#[allow(
+    clippy::too_many_lines,
+    reason = "gives numbers in one order, which a reader has to see whole"
+)]
+fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Around)> {
+    let draft = &*drafts[dag.index()].borrow();
+    let (verified, lines) = (plan.task_set.dag(dag), &mut plan.lines);
+    let first = lines.len();
+    let mut channels = Vec::new();
+    let mut open =
+        |subtask, role, topic: &str, (schema, line): (Schema, Arc<ChannelState>), state| {
+            line.set_number(narrow(lines.len()));
+            lines.push(LineOf {
+                dag,
+                subtask,
+                role,
+                line,
+                state,
+            });
+            channels.push(Channel {
+                dag: narrow(dag.index()),
+                subtask: narrow(subtask),
+                role,
+                topic: topic.into(),
+                schema,
+            });
+        };
+    let has_results = expect_installed().results_cross();
+    let topics = draft.all::<Rc<dyn AnyRecorded>>();
+    for (topic, subtask) in topics.filter_map(|of| Some((of, writer(verified, of.topic())?))) {
+        let role = match draft.spec.subtasks[subtask].inputs.is_empty() {
+            true => Role::Source,
+            false => Role::Result,
+        };
+        // Where nobody compares results, only inputs are kept.
+        if has_results || role != Role::Result {
+            open(subtask, role, topic.topic(), topic.line(), None);
+        }
+    }
+    let mut around = Vec::new();
+    for SampleUse(subtask, latest, sampler) in draft.all() {
+        let writer = writer_of(drafts, latest).map(|writer| drafts[writer].borrow());
+        let topic = writer
+            .as_ref()
+            .and_then(|writer| recorded(writer, latest.topic()));
+        // A topic of another type, or one that is not recorded, has no probe.
+        let probe = topic.and_then(|topic| topic.probe(&**latest, *sampler));
+        if let Some((probe, schema, line)) = probe {
+            let way = (schema, Arc::clone(&line));
+            open(*subtask, Role::Sample, latest.topic(), way, None);
+            let look = move |job| probe.note_job(job);
+            around.push((*subtask, looking(line, look)));
+        }
+    }
+    for AskedDevice(subtask, device) in draft.all() {
+        if let Some((schema, line)) = device.line() {
+            let way = (schema, Arc::clone(&line));
+            open(*subtask, Role::Answer, device.name(), way, None);
+            around.push((*subtask, finding(line)));
+        }
+    }
+    for options in draft.all::<Rc<StateOptions>>() {
+        let Some(kept) = options.kept.borrow().clone() else {
+            continue;
+        };
+        let state = &draft.spec.states[options.position];
+        let changes = |subtask: &usize| {
+            let mut users = state.users.iter();
+            users.any(|user| user.updates && user.subtask == *subtask)
+        };
+        // The users take turns in that order.
+        let order = verified.topological_order().iter();
+        // The first user that changes it sees it as the job before has left it.
+        if let Some(subtask) = order.map(|subtask| subtask.index()).find(changes) {
+            let line = Arc::new(ChannelState::new(&EDGE));
+            let way = (kept.state.schema(), Arc::clone(&line));
+            let of_state = Some(Arc::clone(&kept));
+            open(subtask, Role::State, &state.name, way, of_state);
+            let found = Arc::clone(&line);
+            let look = move |job| kept.keep(&line, job);
+            around.push((subtask, looking(found, look)));
+        }
+    }
+    // One call for each DAG, so that the platform sees all its channels together.
+    if !channels.is_empty() {
+        let hash = graph_hash(&draft.spec);
+        let is_read = expect_installed().open_channels(dag, hash, &channels, BEGIN);
+        for (of, channel) in lines[first..].iter().zip(&channels) {
+            of.line.open(is_read, channel.schema.least_bytes());
+        }
+    }
+    around
+}
+
+/// Puts others into the place of recorded sources, which a replay does not call.
+fn replay_sources(draft: &mut DagDraft) {
+    for subtask in 0..draft.make_bodies.len() {
+        let source = &draft.spec.subtasks[subtask];
+        let outputs = source.outputs.iter();
+        // The commit has made sure that all of them are recorded, or none.
+        let outputs = outputs.filter_map(|port| recorded(draft, &port.topic).cloned());
+        let outputs: Vec<_> = outputs.collect();
+        if source.inputs.is_empty() && !outputs.is_empty() {
+            draft.make_bodies[subtask] = defer_replayed(outputs);
+        }
+    }
+}
+
+/// Adds what the DAGs of a commit do not record that a replay would need: of each DAG a source
+/// of which is recorded, all else that its sources write, and what its other subtasks sample.
+fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
+    for (id, draft) in (0..).map(DagId).zip(drafts) {
+        let draft = draft.borrow();
+        let dag = part::label(drafts, id);
+        let mut add = |code, subtask, says: fmt::Arguments<'_>| {
+            let text = format!("{} of {dag} {says}", draft.label(subtask));
+            faults.push(Fault::Worded { code, text });
+        };
+        let is_source = |subtask: usize| draft.spec.subtasks[subtask].inputs.is_empty();
+        let sources = (0..draft.spec.subtasks.len()).filter(|subtask| is_source(*subtask));
+        let written = sources.flat_map(|subtask| {
+            let outputs = draft.spec.subtasks[subtask].outputs.iter();
+            outputs.map(move |port| (subtask, &*port.topic))
+        });
+        let (kept, others): (Vec<_>, Vec<_>) =
+            written.partition(|(_, topic)| recorded(&draft, topic).is_some());
+        let Some((_, first)) = kept.first() else {
+            continue;
+        };
+        for (subtask, topic) in others {
+            let says = format_args!(
+                "writes topic `{topic}`, which is not recorded, and a replay would not call it, for \
+                 topic `{first}` of a source is; record all topics of the sources, or none"
+            );
+            add("source_partly_recorded", subtask, says);
+        }
+        for AskedDevice(subtask, device) in draft.all() {
+            if !is_source(*subtask) && device.line().is_none() {
+                let says = format_args!(
+                    "asks device `{}`, whose answers are not recorded, and a replay could not give \
+                     them, though topic `{first}` of a source is; record both, or neither",
+                    device.name()
+                );
+                add("answers_not_recorded", *subtask, says);
+            }
+        }
+        for SampleUse(subtask, latest, _) in draft.all() {
+            let (topic, writer) = (latest.topic(), writer_of(drafts, latest));
+            let is_lacking = |of: usize| recorded(&drafts[of].borrow(), topic).is_none();
+            if !is_source(*subtask) && writer.is_some_and(is_lacking) {
+                let says = format_args!(
+                    "samples topic `{topic}`, which is not recorded, and a replay could not give it \
+                     the same, though topic `{first}` of a source is; record both, or neither"
+                );
+                add("sample_not_recorded", *subtask, says);
+            }
+        }
+    }
+}
+
+fn recorded<'d>(draft: &'d DagDraft, topic: &str) -> Option<&'d Rc<dyn AnyRecorded>> {
+    let mut all = draft.all::<Rc<dyn AnyRecorded>>();
+    all.find(|recorded| recorded.topic() == topic)
 }

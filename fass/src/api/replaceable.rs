@@ -6,6 +6,7 @@
 //! work in a simpler way.
 
 use alloc::boxed::Box;
+use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -14,6 +15,9 @@ use sched_dag::{FaultLimit, OnFault};
 use super::dag::Dag;
 use super::subtask::Subtask;
 use super::uses::{ResettableUses, SubtaskBuilder, Uses};
+use crate::draft::DagDraft;
+use crate::draft::fault::Fault;
+use crate::draft::part::{CheckedDag, DraftPart, PartKind};
 use crate::run::replaceable::Reset;
 use crate::run::replaceable::{Alternatives, FallbackPair, RemadeFunction, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -25,7 +29,21 @@ impl Dag {
     /// See [`restarting`](Self::restarting), and [`FaultLimit`] for the memory that it takes.
     #[track_caller]
     pub fn survive_faults(&self, limit: FaultLimit) -> &Self {
-        self.open().spec.on_fault = OnFault::DropJob(limit);
+        let mut draft = self.open();
+        // Checked once, however often it is said.
+        if draft.spec.on_fault == OnFault::EndDag {
+            draft.add(PartKind::Replacement, |of: &CheckedDag<'_>| {
+                let says = "drops a job at a fault and goes on, and no subtask of it has another \
+                            function for that; register one by `restarting` or `falling_back`";
+                let fault = Fault::Worded {
+                    code: "nothing_replaceable",
+                    text: format!("{} {says}", of.label),
+                };
+                (!of.draft.has::<Replaceable>()).then_some(fault)
+            });
+        }
+        draft.spec.on_fault = OnFault::DropJob(limit);
+        drop(draft);
         self
     }
 
@@ -205,6 +223,30 @@ where
     move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args)
 }
 
+/// A subtask whose function another one replaces after a fault.
+pub(super) struct Replaceable(pub(super) usize);
+
+impl DraftPart for Replaceable {}
+
+/// Takes note of such a subtask.
+fn note_replaceable(draft: &mut DagDraft, subtask: usize) {
+    // The first stands for all.
+    if !draft.has::<Replaceable>() {
+        draft.add(PartKind::Replacement, move |of: &CheckedDag<'_>| {
+            let says = "has another function for after a fault, and a fault ends the dag; let the dag \
+                        survive faults by `survive_faults`, or register one function";
+            // It would be made anew after a fault that ends the DAG.
+            let is_in_vain = of.draft.spec.on_fault == OnFault::EndDag;
+            is_in_vain.then(|| of.fault("replaced_in_vain", subtask, says))
+        });
+    }
+    draft.add(PartKind::Replacement, Replaceable(subtask));
+    let says = "states waits, and has another function for after a fault, which could not have the \
+                place of a future that the fault has ended; register an async one alone, or state no \
+                waits";
+    draft.refuse_waits("replaceable_waits", subtask, says);
+}
+
 impl<'d> Subtask<'d> {
     /// Begins with functions of which one replaces the other.
     fn with_replacement<Args: VecToSubs, Ret: VecToPubs>(
@@ -212,6 +254,6 @@ impl<'d> Subtask<'d> {
         alternatives: Box<dyn Alternatives<Args, Ret>>,
         states: Vec<Arc<dyn Reset>>,
     ) -> Self {
-        Self::new::<Args, Ret>(dag, defer(alternatives, states)).replaceable()
+        Self::new::<Args, Ret>(dag, defer(alternatives, states)).noted_by(note_replaceable)
     }
 }

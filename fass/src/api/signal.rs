@@ -13,6 +13,7 @@
 //! - the platform: a byte from a serial port, say, or a test in virtual time;
 //! - the app's code outside subtasks ([`Signal::raise`]).
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicU8, Ordering};
 use core::time::Duration;
@@ -22,6 +23,8 @@ use sched_dag::DagId;
 use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::DagDraft;
+use crate::draft::fault::Fault;
+use crate::draft::part::{CheckedDag, DraftPart, PartKind, TiedDag, dag_of};
 use crate::platform;
 use crate::run::effect::RequestTarget;
 use crate::run::effect::{GO, RequestKind, Wish};
@@ -196,7 +199,11 @@ impl Dag {
     /// ```
     #[track_caller]
     pub fn on_fault(&self, signal: &Signal) -> &Self {
-        self.open().on_fault = Some(Arc::clone(&signal.target));
+        let mut draft = self.open();
+        // The last one counts.
+        draft.parts.retain(|(kind, _)| *kind != PartKind::OnFault);
+        draft.add(PartKind::OnFault, FaultSignal(Arc::clone(&signal.target)));
+        drop(draft);
         self
     }
 
@@ -211,8 +218,38 @@ impl Dag {
 
 implement_asking!(SignalUse, Raiser, |raising, draft, subtask| {
     let target = raising.0.target;
-    draft.raises.push((subtask, Arc::clone(&target)));
+    let asked = Arc::clone(&target);
+    let unknown = move |of: &CheckedDag<'_>| unknown_signal(of, subtask, &asked);
+    draft.add(PartKind::Raise, unknown);
     draft.ask(subtask, RequestKind::Signal(target))
 });
+
+/// The signal that is raised when a fault ends the DAG.
+pub(super) struct FaultSignal(pub(super) Arc<RequestTarget>);
+
+impl DraftPart for FaultSignal {
+    fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
+        // The fault of any subtask raises it; the first stands for them.
+        let first = (0..of.draft.spec.subtasks.len()).next()?;
+        unknown_signal(of, first, &self.0)
+    }
+
+    fn tie(self: Box<Self>, dag: &mut TiedDag<'_>) {
+        *dag.after_fault = self.0.get().map(|(_, handler)| handler);
+    }
+}
+
+/// Returns a fault if the DAG of a signal that a subtask may raise is not in the commit.
+pub(super) fn unknown_signal(
+    of: &CheckedDag<'_>,
+    subtask: usize,
+    signal: &Arc<RequestTarget>,
+) -> Option<Fault> {
+    let says =
+        "may raise the signal of a dag that is not in the commit; commit both dags in one call";
+    dag_of(of.drafts, signal)
+        .is_none()
+        .then(|| of.fault("signal_not_committed", subtask, says))
+}
 
 shown_as!(Signal, |of| of.target());

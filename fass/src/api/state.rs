@@ -31,12 +31,16 @@ use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::RefCell;
 
 use recording::Recordable;
-use sched_dag::{StateSpec, StateUser};
+use sched_dag::{OnFault, StateSpec, StateUser};
 
 use super::dag::Dag;
+use super::replaceable::Replaceable;
 use super::uses::{ResettableUses, Uses, sealed};
+use crate::draft::fault::Fault;
+use crate::draft::part::{CheckedDag, DraftPart, PartKind, TiedDag};
 use crate::run::cell::{ReadClaim, WriteClaim};
 use crate::run::line::KeptState;
 use crate::run::replaceable::{Reset, ResettableState};
@@ -94,9 +98,48 @@ impl<T: Send + Sync + 'static> StateValue for T {}
 /// ```
 pub struct State<T> {
     dag: Dag,
-    /// The position among the DAG's states.
-    position: usize,
+    options: Rc<StateOptions>,
     value: Arc<ResettableState<T>>,
+}
+
+/// Provides so many values of a state for after faults.
+type ProvideResets = Box<dyn FnOnce(u32)>;
+
+/// The statements about a state: its values for after faults, and that it is recorded.
+#[derive(Default)]
+pub(super) struct StateOptions {
+    /// The position among the DAG's states.
+    pub(super) position: usize,
+    provide: RefCell<Option<ProvideResets>>,
+    pub(super) kept: RefCell<Option<Arc<KeptState>>>,
+}
+
+impl DraftPart for Rc<StateOptions> {
+    fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
+        let state = &of.draft.spec.states[self.position];
+        let is_replaceable = |user: &usize| of.draft.all().any(|Replaceable(other)| other == user);
+        let mut users = state.users.iter().map(|user| user.subtask);
+        let user = users.find(is_replaceable)?;
+        // A fault may leave the state half changed, so somebody has to say what it begins with
+        // again.
+        self.provide.borrow().is_none().then(|| {
+            let says = format_args!(
+                "has another function for after a fault, and the state `{}`, which it uses, no other \
+                 value; give it one by `reset_to`",
+                state.name
+            );
+            of.fault("state_without_reset", user, says)
+        })
+    }
+
+    fn tie(self: Box<Self>, dag: &mut TiedDag<'_>) {
+        if let Some(provide) = self.provide.take() {
+            provide(match dag.verified.on_fault() {
+                OnFault::EndDag => 0,
+                OnFault::DropJob(limit) => limit.in_all,
+            });
+        }
+    }
 }
 
 /// The use of a [`State`] that may change it: the function gets a `&mut T`. Made
@@ -140,10 +183,8 @@ impl<T: StateValue> State<T> {
     pub fn reset_to(&self, mut make: impl FnMut() -> T + 'static) -> &Self {
         let value = Arc::clone(&self.value);
         let provide = move |faults| value.provide((0..faults).map(|_| make()));
-        let mut draft = self.dag.open();
-        draft.resets.retain(|(state, _)| *state != self.position);
-        draft.resets.push((self.position, Box::new(provide)));
-        drop(draft);
+        let _open = self.dag.open();
+        self.options.provide.replace(Some(Box::new(provide)));
         self
     }
 
@@ -213,18 +254,16 @@ impl<T: StateValue> State<T> {
         T: Recordable,
     {
         let value = Arc::<ResettableState<T>>::clone(&self.value);
-        let mut draft = self.dag.open();
-        draft.states.retain(|(state, _)| *state != self.position);
+        let _open = self.dag.open();
         let kept = Arc::new(KeptState::new(value, jobs));
-        draft.states.push((self.position, kept));
-        drop(draft);
+        self.options.kept.replace(Some(kept));
         self
     }
 
     /// Notes a use, and returns the value that the subtask will claim.
     fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<ResettableState<T>> {
         let user = StateUser { subtask, updates };
-        dag.draft.borrow_mut().spec.states[self.position]
+        dag.draft.borrow_mut().spec.states[self.options.position]
             .users
             .push(user);
         Arc::clone(&self.value)
@@ -235,7 +274,7 @@ impl<T> Clone for State<T> {
     fn clone(&self) -> Self {
         Self {
             dag: self.dag.clone(),
-            position: self.position,
+            options: Rc::clone(&self.options),
             value: Arc::clone(&self.value),
         }
     }
@@ -255,9 +294,14 @@ impl Dag {
             name: name.into(),
             users: Default::default(),
         });
+        let options = Rc::new(StateOptions {
+            position,
+            ..StateOptions::default()
+        });
+        draft.add(PartKind::State, Rc::clone(&options));
         State {
             dag: self.clone(),
-            position,
+            options,
             value: Arc::new(ResettableState::new(initial)),
         }
     }
@@ -313,4 +357,4 @@ fn refuse() -> ! {
     )
 }
 
-shown_as!(State<T>, |of| of.position);
+shown_as!(State<T>, |of| of.options.position);

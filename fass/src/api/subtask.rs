@@ -64,13 +64,20 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 pub struct Subtask<'d> {
     dag: &'d Dag,
     body: MakeBody,
-    is_replaceable: bool,
-    may_wait: bool,
+    /// Takes note of it, and of what its function is.
+    note: fn(&mut DagDraft, usize),
     reads: &'d [&'d str],
     writes: &'d [&'d str],
     /// The types of its inputs and of its outputs, by functions: an image has little room.
     types: [fn() -> Vec<MessageType>; 2],
     due: Option<Duration>,
+}
+
+/// Takes note of a subtask whose function is not async.
+fn note_plain(draft: &mut DagDraft, subtask: usize) {
+    let says =
+        "states waits, and its function is not async; register an async one, or state no waits";
+    draft.refuse_waits("cannot_wait", subtask, says);
 }
 
 impl Dag {
@@ -106,8 +113,7 @@ impl<'d> Subtask<'d> {
         Self {
             dag,
             body,
-            is_replaceable: false,
-            may_wait: false,
+            note: note_plain,
             reads: &[],
             writes: &[],
             types: [Args::input_types, Ret::output_types],
@@ -115,18 +121,8 @@ impl<'d> Subtask<'d> {
         }
     }
 
-    pub(super) fn replaceable(self) -> Self {
-        Self {
-            is_replaceable: true,
-            ..self
-        }
-    }
-
-    pub(super) fn waiting(self) -> Self {
-        Self {
-            may_wait: true,
-            ..self
-        }
+    pub(super) fn noted_by(self, note: fn(&mut DagDraft, usize)) -> Self {
+        Self { note, ..self }
     }
 
     /// Names the topics of its inputs, one for each element of the function's argument.
@@ -167,19 +163,13 @@ impl<'d> Subtask<'d> {
     #[track_caller]
     pub(super) fn register_labelled(self, attributes: SubtaskAttributes) -> SubtaskLabel {
         let mut draft = self.dag.open();
-        let subtask = draft.spec.subtasks.len();
-        if self.is_replaceable {
-            draft.replaceable.push(subtask);
-        }
-        if self.may_wait {
-            draft.waiting.push(subtask);
-        }
         let [inputs, outputs] = self.types.map(|types| types());
         let ends = NamedTopics {
             inputs: (self.reads, &inputs),
             outputs: (self.writes, &outputs),
         };
         let subtask = draft.register(self.body, ends, attributes);
+        (self.note)(&mut draft, subtask.id.index());
         if let Some(due) = self.due {
             draft.set_sink_deadline(due, &subtask);
         }
@@ -255,8 +245,13 @@ impl Dag {
     where
         F: FnMut(u64) + Send + 'static,
     {
+        let mut draft = self.open();
+        let ends = NamedTopics::default();
+        let subtask = draft.register(defer_untyped(f), ends, attributes);
+        let subtask = subtask.id.index();
+        note_plain(&mut draft, subtask);
         UntypedSubtask {
-            subtask: self.open().register_untyped(defer_untyped(f), attributes),
+            subtask,
             draft: Rc::clone(&self.draft),
         }
     }

@@ -33,12 +33,16 @@
 //! begins the
 //! uses, lends them to the function for one call, and ends them.
 
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::ptr;
 
 use super::dag::Dag;
 use super::subtask::{Subtask, UntypedSubtask};
 use crate::draft::SubtaskAttributes;
+use crate::draft::fault::Fault;
+use crate::draft::part::{CheckedDag, DraftPart};
 use crate::run::replaceable::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
@@ -208,6 +212,41 @@ implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guar
 implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard));
 implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard)(G g g_guard));
 implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard)(G g g_guard)(H h h_guard));
+
+/// An input of a subtask from outside, by a use: "reads parameter `gain`". Sources alone take them, and
+/// each thing once, so that a job has one value of it.
+pub(super) struct OutsideInput {
+    pub(super) subtask: usize,
+    pub(super) takes: String,
+}
+
+impl DraftPart for OutsideInput {
+    fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
+        let Self { subtask, takes } = self;
+        // A replay gives sources their values; what others take from outside it could not repeat.
+        if !is_source(of, self) {
+            let says = format_args!(
+                "is no source and {takes}; let the source do that, and send it along an edge"
+            );
+            return Some(of.fault("taken_by_no_source", *subtask, says));
+        }
+        let mut earlier = of.draft.all().take_while(|other| !ptr::eq(*other, self));
+        let first = earlier.find(|other| other.takes == *takes && is_source(of, other))?;
+        let first = of.draft.label(first.subtask);
+        let says = format_args!(
+            "{takes}, and so does {first}, but a job has one value of it; let one source do that, \
+             once, and send it along edges"
+        );
+        Some(of.fault("taken_twice", *subtask, says))
+    }
+}
+
+/// Reports whether nothing precedes the subtask of an input.
+fn is_source(of: &CheckedDag<'_>, input: &OutsideInput) -> bool {
+    let (spec, subtask) = (&of.draft.spec, input.subtask);
+    let follows = |&(_, to): &(usize, usize)| to == subtask;
+    spec.subtasks[subtask].inputs.is_empty() && !spec.edges.iter().any(follows)
+}
 
 /// A DAG whose next subtask uses something. Made by [`Dag::using`].
 ///

@@ -30,7 +30,7 @@ use super::dag::Dag;
 use super::subtask::{Subtask, UntypedSubtask};
 use super::topics::{self, Topics};
 use super::uses::{SubtaskBuilder, Uses};
-use crate::draft::SubtaskAttributes;
+use crate::draft::{NamedTopics, SubtaskAttributes};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 use crate::run::waiting::{defer, defer_untyped};
 
@@ -146,11 +146,10 @@ impl Dag {
         F: FnMut(u64) -> Fut + Send + 'static,
         Fut: Future<Output = ()> + Send + 'static,
     {
-        let mut draft = self.open();
-        let subtask = draft.register_untyped(defer_untyped(f), attributes);
-        draft.waiting.push(subtask);
+        let ends = NamedTopics::default();
+        let subtask = (self.open()).register(defer_untyped(f), ends, attributes);
         UntypedSubtask {
-            subtask,
+            subtask: subtask.id.index(),
             draft: Rc::clone(&self.draft),
         }
     }
@@ -179,7 +178,7 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::new::<Args, Ret>(self, defer(f)).waiting()
+        Subtask::new::<Args, Ret>(self, defer(f)).noted_by(|_, _| ())
     }
 }
 

@@ -36,7 +36,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use sched_dag::DagId;
 
 use super::dag::Dag;
-use super::uses::{Uses, sealed};
+use super::uses::{OutsideInput, Uses, sealed};
+use crate::draft::part::PartKind;
 use crate::run::cell::SetOnce;
 use crate::run::effect::RequestTarget;
 use crate::run::wire::{Framing, SendCompletion, WireInput, WireOutput};
@@ -434,10 +435,14 @@ impl<T: 'static> Uses for ReceiveUse<T> {
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let takes = format!("receives on wire `{}`", self.wire.name());
         let mut draft = dag.draft.borrow_mut();
-        draft.outside.push((subtask, takes));
+        draft.add(PartKind::Input, OutsideInput { subtask, takes });
         let shared = Arc::clone(&self.wire.shared);
-        let tell = move |signal| _ = shared.signal.set(signal);
-        draft.receives.push(Box::new(tell));
+        draft.tie(move |dag| {
+            if dag.verified.is_sporadic() {
+                let _ = shared.signal.set(Arc::clone(dag.target));
+            }
+        });
+        drop(draft);
         PacketReceiver {
             room: self.wire.shared.incoming.buffer(),
             wire: self.wire,
@@ -466,8 +471,7 @@ impl Uses for SendUse {
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let effect = SendCompletion(Arc::clone(&self.0.shared.outgoing));
-        let mut draft = dag.draft.borrow_mut();
-        draft.effects.push((subtask, Box::new(effect)));
+        dag.draft.borrow_mut().act(subtask, Box::new(effect));
         self.0
     }
 

@@ -264,9 +264,7 @@ impl Uses for WriteUse {
     fn hold(self, dag: &Dag, subtask: usize) -> WireWriter {
         // First: whether it has gone is asked when it is on its way.
         let effect = SendCompletion(Arc::clone(&self.1.shared.outgoing));
-        let mut draft = dag.draft.borrow_mut();
-        draft.effects.push((subtask, Box::new(effect)));
-        drop(draft);
+        dag.draft.borrow_mut().act(subtask, Box::new(effect));
         WireWriter(self.0.asking().hold(dag, subtask), self.1)
     }
 

@@ -50,8 +50,9 @@ use sched_dag::{
     AssignmentReason, ClusterId, DagId, DagKey, DagLabel, Subtask, SubtaskLabel, TaskSet, Warning,
 };
 
-use crate::draft::checks::{Drafts, writer_of};
+use crate::api::latest::{SampleUse, writer_of};
 use crate::draft::fault::{CountedNoun, UnprovenDag};
+use crate::draft::part::Drafts;
 use crate::platform::RunConfig;
 use crate::run::latest::Staleness;
 use crate::run::plan::CommitWords;
@@ -622,7 +623,7 @@ pub(super) fn staleness(
     let mut found = Vec::new();
     for (draft, reader) in drafts.iter().zip(answers) {
         let draft = draft.borrow();
-        for (subtask, latest, _) in &draft.samples {
+        for SampleUse(subtask, latest, _) in draft.all() {
             let Some(writer) = writer_of(drafts, latest) else {
                 continue;
             };

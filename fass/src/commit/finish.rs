@@ -27,8 +27,9 @@ use sched_dag::{
 use super::answer::{Commit, CommitAnswers, staleness};
 use super::tie::tie;
 use crate::api::dag::Dag;
-use crate::draft::checks::{self, Drafts};
+use crate::api::lifecycle::dags_of_modes;
 use crate::draft::fault::{CommitError, Fault};
+use crate::draft::part::{CheckedDag, CommitCheck, Drafts, one_of_each};
 use crate::platform;
 use crate::platform::{LaunchError, RunConfig};
 
@@ -191,7 +192,7 @@ fn divide_to_prove(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) {
     let mut divided = task_set.clone();
     let is_assigned = assign_clusters(&mut divided, terms).is_ok();
     let cluster = |dag: &DagId| divided.dag(*dag).cluster();
-    let of_modes = checks::dags_of_modes(drafts).concat();
+    let of_modes = dags_of_modes(drafts).concat();
     if is_assigned
         && divided.is_divided()
         && of_modes
@@ -253,19 +254,25 @@ fn verify(
             // DAGs were left out before it, so the model counts differently.
             spec.to_mut().name = number.to_string();
         }
-        let label = DagLabel {
-            id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
-            name: spec.name.clone(),
+        let checked = CheckedDag {
+            drafts,
+            draft,
+            label: DagLabel {
+                id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
+                name: spec.name.clone(),
+            },
         };
-        faults.extend(draft.flaws.iter().map(|flaw| flaw(label.clone())));
+        faults.extend(draft.flaws.iter().map(|flaw| flaw(checked.label.clone())));
         if let Some(Err(fault)) = observed.map(|file| wcets::apply(file, spec.to_mut())) {
-            let dag = label.clone();
+            let dag = checked.label.clone();
             faults.push(Fault::WcetsRefused { dag, fault });
         }
-        checks::check_dag(drafts, draft, &label, &mut faults);
+        checked.check(&mut faults);
         specs.push(spec);
     }
-    checks::check_all(drafts, &mut faults);
+    for (_, check) in one_of_each::<CommitCheck>(drafts) {
+        check(drafts, &mut faults);
+    }
     // A commit of nothing but repeated DAGs has been told what is wrong.
     if specs.is_empty() && !faults.is_empty() {
         let warnings = Vec::new();

@@ -87,49 +87,8 @@ worded! {
              DAGs, or leave one of the two out";
         /// The file of observed WCETs does not fit the DAG.
         WcetsRefused { dag: DagLabel, fault: WcetFault } = "wcets_refused", "{fault}: {dag}";
-        /// A subtask samples a latest value of a DAG that is not in the commit.
-        LatestNotCommitted { dag: DagLabel, subtask: SubtaskLabel, topic: String } =
-            "latest_not_committed",
-            "{subtask} of {dag} samples the latest value of topic `{topic}`, whose dag is not in \
-             the commit; commit both dags in one call";
-        /// A subtask may raise the signal of a DAG that is not in the commit.
-        SignalNotCommitted { dag: DagLabel, subtask: SubtaskLabel } = "signal_not_committed",
-            "{subtask} of {dag} may raise the signal of a dag that is not in the commit; commit \
-             both dags in one call";
-        /// A subtask may pause a DAG that is not in the commit.
-        SwitchedNotCommitted { dag: DagLabel, subtask: SubtaskLabel } = "switched_not_committed",
-            "{subtask} of {dag} may pause a dag that is not in the commit; commit both dags in one \
-             call";
-        /// Something is wrong with the modes, or with what enters from outside.
+        /// A part of a DAG is at fault, such as a signal, a device or a mode.
         Worded { code: &'static str, text: String } = of *code, "{text}";
-        /// A subtask has a function for after a fault, and a fault ends its DAG.
-        ReplacedInVain { dag: DagLabel, subtask: SubtaskLabel } = "replaced_in_vain",
-            "{subtask} of {dag} has another function for after a fault, and a fault ends the dag; \
-             let the dag survive faults by `survive_faults`, or register one function";
-        /// A DAG goes on after faults, and no subtask has a function for that.
-        NothingReplaceable { dag: DagLabel } = "nothing_replaceable",
-            "{dag} drops a job at a fault and goes on, and no subtask of it has another function \
-             for that; register one by `restarting` or `falling_back`";
-        /// A subtask that has a function for after a fault uses a state that has no value
-        /// for that.
-        StateWithoutReset { dag: DagLabel, subtask: SubtaskLabel, state: String } =
-            "state_without_reset",
-            "{subtask} of {dag} has another function for after a fault, and the state `{state}`, \
-             which it uses, no other value; give it one by `reset_to`";
-        /// A subtask states waits, and its function is not async.
-        CannotWait { dag: DagLabel, subtask: SubtaskLabel } = "cannot_wait",
-            "{subtask} of {dag} states waits, and its function is not async; register an async \
-             one, or state no waits";
-        /// A subtask states waits, and has another function for after a fault.
-        ReplaceableWaits { dag: DagLabel, subtask: SubtaskLabel } = "replaceable_waits",
-            "{subtask} of {dag} states waits, and has another function for after a fault, which \
-             could not have the place of a future that the fault has ended; register an async one \
-             alone, or state no waits";
-        /// A device is asked by more than one subtask.
-        DeviceAskedTwice { dag: DagLabel, subtask: SubtaskLabel, device: String } =
-            "device_asked_twice",
-            "{subtask} of {dag} asks device `{device}`, which another subtask asks; make a device \
-             for each";
         /// The commit is to find the clusters, and a DAG gets no cores.
         NotAssigned(error: LaunchError) = "not_assigned", "{error}";
         /// The DAG demands a proof that it meets its deadlines, and there is none, for that

@@ -7,8 +7,8 @@
 //! keeps its topics in the spec, but with the type [`UnstatedType`], which the commit
 //! takes to be whatever the topic's other end says.
 
-pub(crate) mod checks;
 pub(crate) mod fault;
+pub(crate) mod part;
 
 use alloc::borrow::Cow;
 use alloc::boxed::Box;
@@ -16,34 +16,19 @@ use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::cell::RefCell;
-use core::fmt;
 use core::time::Duration;
 
-use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
     Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel, SubtaskSpec,
     TopicPort, Wait,
 };
 
-use crate::run::answers::AnyDevice;
-use crate::run::effect::{Effect, InstanceRequests, RequestKind, RequestTarget, Wish};
+use crate::run::effect::{InstanceRequests, RequestKind, RequestTarget, Wish};
 use crate::run::latest::AnyLatest;
-use crate::run::line::KeptState;
 use crate::run::message::MessageType;
-use crate::run::record::AnyRecorded;
 use crate::run::subtask::MakeBody;
 use fault::Fault;
-
-/// Makes of all drafts of a commit what serves their requests.
-type MakeLifecycle = fn(&[Rc<RefCell<DagDraft>>]) -> Box<dyn Lifecycle>;
-
-/// Provides so many values of a state for after faults.
-pub(crate) type ProvideResets = Box<dyn FnOnce(u32)>;
-
-/// Something that is wrong with a registration: the fault that it is in a DAG of that label, which
-/// is known at the commit only.
-pub(crate) type Flaw = Box<dyn Fn(DagLabel) -> Fault>;
+use part::{CheckedDag, DraftPart, PartKind};
 
 /// A DAG as registered so far.
 #[derive(Default)]
@@ -51,8 +36,6 @@ pub(crate) struct DagDraft {
     pub(crate) spec: DagSpec,
     /// One for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
-    /// Faults that only this crate can find.
-    pub(crate) flaws: Vec<Flaw>,
     pub(crate) is_committed: bool,
     /// A source that states a period.
     periodic_source: Option<SubtaskLabel>,
@@ -60,54 +43,16 @@ pub(crate) struct DagDraft {
     states_deadline: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
     pub(crate) demands_proof: bool,
-    /// The topics whose latest values are offered.
-    pub(crate) latest: Vec<Rc<dyn AnyLatest>>,
-    /// The topics that are recorded; they stand in `latest`, too.
-    pub(crate) recorded: Vec<Rc<dyn AnyRecorded>>,
-    /// The states that are recorded, by their positions.
-    pub(crate) states: Vec<(usize, Arc<KeptState>)>,
-    /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
-    /// has there.
-    pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,
-    /// The inputs of subtasks from outside: "reads parameter `gain`".
-    pub(crate) outside: Vec<(usize, String)>,
-    /// The signals that subtasks may raise, of whatever DAG.
-    pub(crate) raises: Vec<(usize, Arc<RequestTarget>)>,
-    /// The DAGs that subtasks may pause.
-    pub(crate) switches: Vec<(usize, Arc<RequestTarget>)>,
-    /// Whether it is paused at the beginning.
-    pub(crate) starts_paused: bool,
-    /// Whether a subtask may end the run.
-    pub(crate) may_shut_down: bool,
-    /// The modes that it is in, and those that its subtasks may enter.
-    pub(crate) modes: Vec<checks::ModeSets>,
-    /// The check that finds their faults, if there are modes.
-    pub(crate) check_modes: Option<checks::Check>,
-    /// The check of topics that are recorded, if there are any.
-    pub(crate) check_recorded: Option<checks::Check>,
-    /// The maker of the lifecycle that serves requests, if it states some.
-    pub(crate) lifecycle: Option<MakeLifecycle>,
-    /// Listeners to the DAG's signal if it is sporadic: wires that its source receives on.
-    pub(crate) receives: Vec<Box<dyn FnOnce(Arc<RequestTarget>)>>,
-    /// Effects of completions beyond the DAG, latest values apart.
-    pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
-    /// The subtasks whose functions can be replaced.
-    pub(crate) replaceable: Vec<usize>,
-    /// The subtasks whose functions are async.
-    pub(crate) waiting: Vec<usize>,
-    /// The devices that subtasks ask.
-    pub(crate) devices: Vec<(usize, Arc<dyn AnyDevice>)>,
-    /// The devices that several subtasks ask: each further one, and the device's name.
-    pub(crate) asked_twice: Vec<(usize, String)>,
-    /// The states that are made anew after faults, and by what.
-    pub(crate) resets: Vec<(usize, ProvideResets)>,
+    /// Faults that are known but for the label of its DAG.
+    pub(crate) flaws: Vec<Box<dyn Fn(DagLabel) -> Fault>>,
+    /// All else that it states, in the order of registration.
+    pub(crate) parts: Vec<(PartKind, Box<dyn DraftPart>)>,
     /// Which DAG it is, for others that send it signals, or pause it.
     pub(crate) target: Arc<RequestTarget>,
-    /// The signal that is raised when a fault ends the DAG.
-    pub(crate) on_fault: Option<Arc<RequestTarget>>,
 }
 
 /// The topics that a subtask names, and the types of its function.
+#[derive(Default)]
 pub(crate) struct NamedTopics<'a> {
     pub(crate) inputs: (&'a [&'a str], &'a [MessageType]),
     pub(crate) outputs: (&'a [&'a str], &'a [MessageType]),
@@ -128,7 +73,6 @@ impl DagDraft {
             },
             is_committed: true,
             target: Arc::clone(&self.target),
-            on_fault: self.on_fault.clone(),
             ..Self::default()
         };
         core::mem::replace(self, committed)
@@ -149,22 +93,22 @@ impl DagDraft {
         if input_types.len() != inputs.len() {
             let subtask = subtask.clone();
             let (expected, given) = (input_types.len(), inputs.len());
-            self.flaws.push(Box::new(move |dag| Fault::InputArity {
+            self.flaw(move |dag| Fault::InputArity {
                 dag,
                 subtask: subtask.clone(),
                 expected,
                 given,
-            }));
+            });
         }
         if output_types.len() != outputs.len() {
             let subtask = subtask.clone();
             let (expected, given) = (output_types.len(), outputs.len());
-            self.flaws.push(Box::new(move |dag| Fault::OutputArity {
+            self.flaw(move |dag| Fault::OutputArity {
                 dag,
                 subtask: subtask.clone(),
                 expected,
                 given,
-            }));
+            });
         }
         let spec = self.specify(&subtask, attributes);
         self.spec.subtasks.push(SubtaskSpec {
@@ -173,19 +117,6 @@ impl DagDraft {
             ..spec
         });
         subtask
-    }
-
-    /// Adds a subtask without types and returns its position.
-    pub(crate) fn register_untyped(
-        &mut self,
-        body: MakeBody,
-        attributes: SubtaskAttributes,
-    ) -> usize {
-        let subtask = self.next_label(&attributes);
-        let spec = self.specify(&subtask, attributes);
-        self.spec.subtasks.push(spec);
-        self.make_bodies.push(body);
-        subtask.id.index()
     }
 
     /// Returns the spec of a subtask by its attributes, without its ports.
@@ -244,11 +175,10 @@ impl DagDraft {
         // The analysis takes the minimum inter-arrival time for the period.
         self.replace_period(min_inter_arrival);
         if let Some(subtask) = self.periodic_source.clone() {
-            self.flaws
-                .push(Box::new(move |dag| Fault::ActivationsDiffer {
-                    dag,
-                    subtask: subtask.clone(),
-                }));
+            self.flaw(move |dag| Fault::ActivationsDiffer {
+                dag,
+                subtask: subtask.clone(),
+            });
         }
     }
 
@@ -256,11 +186,10 @@ impl DagDraft {
     #[inline(never)]
     pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
         if self.spec.activation == Activation::Sporadic {
-            self.flaws
-                .push(Box::new(move |dag| Fault::ActivationsDiffer {
-                    dag,
-                    subtask: subtask.clone(),
-                }));
+            self.flaw(move |dag| Fault::ActivationsDiffer {
+                dag,
+                subtask: subtask.clone(),
+            });
             return;
         }
         self.periodic_source = Some(subtask.clone());
@@ -270,12 +199,12 @@ impl DagDraft {
         // The first source sets it; a second one that differs is a fault.
         let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
         if first_ns != period_ns {
-            self.flaws.push(Box::new(move |dag| Fault::PeriodsDiffer {
+            self.flaw(move |dag| Fault::PeriodsDiffer {
                 dag,
                 subtask: subtask.clone(),
                 first_ns,
                 second_ns: period_ns,
-            }));
+            });
         }
     }
 
@@ -302,8 +231,20 @@ impl DagDraft {
             of,
         };
         // A wish becomes a request by the completion (R3), and by nothing else.
-        self.effects.push((subtask, Box::new(asked)));
+        self.act(subtask, Box::new(asked));
         wish
+    }
+
+    fn flaw(&mut self, flaw: impl Fn(DagLabel) -> Fault + 'static) {
+        self.flaws.push(Box::new(flaw));
+    }
+
+    /// Makes waits of a subtask a fault, if it states any.
+    pub(crate) fn refuse_waits(&mut self, code: &'static str, subtask: usize, says: &'static str) {
+        if !self.spec.subtasks[subtask].waits.is_empty() {
+            let fault = move |of: &CheckedDag<'_>| Some(of.fault(code, subtask, says));
+            self.add(PartKind::Wait, fault);
+        }
     }
 
     /// Returns how messages call a subtask that is registered.
@@ -318,8 +259,8 @@ impl DagDraft {
     /// type, where that is known.
     pub(crate) fn spec_with_known_types(&self) -> Cow<'_, DagSpec> {
         let mut spec = Cow::Borrowed(&self.spec);
-        if !self.latest.is_empty() {
-            let latest = self.latest.iter().map(|latest| LatestSpec {
+        if self.has::<Rc<dyn AnyLatest>>() {
+            let latest = self.all::<Rc<dyn AnyLatest>>().map(|latest| LatestSpec {
                 port: latest.port(),
                 samplers: latest.samplers(),
             });
@@ -335,7 +276,7 @@ impl DagDraft {
         let known: Vec<TopicPort> = ports
             .filter(|port| port.type_id != unknown)
             .cloned()
-            .chain(self.latest.iter().map(|latest| latest.port()))
+            .chain(spec.latest.iter().map(|latest| latest.port.clone()))
             .collect();
         for subtask in &mut spec.to_mut().subtasks {
             for port in subtask.inputs.iter_mut().chain(&mut subtask.outputs) {
@@ -364,11 +305,11 @@ impl DagDraft {
         let ns = u64::try_from(duration.as_nanos()).ok();
         if ns.is_none() {
             let subtask = subtask.cloned();
-            self.flaws.push(Box::new(move |dag| Fault::DurationTooLong {
+            self.flaw(move |dag| Fault::DurationTooLong {
                 dag,
                 subtask: subtask.clone(),
                 what,
-            }));
+            });
         }
         ns
     }
@@ -394,16 +335,6 @@ fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
             message.port(topic)
         })
         .collect()
-}
-
-impl fmt::Debug for DagDraft {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Draft")
-            .field("spec", &self.spec)
-            .field("flaws", &self.flaws.len())
-            .field("is_committed", &self.is_committed)
-            .finish_non_exhaustive()
-    }
 }
 
 /// Attributes of a subtask beyond its function and its topics.

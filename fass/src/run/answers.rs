@@ -32,6 +32,9 @@ pub(crate) trait AnyDevice: Send + Sync {
     fn server(&self) -> Option<&Arc<RequestTarget>>;
 }
 
+/// A subtask, and the device that it asks.
+pub(crate) struct AskedDevice(pub(crate) usize, pub(crate) Arc<dyn AnyDevice>);
+
 /// The answers of a device whose answers are recorded.
 pub(crate) trait AnyAnswers<A>: Send + Sync {
     fn line(&self) -> (Schema, Arc<ChannelState>);

@@ -15,26 +15,6 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use sched_dag::lifecycle::{ModeEntry, Request};
 use sched_dag::{DagId, ModeId};
 
-/// An effect without its signals.
-pub(crate) struct MutedEffect(pub(crate) Box<dyn Effect>);
-
-impl Effect for MutedEffect {
-    fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
-        self.0.happen(completed_ns, &mut |request| match request {
-            Request::Signal(_) => {}
-            other => ask(other),
-        });
-    }
-
-    fn withdraw(&mut self) {
-        self.0.withdraw();
-    }
-
-    fn fail(&mut self, failed_ns: u64) {
-        self.0.fail(failed_ns);
-    }
-}
-
 /// Something that a function has prepared, perhaps.
 pub(crate) trait Effect: Send {
     /// Publishes it if it was prepared since the last time. `ask` takes what the scheduler is
@@ -61,12 +41,20 @@ pub(crate) trait Effect: Send {
 
     /// Does what is to be done for an instance that has failed.
     fn fail(&mut self, _failed_ns: u64) {}
+
+    /// Keeps its signals from going anywhere.
+    fn mute(&mut self) {}
 }
 
 /// The effect that a platform adds to a completion.
 impl Effect for Box<dyn FnMut() + Send> {
     fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self();
+    }
+
+    fn wait(&mut self, _ended_and_limit_ns: (u64, u64), _ask: &mut dyn FnMut(Request)) -> bool {
+        self();
+        false
     }
 }
 
@@ -140,5 +128,12 @@ impl Effect for InstanceRequests {
             RequestKind::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, ModeEntry::AtOnce),
             RequestKind::Mode(mode) => Request::Enter(*mode, ModeEntry::WhenIdle),
         });
+    }
+
+    fn mute(&mut self) {
+        if let RequestKind::Signal(_) = self.of {
+            // A place that no function knows.
+            self.wish = Wish::default();
+        }
     }
 }

@@ -9,7 +9,7 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
 
-use recording::{Channel, Encoder, Recordable, Role, Schema};
+use recording::{Encoder, Recordable, Role, Schema};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance};
 
@@ -31,7 +31,7 @@ pub(crate) struct ChannelState {
 }
 
 impl ChannelState {
-    pub(super) const fn new(edge: &'static TopicEdge) -> Self {
+    pub(crate) const fn new(edge: &'static TopicEdge) -> Self {
         Self {
             number: AtomicU16::new(NO_CHANNEL),
             edge,
@@ -50,12 +50,12 @@ impl ChannelState {
         self.number.load(Ordering::Relaxed)
     }
 
-    pub(super) fn set_number(&self, number: u16) {
+    pub(crate) fn set_number(&self, number: u16) {
         self.number.store(number, Ordering::Relaxed);
     }
 
     /// Notes whether the platform reads the values, which have at least so many bytes.
-    pub(super) fn open(&self, is_read: bool, least_bytes: usize) {
+    pub(crate) fn open(&self, is_read: bool, least_bytes: usize) {
         self.is_read.store(is_read, Ordering::Relaxed);
         // Nobody drains it in the background, so one value at a time needs room.
         if !is_read && let Some((outbox, _)) = outbox(words_of(room_for(least_bytes))) {
@@ -208,7 +208,7 @@ impl KeptState {
     }
 
     /// Writes it down, if that is due in the job.
-    pub(super) fn keep(&self, line: &ChannelState, job: u64) {
+    pub(crate) fn keep(&self, line: &ChannelState, job: u64) {
         if job.is_multiple_of(self.every.load(Ordering::Relaxed).into()) {
             self.state.stage(line, job);
         }
@@ -276,16 +276,8 @@ pub struct RecordedValue<'v> {
     pub bytes: Option<&'v [u8]>,
 }
 
-/// The way from a topic to the platform, and back. All code of a commit for recorded topics
-/// is reached through them only, so that an image without any does not contain it.
+/// The way from a topic to the platform, and back. An image without recorded topics has none.
 pub(crate) struct TopicEdge {
-    /// Reports whether anything is recorded or replayed.
-    pub(crate) crosses: fn() -> bool,
-    /// Reports whether that is so of what other subtasks than sources write, too.
-    pub(crate) has_results: fn() -> bool,
-    /// Takes the recorded topics of a DAG, and the hash of its graph. Reports whether the plan's
-    /// taker will read the values; else they are given to it.
-    pub(crate) open: fn(DagId, u64, &[Channel]) -> bool,
     /// Takes a value.
     pub(crate) record: fn(&RecordedValue<'_>),
     /// Reports whether there is a replay.

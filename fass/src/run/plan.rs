@@ -6,20 +6,23 @@
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
+use core::mem;
+use core::slice;
 use core::sync::atomic::AtomicU32;
 
 use sched_dag::engine::{Alternate, ProvenBounds};
 use sched_dag::journal::EventSubject;
-use sched_dag::lifecycle::{Lifecycle, Request};
+use sched_dag::lifecycle::{Lifecycle, Request, WaitLimit};
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
 
-use super::effect::{Effect, MutedEffect};
+use super::effect::Effect;
 use super::gate::call_app;
 use super::latest::Staleness;
 use super::line::{KeptState, LineOf};
-use super::turn::{TurnEffects, TurnState};
+use super::turn::TurnState;
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
@@ -130,7 +133,32 @@ pub struct SubtaskCode {
     /// The job that it runs, or has panicked in; [`NO_JOB`] else.
     job: u64,
     /// Effects of its completions beyond the DAG.
-    effects: Vec<Box<dyn Effect>>,
+    effects: Effects,
+    /// Whether there are any: asked where each instruction counts.
+    has_effects: bool,
+}
+
+/// Effects of completions. Mostly there is none, or one, for which a loop would take longer than its
+/// effect does. To compare a tag of its own is short.
+#[derive(Default)]
+#[repr(u8)]
+enum Effects {
+    #[default]
+    None,
+    One(Box<dyn Effect>),
+    Several(Vec<Box<dyn Effect>>),
+    /// Those of a subtask that waits, which happen when its instance has finished.
+    OfTurns(Arc<TurnState>, Vec<Box<dyn Effect>>),
+}
+
+impl Effects {
+    fn all(&mut self) -> &mut [Box<dyn Effect>] {
+        match self {
+            Self::None => &mut [],
+            Self::One(only) => slice::from_mut(only),
+            Self::Several(all) | Self::OfTurns(_, all) => all,
+        }
+    }
 }
 
 /// Stands where a job's number does, for none: no run gets so far.
@@ -236,25 +264,32 @@ impl Alternate for ReplacementCode {
 
 impl SubtaskCode {
     pub(crate) fn new(subtask: Box<dyn PolledSubtask>) -> Self {
+        let turn = subtask.turn().map(Arc::clone);
         Self {
+            effects: turn.map_or(Effects::None, |turn| Effects::OfTurns(turn, Vec::new())),
+            has_effects: subtask.turn().is_some(),
             subtask,
             job: NO_JOB,
-            effects: Vec::new(),
         }
     }
 
     /// Adds what each completion does beyond the DAG.
     pub(crate) fn add_effects(&mut self, effects: impl IntoIterator<Item = Box<dyn Effect>>) {
-        self.effects.extend(effects);
-    }
-
-    /// Lets what it has of effects happen when its instances have finished, if it may wait.
-    pub(crate) fn hold_effects(&mut self) {
-        if let Some(turn) = self.turn() {
-            let turn = Arc::clone(turn);
-            let real = core::mem::take(&mut self.effects);
-            let held = TurnEffects::new(turn, real);
-            self.effects.push(Box::new(held));
+        for mut effect in effects {
+            self.has_effects = true;
+            self.effects = match mem::take(&mut self.effects) {
+                Effects::None => Effects::One(effect),
+                Effects::One(first) => Effects::Several(vec![first, effect]),
+                Effects::Several(mut all) => {
+                    all.push(effect);
+                    Effects::Several(all)
+                }
+                Effects::OfTurns(turn, mut all) => {
+                    effect.bind(turn.address());
+                    all.push(effect);
+                    Effects::OfTurns(turn, all)
+                }
+            };
         }
     }
 
@@ -310,7 +345,8 @@ impl SubtaskCode {
     }
 
     /// Publishes the effects that the last [`run`](Self::run) prepared outside the DAG:
-    /// its latest values show, and `ask` is called with each signal and each other request.
+    /// its latest values show, and `ask` is called with each signal and each other request. Or, of an
+    /// instance that has not finished, returns for how long it waits.
     ///
     /// The caller does so once the instance is complete for it, at `completed_ns` on
     /// the clock of [`crate::now_ns`], and not for an instance that failed. It passes
@@ -318,28 +354,43 @@ impl SubtaskCode {
     /// Does not wait, allocate or
     /// run code of the app; a body that has no such effects returns at once.
     #[inline]
-    pub fn complete(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
-        // Mostly there is one, for which a loop would take longer than what it does.
-        if let [only] = &mut *self.effects {
-            return only.happen(completed_ns, ask);
+    pub fn complete(
+        &mut self,
+        completed_ns: u64,
+        ask: &mut dyn FnMut(Request),
+    ) -> Option<WaitLimit> {
+        match &mut self.effects {
+            Effects::One(only) => only.happen(completed_ns, ask),
+            Effects::None => {}
+            _ => return self.end_turn(completed_ns, ask),
         }
-        self.have_all_happen(completed_ns, ask);
+        None
     }
 
     /// Apart, so that the way of one effect saves no registers for a loop.
     #[inline(never)]
-    fn have_all_happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
-        for effect in &mut self.effects {
-            effect.happen(completed_ns, ask);
+    fn end_turn(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
+        if let Effects::OfTurns(turn, all) = &mut self.effects
+            && let Some((limit, limit_ns)) = turn.take_wait()
+        {
+            // All are asked, as each has something to post when a wait begins.
+            let mut is_there = false;
+            for effect in all {
+                is_there |= effect.wait((completed_ns, limit_ns), ask);
+            }
+            // It is a wait all the same: the instance gives its core up.
+            return Some(if is_there { WaitLimit::For(0) } else { limit });
         }
+        let all = self.effects.all().iter_mut();
+        all.for_each(|effect| effect.happen(completed_ns, ask));
+        None
     }
 
     /// Gives the platform what an instance had sampled, if that is recorded, although it
     /// failed; else nobody could compute its fault again.
     pub fn failed(&mut self, failed_ns: u64) {
-        for effect in &mut self.effects {
-            effect.fail(failed_ns);
-        }
+        let all = self.effects.all().iter_mut();
+        all.for_each(|effect| effect.fail(failed_ns));
     }
 
     /// Has each job looked at before its turn: it is given up where `look` returns false.
@@ -356,15 +407,16 @@ impl SubtaskCode {
     /// Has something done at each completion, after what the subtask itself prepared. As an
     /// effect it must be short: it keeps the platform from deciding anything meanwhile.
     pub fn on_completion(&mut self, act: Box<dyn FnMut() + Send>) {
-        self.effects.push(Box::new(act));
+        let effect: Box<dyn Effect> = Box::new(act);
+        self.add_effects([effect]);
     }
 
     /// Keeps its signals from going anywhere.
     pub(crate) fn mute(&mut self) {
-        let effects = core::mem::take(&mut self.effects).into_iter();
-        self.effects = effects
-            .map(|effect| Box::new(MutedEffect(effect)) as _)
-            .collect();
+        self.effects
+            .all()
+            .iter_mut()
+            .for_each(|effect| effect.mute());
     }
 
     /// Returns the word that a question of the latest turn has changed, if threads may sleep on it:
@@ -373,14 +425,17 @@ impl SubtaskCode {
     /// See [`DeviceDriver::bell`](crate::shared::DeviceDriver::bell).
     #[must_use]
     pub fn bell(&mut self) -> Option<Arc<AtomicU32>> {
-        self.effects.iter_mut().find_map(|effect| effect.bell())
+        self.effects
+            .all()
+            .iter_mut()
+            .find_map(|effect| effect.bell())
     }
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
     /// platform to which a clock is dear need not read it for the others.
     #[must_use]
     pub fn has_effects(&self) -> bool {
-        !self.effects.is_empty()
+        self.has_effects
     }
 
     /// Takes a turn of job `job` without its function, in the place of [`run`](Self::run): the last
@@ -404,7 +459,10 @@ impl SubtaskCode {
         self.subtask.discard(job);
         // It was cancelled while it waited.
         if self.goes_on(job) {
-            self.effects.iter_mut().for_each(|effect| effect.withdraw());
+            self.effects
+                .all()
+                .iter_mut()
+                .for_each(|effect| effect.withdraw());
         }
     }
 
@@ -438,7 +496,7 @@ impl SubtaskCode {
 impl core::fmt::Debug for SubtaskCode {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Body")
-            .field("effects", &self.effects.len())
+            .field("has_effects", &self.has_effects())
             .finish_non_exhaustive()
     }
 }
@@ -522,8 +580,8 @@ impl engine::SubtaskBody for SubtaskRunner {
     }
 
     #[inline]
-    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) {
-        self.body.complete(finish_ns, ask);
+    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
+        self.body.complete(finish_ns, ask)
     }
 
     fn alternate(&self) -> Option<ReplacementCode> {

@@ -3,21 +3,17 @@
 //! A *turn* is what an instance executes from its start, or the end of a wait, to its finish, or
 //! the next wait. How it ends is told by one poll of the instance's future. That is ready: then the
 //! instance has finished, and its outputs go out. Or it is pending: then one future of ours has
-//! begun one wait in it. The completion of such a turn asks for that wait, and causes nothing else.
+//! begun one wait in it. The completion of such a turn returns that wait, and causes nothing else.
 //!
 //! The waits of a subtask are stated: their number, and the limit of each. An instance that waits
 //! otherwise panics with a [`WaitFault`].
 
 use alloc::boxed::Box;
-use alloc::sync::Arc;
-use alloc::vec::Vec;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
 use core::time::Duration;
 
-use sched_dag::lifecycle::Request;
+use sched_dag::lifecycle::WaitLimit;
 use sched_dag::{Wait, worded};
-
-use super::effect::Effect;
 
 worded! {
     /// A fault of an instance that does not wait as its subtask states. Its text is the message of
@@ -239,17 +235,17 @@ impl TurnState {
         is_last
     }
 
-    /// Takes what the turn that has ended asks for, if it has not finished, and for how long at the
-    /// most.
-    fn take_request(&self) -> Option<(Request, u64)> {
+    /// Takes the wait that the turn has ended in, if the instance has not finished, and how long that
+    /// is at the most.
+    pub(super) fn take_wait(&self) -> Option<(WaitLimit, u64)> {
         let ns = self.asked_ns.load(Ordering::Relaxed);
         let asks = self.asks.load(Ordering::Relaxed);
         self.asks.store(NONE, Ordering::Relaxed);
         match asks {
             NONE => None,
-            AFTER => Some((Request::Wait(ns), ns)),
+            AFTER => Some((WaitLimit::For(ns), ns)),
             // The release is not later than the end of the turn.
-            _ => Some((Request::WaitUntil(ns), ns)),
+            _ => Some((WaitLimit::SinceRelease(ns), ns)),
         }
     }
 
@@ -261,52 +257,5 @@ impl TurnState {
     /// Learns how the wait has ended, before the next turn.
     pub(crate) fn wake(&self, has_timed_out: bool) {
         self.has_timed_out.store(has_timed_out, Ordering::Relaxed);
-    }
-}
-
-/// The effects of a subtask that waits: the real ones, which happen when it has finished.
-pub(crate) struct TurnEffects {
-    turn: Arc<TurnState>,
-    real: Vec<Box<dyn Effect>>,
-}
-
-impl TurnEffects {
-    pub(crate) fn new(turn: Arc<TurnState>, mut real: Vec<Box<dyn Effect>>) -> Self {
-        real.iter_mut()
-            .for_each(|effect| effect.bind(turn.address()));
-        Self { turn, real }
-    }
-}
-
-impl Effect for TurnEffects {
-    fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
-        match self.turn.take_request() {
-            None => {
-                let real = self.real.iter_mut();
-                real.for_each(|effect| effect.happen(completed_ns, ask));
-            }
-            Some((request, limit_ns)) => {
-                // All are asked, as each has something to post when a wait begins.
-                let mut is_there = false;
-                for effect in &mut self.real {
-                    is_there |= effect.wait((completed_ns, limit_ns), ask);
-                }
-                // It is a wait all the same: the instance gives its core up.
-                ask(if is_there { Request::Wait(0) } else { request });
-            }
-        }
-    }
-
-    fn bell(&mut self) -> Option<Arc<AtomicU32>> {
-        self.real.iter_mut().find_map(|effect| effect.bell())
-    }
-
-    fn withdraw(&mut self) {
-        self.real.iter_mut().for_each(|effect| effect.withdraw());
-    }
-
-    fn fail(&mut self, failed_ns: u64) {
-        let real = self.real.iter_mut();
-        real.for_each(|effect| effect.fail(failed_ns));
     }
 }

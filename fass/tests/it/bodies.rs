@@ -268,7 +268,7 @@ fn misuse(places: &[Place], running: &[AtomicU64; 4], turns: u32, random: &mut R
             let done = catch_unwind(AssertUnwindSafe(|| match what {
                 0 | 1 => body.run(job),
                 2 => body.discard(job),
-                _ => body.complete(job, &mut |_| ()),
+                _ => _ = body.complete(job, &mut |_| ()),
             }));
             *next += u64::from(job == *next && !random.chance(1));
             drop(place);

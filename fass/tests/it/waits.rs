@@ -15,6 +15,7 @@ use fass::shared::{
 use fass::{Dag, create_dag, sleep, until};
 use sched_dag::DagId;
 use sched_dag::lifecycle::WaitId;
+use sched_dag::lifecycle::WaitLimit::{self, For, SinceRelease};
 
 fn dag() -> Dag {
     let dag = create_dag();
@@ -22,12 +23,13 @@ fn dag() -> Dag {
     dag
 }
 
-/// Takes a turn, and returns what its end asks for.
-fn turn(body: &mut SubtaskCode, job: u64) -> Vec<Request> {
+/// Takes a turn, and returns what its end asks for, or the wait that it ends in.
+fn turn(body: &mut SubtaskCode, job: u64) -> Result<Vec<Request>, WaitLimit> {
     let mut asked = Vec::new();
     body.run(job);
-    body.complete(0, &mut |request| asked.push(request));
-    asked
+    let wait = body.complete(0, &mut |request| asked.push(request));
+    assert!(wait.is_none() || asked.is_empty(), "{asked:?}");
+    wait.map_or(Ok(asked), Err)
 }
 
 /// Keeps a number for a test.
@@ -70,19 +72,22 @@ fn a_turn_that_ends_in_a_wait_asks_for_that_alone() {
     };
     for job in 0..3 {
         assert!(of_dag[0].has_effects() && !of_dag[0].goes_on(job));
-        assert_eq!(turn(&mut of_dag[0], job), [Request::Wait(3_000)]);
+        assert_eq!(turn(&mut of_dag[0], job), Err(For(3_000)));
         of_dag[0].wake(true);
-        assert_eq!(turn(&mut of_dag[0], job), [Request::WaitUntil(4_000)]);
+        assert_eq!(turn(&mut of_dag[0], job), Err(SinceRelease(4_000)));
         assert!(of_dag[0].goes_on(job) && returned.load(Relaxed) == job);
         of_dag[0].wake(true);
         // The latest value is that of the job before, until this one is complete.
         of_dag[0].run(job);
-        turn(&mut of_reader[0], job);
+        _ = turn(&mut of_reader[0], job);
         assert_eq!(sampled.load(Relaxed), job);
         of_dag[0].complete(0, &mut |request| panic!("{request:?}"));
-        turn(&mut of_reader[0], job);
+        _ = turn(&mut of_reader[0], job);
         assert_eq!(sampled.load(Relaxed), job + 1);
-        assert_eq!(turn(&mut of_dag[1], job), [Request::Signal(DagId(1))]);
+        assert_eq!(
+            turn(&mut of_dag[1], job),
+            Ok(vec![Request::Signal(DagId(1))])
+        );
     }
 }
 
@@ -115,18 +120,18 @@ fn holding() -> (SubtaskCode, Arc<AtomicU64>) {
 #[test]
 fn a_future_is_dropped_by_the_next_turn_or_with_its_body_and_not_by_discarding() {
     let (mut body, drops) = holding();
-    assert_eq!(turn(&mut body, 0), [Request::Wait(0)]);
+    assert_eq!(turn(&mut body, 0), Err(For(0)));
     body.discard(0);
     assert_eq!(drops.load(Relaxed), 0, "that is the app's code");
-    assert_eq!(turn(&mut body, 1), [Request::Wait(0)]);
+    assert_eq!(turn(&mut body, 1), Err(For(0)));
     assert_eq!(drops.load(Relaxed), 1);
-    assert_eq!(turn(&mut body, 1), []);
+    assert_eq!(turn(&mut body, 1), Ok(vec![]));
     assert_eq!(drops.load(Relaxed), 2);
-    turn(&mut body, 2);
+    _ = turn(&mut body, 2);
     drop(body);
     assert_eq!(drops.load(Relaxed), 3);
     let (mut body, drops) = holding();
-    turn(&mut body, 0);
+    _ = turn(&mut body, 0);
     body.forget();
     assert_eq!(
         drops.load(Relaxed),
@@ -146,7 +151,7 @@ fn a_function_that_has_panicked_is_not_called_again() {
         .register(named("f").wait(Duration::ZERO));
     let mut plan = commit(&[dag]);
     let body = &mut plan.bodies[0][0];
-    turn(body, 0);
+    _ = turn(body, 0);
     assert_eq!(panic_message(|| body.run(0)), "worn out");
     let again = "the subtask panicked in job 0 and cannot continue";
     assert_eq!(panic_message(|| body.run(1)), again);
@@ -240,14 +245,14 @@ fn of_two_questions_the_later_one_counts_whatever_the_driver_does() {
     let body = &mut plan.bodies[0][0];
     let mut tickets = Vec::new();
     for job in 0..4 {
-        turn(body, job);
+        _ = turn(body, job);
         // The second and the third are never taken.
         if job % 3 == 0 {
             tickets.push(driver.question().expect("there is one").0);
         }
         if job < 3 {
             body.wake(true);
-            turn(body, job);
+            _ = turn(body, job);
             assert!(driver.question().is_none());
         }
     }
@@ -255,7 +260,7 @@ fn of_two_questions_the_later_one_counts_whatever_the_driver_does() {
     assert_eq!(driver.answer(tickets[1], 40), Ok(()));
     assert_eq!(answers().map(|wait| wait.instance.job), Some(3));
     body.wake(false);
-    assert_eq!(turn(body, 3), []);
+    assert_eq!(turn(body, 3), Ok(vec![]));
 }
 
 /// Takes a turn while another thread does something, and returns the requests and the answer.
@@ -263,7 +268,7 @@ fn turn_while(
     body: &mut SubtaskCode,
     job: u64,
     other: impl FnOnce() + Send,
-) -> (Vec<Request>, Option<WaitId>) {
+) -> (Result<Vec<Request>, WaitLimit>, Option<WaitId>) {
     let start = Barrier::new(2);
     thread::scope(|scope| {
         let other = scope.spawn(|| {
@@ -301,13 +306,13 @@ fn bytes_that_come_or_go_as_a_wait_for_them_begins_end_it_once() {
         for (number, other) in (0..).zip(others) {
             let (asked, answered) = turn_while(body, job, other);
             let found = answered.map(|wait| (wait.instance.job, wait.number));
-            match asked[..] {
-                [Request::Wait(0)] => assert_eq!(found, None),
-                [Request::Wait(9)] => assert_eq!(found, Some((job, number))),
+            match asked {
+                Err(For(0)) => assert_eq!(found, None),
+                Err(For(9)) => assert_eq!(found, Some((job, number))),
                 _ => panic!("{asked:?}"),
             }
             body.wake(answered.is_none());
         }
-        assert_eq!(turn(body, job), []);
+        assert_eq!(turn(body, job), Ok(vec![]));
     }
 }

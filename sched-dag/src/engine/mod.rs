@@ -30,7 +30,7 @@ use core::ops::DerefMut;
 use crate::ids::{ClusterId, CoreId, DagId, Vertex};
 use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{Mailboxes, Parts, PendingRequests, Request};
+use crate::lifecycle::{Mailboxes, Parts, PendingRequests, Request, WaitLimit};
 use crate::placement::{NextWork, Placement};
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
@@ -206,16 +206,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     ) -> NextAction<B> {
         // Before the scheduler knows: a latest value is there when a successor of this instance
         // starts.
-        if body.has_effects() {
-            body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
+        if body.has_effects()
+            && let Some(limit) = self.publish(&mut body, port.on_clock(finish_ns))
+        {
+            // Asked here, so that the port need not lie in memory for those that do not wait.
+            let is_alone = is_alone && !port.has_letters();
+            return self.wait((core, vertex), body, (finish_ns, limit), is_alone, port);
         }
         // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
-            if let Some(limit_ns) = self.take_wait(vertex, finish_ns) {
-                // Asked here, so that the port need not lie in memory for those that do not wait.
-                let is_alone = is_alone && !port.has_letters();
-                return self.wait((core, vertex), body, (finish_ns, limit_ns), is_alone, port);
-            }
             let instance = self.scheduler.instance_of(vertex);
             self.placement.finish(core.index(), vertex, body);
             let limit_ns = None;
@@ -287,10 +286,11 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         &mut self,
         (core, vertex): (CoreId, Vertex),
         mut body: B,
-        (ended_ns, limit_ns): (u64, u64),
+        (ended_ns, limit): (u64, WaitLimit),
         is_alone: bool,
         port: &mut C,
     ) -> NextAction<B> {
+        let limit_ns = self.limit_ns(vertex, limit, ended_ns);
         port.wait(core, &mut body, ended_ns);
         let done = match is_alone && !C::ANSWERS_AT_ONCE && self.requests.are_none() {
             true => (self.scheduler).wait_shortly(ended_ns, core, vertex, limit_ns),
@@ -342,13 +342,13 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     pub fn complete_parked(
         &mut self,
         (core, vertex): (CoreId, Vertex),
-        body: B,
+        mut body: B,
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl PlatformPort<B>,
     ) {
-        let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
+        let wait = self.publish(&mut body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
-        let limit_ns = self.take_wait(vertex, finish_ns);
+        let limit_ns = wait.map(|limit| self.limit_ns(vertex, limit, finish_ns));
         match limit_ns {
             Some(_) => {
                 port.wait(core, &mut body, finish_ns);
@@ -361,11 +361,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.step((now_ns, core), port, |moment| moment.end_turn(turn));
     }
 
-    /// Takes the request of a turn that has ended in a wait, and returns the limit of that.
-    #[inline]
-    fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
-        let release_ns = || self.scheduler.release_ns(vertex);
-        self.requests.take_wait(now_ns, release_ns)
+    /// Returns for how long an instance waits that begins now.
+    fn limit_ns(&self, vertex: Vertex, limit: WaitLimit, now_ns: u64) -> u64 {
+        match limit {
+            WaitLimit::For(limit_ns) => limit_ns,
+            WaitLimit::SinceRelease(after_ns) => {
+                let until_ns = self.scheduler.release_ns(vertex).saturating_add(after_ns);
+                until_ns.saturating_sub(now_ns)
+            }
+        }
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
@@ -477,14 +481,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.placement.suspend(vertex, parked)
     }
 
-    /// A body that goes and comes stays in a register.
     #[inline]
-    fn publish(requests: &mut PendingRequests, mut body: B, finish_ns: u64) -> B {
-        body.complete(finish_ns, &mut |request| match request {
-            Request::Wait(_) | Request::WaitUntil(_) => requests.keep_wait(request),
-            _ => requests.keep(request),
-        });
-        body
+    fn publish(&mut self, body: &mut B, finish_ns: u64) -> Option<WaitLimit> {
+        body.complete(finish_ns, &mut |request| self.requests.keep(request))
     }
 
     #[inline]
@@ -580,9 +579,10 @@ pub trait SubtaskBody {
     /// Reports whether a completion has effects besides the scheduler's.
     fn has_effects(&self) -> bool;
 
-    /// Publishes these effects, and passes on what the function asks of the run; of a turn that ends
-    /// in a wait that is [`Request::Wait`] alone. The time is that of the clock which functions read.
-    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request));
+    /// Publishes these effects, and passes on the requests of the function; or returns for how long
+    /// the instance waits, if its turn has ended in a wait. The time is that of the clock which
+    /// functions read.
+    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit>;
 
     /// Returns the alternate that takes over if a fault ends the function.
     fn alternate(&self) -> Option<Self::Alternate>;
@@ -619,8 +619,8 @@ impl<D: DerefMut<Target: SubtaskBody>> SubtaskBody for D {
     }
 
     #[inline]
-    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) {
-        (**self).complete(finish_ns, ask);
+    fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
+        (**self).complete(finish_ns, ask)
     }
 
     fn alternate(&self) -> Option<Self::Alternate> {

@@ -41,8 +41,6 @@ impl Scheduler {
             | Request::ShutDown
             | Request::Begin
             | Request::GoOn
-            | Request::Wait(_)
-            | Request::WaitUntil(_)
             | Request::Step => {}
         }
     }

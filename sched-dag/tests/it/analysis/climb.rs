@@ -8,7 +8,7 @@ use sched_dag::analysis::{AnalysisResult, AnalysisSettings};
 use sched_dag::engine::SubtaskBody;
 use sched_dag::journal::{Event, EventKind, EventSubject};
 use sched_dag::law::{JudgeOptions, dispatch_violations, violations};
-use sched_dag::lifecycle::{LifecyclePlan, ModeEntry, Request, WaitId};
+use sched_dag::lifecycle::{LifecyclePlan, ModeEntry, Request, WaitId, WaitLimit};
 use sched_dag::virtual_time::{VirtualTime, Workload};
 use sched_dag::{Dag, DagId, Instance, ModeId, SchedulerOptions, Subtask, SubtaskId, TaskSet};
 
@@ -428,14 +428,12 @@ impl SubtaskBody for Body<'_> {
         true
     }
 
-    fn complete(&mut self, _: u64, ask: &mut dyn FnMut(Request)) {
-        if (self.turn as usize) < self.model.waits().len() {
-            let (instance, number) = (self.instance, self.turn);
+    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
+        let (instance, number) = (self.instance, self.turn);
+        ((number as usize) < self.model.waits().len()).then(|| {
             self.turn += 1;
-            ask(Request::Wait(
-                self.drawn.limit_ns(WaitId { instance, number }),
-            ));
-        }
+            WaitLimit::For(self.drawn.limit_ns(WaitId { instance, number }))
+        })
     }
 
     fn alternate(&self) -> Option<()> {

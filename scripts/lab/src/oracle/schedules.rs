@@ -12,7 +12,7 @@ use std::fmt::Display;
 use sched_dag::engine::SubtaskBody;
 use sched_dag::journal::{Event, EventKind, EventSubject};
 use sched_dag::law::{InstanceRecord, JobRecord, RunRecord};
-use sched_dag::lifecycle::{Request, WaitId};
+use sched_dag::lifecycle::{Request, WaitId, WaitLimit};
 use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, SubtaskId, TaskSet};
 
@@ -136,10 +136,8 @@ impl SubtaskBody for CaseBody {
         !self.limits_ns.is_empty()
     }
 
-    fn complete(&mut self, _: u64, ask: &mut dyn FnMut(Request)) {
-        if let Some(&limit_ns) = self.limits_ns.get(self.turn) {
-            ask(Request::Wait(limit_ns));
-        }
+    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
+        self.limits_ns.get(self.turn).copied().map(WaitLimit::For)
     }
 
     fn alternate(&self) -> Option<()> {

@@ -7,6 +7,7 @@ mod cases;
 
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::time::Duration;
 
 use cases::{CASES, GRAPHS, PERIOD};
@@ -19,6 +20,7 @@ use sched_dag::{
     CommitOptions, DagFault, DagId, DagLabel, DagSpec, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
+use tool::system::workspace;
 
 fn not_launched() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new();
@@ -172,10 +174,15 @@ fn every_kind_of_fault_has_an_entry() {
     let documented: BTreeSet<String> = documented_faults().into_keys().collect();
     let tables = [sched_dag::DagFault::CODES, fass::commit::Fault::CODES];
     let mut codes: BTreeSet<String> = tables.concat().into_iter().map(String::from).collect();
-    // Others are named where they are found.
-    let others = sources(&["fass/src/draft/checks.rs"]);
-    let found = others.split("add(\"").skip(1);
-    codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
+    // Those of a DAG's parts are named where they are found, in the file of each part.
+    let parts = fs::read_dir(workspace().join("fass/src/api")).expect("a folder of sources");
+    for part in parts.map(|part| fs::read_to_string(part.expect("it is there").path())) {
+        for call in ["add(\"", "fault(\"", "refuse_waits(\"", "code: \""] {
+            let part = part.as_deref().expect("a source");
+            let found = part.split(call).skip(1);
+            codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
+        }
+    }
     assert_eq!(documented, codes);
 }
 
