@@ -47,6 +47,9 @@ const MESSAGE_BYTES: usize = 400;
 const PLACE_BYTES: usize = 200;
 const NAME_BYTES: usize = 60;
 
+/// The cause of a fault whose instance has exceeded its budget.
+const OVERRUN: &str = "budget overrun";
+
 /// How many notes can wait to be told.
 const PLACES: usize = 8;
 
@@ -140,8 +143,7 @@ pub fn end_at_fault(interrupted: &mut Interrupted) {
     if core.context().is_at_fault()
         && let Some(instance) = execution::running(core)
     {
-        let cost = end_interrupted(interrupted);
-        WAITING.lock_uninterrupted().settle(instance, cost);
+        end_interrupted(instance, interrupted);
     }
 }
 
@@ -162,7 +164,8 @@ pub fn end_faulty(exception: &CpuException<'_>, interrupted: &mut Interrupted) -
     };
     let (name, message) = (exception.name, Excerpt::of(exception));
     let note = FaultNote::new(instance, name, message, exception.address, location);
-    end_noted(note, interrupted);
+    keep(note);
+    end_interrupted(instance, interrupted);
     true
 }
 
@@ -178,32 +181,24 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         timer::set(Alarm::Budget, context.budget_end_ns());
         return;
     }
-    let budget = Duration::from_nanos(execution::budget_ns(instance));
-    let message = format_args!("executed for more than its budget of {budget:?}");
     let location = CodeLocation {
         instruction: Some(interrupted.instruction()),
         stack_pointer: interrupted.stack_pointer(),
     };
-    let message = Excerpt::of(message);
-    let note = FaultNote::new(instance, "budget overrun", message, None, location);
-    end_noted(note, interrupted);
+    let message = Excerpt::of("");
+    keep(FaultNote::new(instance, OVERRUN, message, None, location));
+    end_interrupted(instance, interrupted);
 }
 
-/// Keeps a note, and ends its instance. In this order, for the end may be that of the run, which
-/// awaits its notes.
-fn end_noted(note: FaultNote, interrupted: &mut Interrupted) {
-    let instance = note.instance;
-    keep(note);
-    let cost = end_interrupted(interrupted);
-    WAITING.lock_uninterrupted().settle(instance, cost);
-}
-
-/// Ends this core's instance, whose context a handler has interrupted.
-fn end_interrupted(interrupted: &mut Interrupted) -> FaultCost {
+/// Ends this core's instance, whose context a handler has interrupted. Its note is kept already, for
+/// this may be the end of the run, which awaits its notes; the rest of it is known now.
+fn end_interrupted(instance: Instance, interrupted: &mut Interrupted) {
     let abandoned = interrupted.abandon(contexts::new_worker());
-    let cost = execution::fail(&abandoned);
+    let (cost, budget_ns) = execution::fail(&abandoned).unwrap_or((FaultCost::Dag, u64::MAX));
     contexts::give_back(abandoned.recover());
-    cost.unwrap_or(FaultCost::Dag)
+    WAITING
+        .lock_uninterrupted()
+        .settle(instance, cost, budget_ns);
 }
 
 /// Returns where a panic was raised, as `file:line:column`.
@@ -271,13 +266,18 @@ impl NoteQueue {
         HAS_WAITING.store(false, Ordering::Relaxed);
     }
 
-    /// Adds what the latest fault of an instance has cost.
-    fn settle(&mut self, instance: Instance, cost: FaultCost) {
+    /// Adds the cost of the latest fault of an instance, and the budget that it has exceeded.
+    fn settle(&mut self, instance: Instance, cost: FaultCost, budget_ns: u64) {
         for place in &mut self.places {
             if let NotePlace::Full(note) = place
                 && (note.instance, note.cost) == (instance, None)
             {
                 note.cost = Some(cost);
+                if note.cause == OVERRUN {
+                    let budget = Duration::from_nanos(budget_ns);
+                    let says = format_args!("executed for more than its budget of {budget:?}");
+                    note.message = Excerpt::of(says);
+                }
             }
         }
     }

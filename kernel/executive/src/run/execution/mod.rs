@@ -36,11 +36,11 @@ use loans::RunnerTable;
 use port::{CoreRunner, SmpPort};
 pub use port::{arm_all, arm_next_event, keeps_time, since_epoch};
 pub use status::look_at_clearing;
-pub use status::{
-    budget_ns, has_bound, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
-    try_names, with_scheduler,
-};
 pub use status::{control, nominal_end_ns, task_set};
+pub use status::{
+    has_bound, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal, try_names,
+    with_scheduler,
+};
 use step::RequestQueue;
 pub use step::{answer, raise, raise_in_interrupt};
 pub use step::{complete, fail, find_work, interrupt};
@@ -67,8 +67,6 @@ struct ClusterRun {
     dispatch_due_ns: Option<u64>,
     /// How long a dispatch waits for further events of the same instant.
     coincidence_ns: u64,
-    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
-    budget_factor: u64,
     /// Whether a completion may be all of a step: no dispatch is owed, nor ever
     /// waits.
     may_hand_off: bool,
@@ -116,7 +114,6 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
             background: None,
             dispatch_due_ns: None,
             coincidence_ns,
-            budget_factor: terms.budget_factor,
             may_hand_off: coincidence_ns == 0,
             signals: RequestQueue::new(&plan, &letters),
             proven: ProvenBounds::default(),

@@ -84,16 +84,6 @@ pub(super) fn note_running(core: &Core, subject: Option<EventSubject>) {
     core.note_running([ids, job]);
 }
 
-/// Returns how long an instance that runs here may execute for, `u64::MAX` if there is no limit.
-pub fn budget_ns(instance: Instance) -> u64 {
-    let place = cluster::cluster_of(this_core::get()).execution.lock();
-    place.as_ref().map_or(u64::MAX, |execution| {
-        let dag = execution.task_set().dag(instance.dag);
-        let subtask = dag.subtask(instance.subtask);
-        subtask.most_execution_ns(execution.budget_factor)
-    })
-}
-
 /// Reports whether the commit has proven a bound of anything in this run.
 pub fn has_bound() -> bool {
     let place = cluster::nth(0).execution.lock();

@@ -296,9 +296,10 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     take_turns(core, work)
 }
 
-/// Ends this core's instance because of a fault, and with it its DAG or its job, and returns which.
-/// Its context was `left` here. Interrupts are disabled.
-pub fn fail(left: &AbandonedContext) -> Option<FaultCost> {
+/// Ends this core's instance because of a fault, and with it its DAG or its job. Returns which, and
+/// how many nanoseconds the instance might execute for. Its context was `left` here. Interrupts are
+/// disabled.
+pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     let core = this_core::get();
     let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
     let execution = place.as_mut()?;
@@ -313,11 +314,12 @@ pub fn fail(left: &AbandonedContext) -> Option<FaultCost> {
     fass::platform::at_edge::failed(lost.instance, clock_ns);
     let mut woken = CoreSet::default();
     let (engine, mut port) = execution.parts(&mut woken);
+    let budget_ns = lost.budget_ns;
     let cost = engine.tell_fault((ended_ns, here), lost.vertex, Some(lost), &mut port);
     execution.end_step(clock_ns, &mut woken);
     drop(place);
     woken.wake();
-    Some(cost)
+    Some((cost, budget_ns))
 }
 
 /// Makes a step of the scheduler if `is_event`, and follows its decisions on this
