@@ -36,7 +36,7 @@ pub fn hands_over_a_file(loader: Loader) {
     let mut content = vec![b'z'; 100_001];
     content[..2].copy_from_slice(b"xy");
     fs::write(&file, content).expect("a file in it");
-    let guest = Guest::new("replay").from_stick(loader).module(&file);
+    let guest = Guest::new("dag-file").from_stick(loader).module(&file);
     let reason = guest.refusal();
     assert!(reason.contains("found `xyz"), "{reason}");
     fs::remove_file(&file).expect("it is ours");

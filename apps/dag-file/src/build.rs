@@ -24,6 +24,21 @@ pub struct Settings {
     pub occupation: Occupation,
     /// How many jobs there are.
     pub length: Length,
+    /// Not 0: a segment's execution counts from the latest multiple of this time on the clock, so
+    /// what the kernel takes before the segment is a part of it, as in a model without overheads.
+    pub grid_ns: u64,
+}
+
+impl Settings {
+    fn execute(&self, ns: u64) {
+        let early_ns = self.grid_ns / 4;
+        let late_ns = match self.grid_ns {
+            0 => 0,
+            grid_ns => (fass::now_ns() + early_ns) % grid_ns,
+        };
+        let ns = ns.saturating_add(early_ns).saturating_sub(late_ns);
+        fass::execute_for(Duration::from_nanos(ns), self.occupation);
+    }
 }
 
 /// Builds the DAGs of a set, to be committed with any shape of graph allowed.
@@ -62,17 +77,19 @@ fn build_dag(
     if let Some(cluster) = spec.cluster {
         dag.cluster(cluster.0);
     }
-    let subtasks = spec.subtasks.iter().zip(&described.subtasks).zip(seeds);
+    let subtasks = spec.subtasks.iter().enumerate().zip(seeds);
     let subtasks: Vec<UntypedSubtask> = subtasks
-        .map(|((subtask, more), seed)| {
+        .map(|((number, subtask), seed)| {
             let later_ns: u64 = subtask.waits.iter().filter_map(|of| of.segment_ns).sum();
-            let first_ns = subtask
-                .wcet_ns
-                .map(|wcet_ns| wcet_ns.saturating_sub(later_ns));
-            let mut attributes = SubtaskAttributes::named(&subtask.name).wcet(time(first_ns));
+            let mut attributes = SubtaskAttributes::named(&subtask.name);
+            if let Some(wcet_ns) = subtask.wcet_ns {
+                attributes = attributes.wcet(time(Some(wcet_ns.saturating_sub(later_ns))));
+            }
             for wait in &subtask.waits {
-                let limit = time(Some(wait.limit_ns));
-                attributes = attributes.wait(limit).wcet(time(wait.segment_ns));
+                attributes = attributes.wait(time(Some(wait.limit_ns)));
+                if wait.segment_ns.is_some() {
+                    attributes = attributes.wcet(time(wait.segment_ns));
+                }
             }
             if let Some(priority) = subtask.priority {
                 attributes = attributes.priority(priority.0);
@@ -85,12 +102,12 @@ fn build_dag(
             }
             let times = Times {
                 execution: settings.execution,
-                wcet_ns: subtask.wcet_ns.unwrap_or(0),
-                samples_ns: more.samples_ns.clone(),
+                wcet_ns: described.most_ns(number),
+                samples_ns: described.subtasks[number].samples_ns.clone(),
                 seed,
                 waits: subtask.waits.to_vec(),
             };
-            register(&dag, times, settings.occupation, attributes)
+            register(&dag, times, *settings, attributes)
         })
         .collect();
     for &(earlier, later) in &spec.edges {
@@ -107,13 +124,11 @@ fn build_dag(
 fn register(
     dag: &Dag,
     times: Times,
-    occupation: Occupation,
+    settings: Settings,
     attributes: SubtaskAttributes,
 ) -> UntypedSubtask {
     if times.waits.is_empty() {
-        let execute = move |job| {
-            fass::execute_for(Duration::from_nanos(times.of_job(job)), occupation);
-        };
+        let execute = move |job| settings.execute(times.of_job(job));
         return dag.register_untyped_subtask(execute, attributes);
     }
     let times = Arc::new(times);
@@ -121,8 +136,7 @@ fn register(
         let times = Arc::clone(&times);
         async move {
             for number in 0.. {
-                let segment = Duration::from_nanos(times.of_segment(job, number));
-                fass::execute_for(segment, occupation);
+                settings.execute(times.of_segment(job, number));
                 match times.of_wait(job, number) {
                     Some(ns) => fass::sleep(Duration::from_nanos(ns)).await,
                     None => break,
@@ -163,6 +177,7 @@ mod tests {
             seed: 1,
             occupation: Occupation::Hold,
             length: Length::Jobs(3),
+            grid_ns: 0,
         };
         let machine = VirtualTime::new().cores(2);
         let dags = build(&parse(TEXT).unwrap().sets[0], &settings);
@@ -186,6 +201,7 @@ mod tests {
                 seed: 1,
                 occupation: Occupation::Hold,
                 length: Length::Jobs(50),
+                grid_ns: 0,
             };
             let machine = VirtualTime::new().cores(1);
             let dags = build(&file.sets[0], &settings);

@@ -10,6 +10,7 @@ mod report;
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use dag_file::{Settings, build};
 use fass::Occupation;
@@ -24,7 +25,7 @@ use report::Report;
 kernel::entry!(main);
 
 /// The app's words of the command line.
-const WORDS: [&str; 9] = [
+const WORDS: [&str; 11] = [
     "overheads",
     "overheads_margin",
     "clusters",
@@ -34,6 +35,8 @@ const WORDS: [&str; 9] = [
     "seconds",
     "occupy",
     "deadlines",
+    "grid_us",
+    "window_us",
 ];
 
 /// Options of the command line besides how a set is run.
@@ -61,7 +64,10 @@ fn main(machine: &Machine) -> Result<(), AppError> {
         for answer in (commit.answers().iter()).filter(|answer| is_placed(answer).is_some()) {
             println!("{answer}");
         }
-        let run = machine.run()?;
+        let run = match wishes.settings.grid_ns {
+            0 => machine.run()?,
+            grid_ns => machine.run_from((fass::now_ns() / grid_ns + 2) * grid_ns)?,
+        };
         let report = Report::new(set, commit.answers(), &run);
         report.emit();
         reports.push(report);
@@ -128,9 +134,13 @@ fn wishes(machine: &Machine) -> Result<Wishes, AppError> {
             seed: options.number("seed", 0..=u64::MAX, 1)?,
             occupation: options.choice("occupy", &occupations)?,
             length,
+            grid_ns: options.number("grid_us", 0..=10_000_000, 0)? * 1000,
         },
         is_strict: options.choice("deadlines", &[("count", false), ("strict", true)])?,
     };
+    // Schedules are compared with those of a model with these two: see `Machine::set_coincidence`.
+    let window_us = options.number("window_us", 0..=10_000_000, 0)?;
+    machine.set_coincidence(Duration::from_micros(window_us));
     options.finish(&WORDS)?;
     Ok(wishes)
 }

@@ -2,17 +2,17 @@
 //!
 //! The time that an instance draws follows from the seed, its set's position of the
 //! subtask and its job alone. So two policies, or two numbers of cores, get the
-//! same load. Where a subtask waits, its segments divide the instance's time as they
-//! divide its WCET.
+//! same load. A sample has the times of all segments and waits. Without one, the segments of a
+//! subtask divide the instance's time as they divide its WCET.
 //!
 //! A wait lasts until a simulated device answers, or to its limit. Where each instance
-//! takes its WCET, no device answers, which is the worst case of waits. Else the time of an
-//! answer is drawn, too: one of five comes beyond the limit.
+//! takes its WCET, no device answers, which is the worst case of waits. Where there is no sample,
+//! the time of an answer is drawn, too: one of five comes beyond the limit.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use fass_dag_file::{Execution, WHOLE};
+use fass_dag_file::{Execution, WHOLE, executed_ns};
 use random::{nth, scale};
 use sched_dag::Wait;
 
@@ -29,6 +29,9 @@ pub(crate) struct Times {
 impl Times {
     /// Returns how long a segment of a job's instance executes, in nanoseconds.
     pub(crate) fn of_segment(&self, job: u64, number: usize) -> u64 {
+        if let Some(sample) = self.sample(job) {
+            return sample[2 * number];
+        }
         let (of_job, whole) = (
             u128::from(self.of_job(job)),
             u128::from(self.wcet_ns.max(1)),
@@ -52,6 +55,9 @@ impl Times {
         if self.execution == Execution::Wcet {
             return Some(limit_ns);
         }
+        if let Some(sample) = self.sample(job) {
+            return Some(sample[2 * number + 1].min(limit_ns));
+        }
         let drawn = nth(!self.seed, job.wrapping_mul(256) + number as u64);
         let latest_ns = limit_ns.saturating_add(limit_ns / 4);
         Some(scale(drawn, 0..=latest_ns).min(limit_ns))
@@ -59,22 +65,32 @@ impl Times {
 
     /// Returns how long a job's instance executes, in nanoseconds.
     pub(crate) fn of_job(&self, job: u64) -> u64 {
-        let drawn = nth(self.seed, job);
+        if let Some(sample) = self.sample(job) {
+            return executed_ns(sample);
+        }
         match self.execution {
-            Execution::Wcet => self.wcet_ns,
             Execution::Uniform { least, most } => {
                 let part = |of: u64| {
                     let ns = u128::from(self.wcet_ns) * u128::from(of) / u128::from(WHOLE);
                     u64::try_from(ns).unwrap_or(self.wcet_ns)
                 };
-                scale(drawn, part(least)..=part(most))
+                scale(nth(self.seed, job), part(least)..=part(most))
             }
-            Execution::Samples => {
-                let last = self.samples_ns.len().saturating_sub(1);
-                let sample = self.samples_ns.get(scale(drawn, 0..=last));
-                sample.copied().unwrap_or(self.wcet_ns)
-            }
+            _ => self.wcet_ns,
         }
+    }
+
+    /// Returns the sample that a job's instance takes.
+    fn sample(&self, job: u64) -> Option<&[u64]> {
+        let len = 2 * self.waits.len() + 1;
+        let count = self.samples_ns.len() / len;
+        let last = count.checked_sub(1)?;
+        let place = match self.execution {
+            Execution::Samples => scale(nth(self.seed, job), 0..=last),
+            Execution::Sequence => usize::try_from(job % count as u64).ok()?,
+            Execution::Wcet | Execution::Uniform { .. } => return None,
+        };
+        self.samples_ns.chunks(len).nth(place)
     }
 }
 
@@ -111,6 +127,11 @@ mod tests {
         };
         assert_eq!(none.of_job(3), 1_000_000);
         assert_eq!(times(Execution::Wcet, 9).of_job(5), 1_000_000);
+        let sequence = times(Execution::Sequence, 1);
+        assert_eq!(
+            [0, 1, 2, 3].map(|job| sequence.of_job(job)),
+            [10, 20, 30, 10]
+        );
     }
 
     #[test]
@@ -122,7 +143,7 @@ mod tests {
         let times = |execution| Times {
             execution: Execution::parse(execution).unwrap(),
             wcet_ns: 1_000,
-            samples_ns: [501, 7].into(),
+            samples_ns: [10, 300, 20, 0, 30, 600, 401, 301, 9, 99].into(),
             seed: 3,
             waits: [wait(400, 301), wait(0, 99)].into(),
         };
@@ -133,20 +154,30 @@ mod tests {
             [0, 1, 2].map(|at| wcet.of_wait(5, at)),
             [Some(400), Some(0), None]
         );
-        for drawn in [times("uniform:0.2..1"), times("samples")] {
-            for job in 0..100 {
-                let segments = of(&drawn, job);
-                assert_eq!(segments.iter().sum::<u64>(), drawn.of_job(job));
-                let most = [600, 301, 99];
-                assert!(
-                    segments.iter().zip(most).all(|(ns, most)| *ns <= most),
-                    "{segments:?}"
-                );
-            }
-            let waits: Vec<_> = (0..1_000).filter_map(|job| drawn.of_wait(job, 0)).collect();
-            let late = waits.iter().filter(|ns| **ns == 400).count();
-            assert!((150..250).contains(&late), "{late}");
-            assert!(waits.iter().any(|ns| *ns < 40) && waits.iter().all(|ns| *ns <= 400));
+        let drawn = times("uniform:0.2..1");
+        for job in 0..100 {
+            let segments = of(&drawn, job);
+            assert_eq!(segments.iter().sum::<u64>(), drawn.of_job(job));
+            let most = [600, 301, 99];
+            assert!(
+                segments.iter().zip(most).all(|(ns, most)| *ns <= most),
+                "{segments:?}"
+            );
         }
+        let waits: Vec<_> = (0..1_000).filter_map(|job| drawn.of_wait(job, 0)).collect();
+        let late = waits.iter().filter(|ns| **ns == 400).count();
+        assert!((150..250).contains(&late), "{late}");
+        assert!(waits.iter().any(|ns| *ns < 40) && waits.iter().all(|ns| *ns <= 400));
+        // A sample has all times; a wait that lasted beyond the limit lasts to the limit.
+        let sequence = times("sequence");
+        assert_eq!(
+            [0, 1].map(|job| of(&sequence, job)),
+            [[10, 20, 30], [600, 301, 99]]
+        );
+        assert_eq!(
+            [0, 1].map(|job| sequence.of_wait(job, 0)),
+            [Some(300), Some(400)]
+        );
+        assert_eq!(sequence.of_job(3), 1_000);
     }
 }

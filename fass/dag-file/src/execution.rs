@@ -23,13 +23,17 @@ pub enum Execution {
     /// One of the subtask's samples, each with the same probability; the WCET
     /// where a subtask has none.
     Samples,
+    /// The samples in their order, job by job, and again from the first one; the WCET where a
+    /// subtask has none.
+    Sequence,
 }
 
 impl Execution {
     /// The forms that [`parse`](Self::parse) reads, for messages.
-    pub const FORMS: &'static str = "wcet, uniform:0.2..1 (fractions of the WCET) or samples";
+    pub const FORMS: &'static str =
+        "wcet, uniform:0.2..1 (fractions of the WCET), samples or sequence";
 
-    /// Reads `wcet`, `uniform:LO..HI` with fractions of the WCET, or `samples`.
+    /// Reads `wcet`, `uniform:LO..HI` with fractions of the WCET, `samples` or `sequence`.
     ///
     /// # Errors
     ///
@@ -38,6 +42,7 @@ impl Execution {
         match text {
             "wcet" => return Ok(Self::Wcet),
             "samples" => return Ok(Self::Samples),
+            "sequence" => return Ok(Self::Sequence),
             _ => {}
         }
         let range = text.strip_prefix("uniform:").and_then(|range| {
@@ -80,6 +85,7 @@ mod tests {
     fn models_are_read() {
         assert_eq!(Execution::parse("wcet"), Ok(Execution::Wcet));
         assert_eq!(Execution::parse("samples"), Ok(Execution::Samples));
+        assert_eq!(Execution::parse("sequence"), Ok(Execution::Sequence));
         let (least, most) = (250_000, WHOLE);
         let uniform = Ok(Execution::Uniform { least, most });
         assert_eq!(Execution::parse("uniform:0.25..1"), uniform);

@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::DagSpec;
+use sched_dag::{DagSpec, SubtaskSpec};
 
 /// A whole file.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +28,7 @@ pub struct Set {
 /// One DAG.
 #[derive(Clone, Debug, Default)]
 pub struct FileDag {
-    /// The DAG. It has no number of jobs; a [`Length`](crate::Length) decides that.
+    /// The DAG. If it states no number of jobs, a [`Length`](crate::Length) decides that.
     pub spec: DagSpec,
     /// The line that begins it, counted from 1.
     pub line: usize,
@@ -46,8 +46,36 @@ pub struct FileDag {
 pub struct FileSubtask {
     /// The line that states it, counted from 1.
     pub line: usize,
-    /// Execution times that were measured, in nanoseconds; mostly none.
+    /// Samples that were measured, one after the other, in nanoseconds; mostly none. Each has the
+    /// execution time of every segment in turn, and between them how long the waits lasted.
     pub samples_ns: Arc<[u64]>,
+}
+
+impl FileDag {
+    /// Returns the longest time that an instance of a subtask may execute: its WCET, or that of its
+    /// samples.
+    #[must_use]
+    pub fn most_ns(&self, subtask: usize) -> u64 {
+        let spec = &self.spec.subtasks[subtask];
+        let samples = self.subtasks[subtask].samples_ns.chunks(sample_len(spec));
+        let longest_ns = || samples.map(executed_ns).max().unwrap_or(0);
+        spec.wcet_ns.unwrap_or_else(longest_ns)
+    }
+}
+
+/// Returns how many times a sample of a subtask has: those of its segments and waits.
+#[must_use]
+pub const fn sample_len(spec: &SubtaskSpec) -> usize {
+    2 * spec.waits.len() + 1
+}
+
+/// Returns how long an instance executes whose times are those of a sample.
+#[must_use]
+pub fn executed_ns(sample: &[u64]) -> u64 {
+    sample
+        .iter()
+        .step_by(2)
+        .fold(0, |sum, &ns| sum.saturating_add(ns))
 }
 
 impl DagFile {

@@ -26,12 +26,12 @@ impl Length {
         Self::Span(periods.max().unwrap_or(0).saturating_mul(count))
     }
 
-    /// Returns the number of jobs of a DAG.
+    /// Returns the number of jobs of a DAG: its own, if it states one.
     #[must_use]
     pub fn jobs(self, spec: &DagSpec) -> u64 {
-        match self {
-            Self::Jobs(jobs) | Self::Periods(jobs) => jobs,
-            Self::Span(span_ns) => {
+        match (spec.jobs, self) {
+            (Some(jobs), _) | (None, Self::Jobs(jobs) | Self::Periods(jobs)) => jobs,
+            (None, Self::Span(span_ns)) => {
                 let period_ns = spec.period_ns.unwrap_or(0).max(1);
                 let after_offset_ns = span_ns.saturating_sub(spec.offset_ns);
                 after_offset_ns.div_ceil(period_ns).max(1)

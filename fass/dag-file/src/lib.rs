@@ -27,6 +27,6 @@ mod write;
 
 pub use check::check;
 pub use execution::{Execution, WHOLE};
-pub use file::{DagFile, FileDag, FileSubtask, Set};
+pub use file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 pub use length::Length;
 pub use parse::{is_name, no_name, parse, refuse_repeated_edge};

@@ -7,7 +7,7 @@ use core::fmt::{Display, Formatter, Result};
 
 use sched_dag::{OverrunPolicy, SubtaskOrder, SubtaskSpec};
 
-use crate::file::{DagFile, FileDag, FileSubtask};
+use crate::file::{DagFile, FileDag, FileSubtask, sample_len};
 use crate::time::Time;
 
 impl Display for DagFile {
@@ -55,6 +55,9 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
     if let Some(jobs) = spec.in_flight {
         write!(out, " in-flight {jobs}")?;
     }
+    if let Some(jobs) = spec.jobs {
+        write!(out, " jobs {jobs}")?;
+    }
     writeln!(out)?;
     for (subtask, more) in spec.subtasks.iter().zip(&dag.subtasks) {
         write_subtask(subtask, more, out)?;
@@ -69,11 +72,15 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
 fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>) -> Result {
     // Each part is written as the reader takes it: the rest of the WCET is the first segment's.
     let later_ns: u64 = spec.waits.iter().filter_map(|wait| wait.segment_ns).sum();
-    let first = Time(spec.wcet_ns.unwrap_or(0).saturating_sub(later_ns));
-    write!(out, "subtask {} wcet {first}", spec.name)?;
+    write!(out, "subtask {}", spec.name)?;
+    if let Some(wcet_ns) = spec.wcet_ns {
+        write!(out, " wcet {}", Time(wcet_ns.saturating_sub(later_ns)))?;
+    }
     for wait in &spec.waits {
-        let segment = Time(wait.segment_ns.unwrap_or(0));
-        write!(out, " wait {} wcet {segment}", Time(wait.limit_ns))?;
+        write!(out, " wait {}", Time(wait.limit_ns))?;
+        if let Some(segment_ns) = wait.segment_ns {
+            write!(out, " wcet {}", Time(segment_ns))?;
+        }
     }
     if let Some(priority) = spec.priority {
         write!(out, " priority {}", priority.0)?;
@@ -88,7 +95,11 @@ fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>
         write!(out, " deadline {}", Time(deadline_ns))?;
     }
     for (number, sample_ns) in more.samples_ns.iter().enumerate() {
-        let separator = if number == 0 { " samples " } else { "," };
+        let separator = match (number, number % sample_len(spec)) {
+            (0, _) => " samples ",
+            (_, 0) => ",",
+            _ => "+",
+        };
         write!(out, "{separator}{}", Time(*sample_ns))?;
     }
     writeln!(out)

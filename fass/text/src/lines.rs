@@ -101,12 +101,6 @@ impl<'a> Lines<'a> {
         Ok(edges)
     }
 
-    /// Returns the number of the last line that was read.
-    #[must_use]
-    pub const fn last(&self) -> usize {
-        self.last
-    }
-
     /// Returns the next record, which must be of this kind.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use tool::{Machine, Outcome, system};
 
 const MIB: usize = 1 << 20;
 
-/// Boots the app `replay` with a file of so many bytes, which it refuses by quoting
+/// Boots the app `dag-file` with a file of so many bytes, which it refuses by quoting
 /// how it begins.
 fn refused(guest: Guest, bytes: usize) -> Outcome {
     let mut content = vec![b'z'; bytes];
@@ -26,7 +26,7 @@ fn refused(guest: Guest, bytes: usize) -> Outcome {
 #[test]
 fn the_boot_takes_no_longer_with_a_large_file() {
     let [small, large] = [3, 20 * MIB + 1].map(|bytes| {
-        let outcome = refused(Guest::new("replay"), bytes);
+        let outcome = refused(Guest::new("dag-file"), bytes);
         outcome.line("boot").number("ready_ns")
     });
     let difference = small.abs_diff(large);
@@ -41,7 +41,7 @@ fn a_file_reaches_the_app_on_both_boards() {
         (Machine::Microvm, 4097),
         (Machine::Q35, 3 * MIB + 5),
     ] {
-        refused(Guest::new("replay").machine(machine), bytes);
+        refused(Guest::new("dag-file").machine(machine), bytes);
     }
 }
 

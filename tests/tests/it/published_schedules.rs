@@ -26,6 +26,7 @@ fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
         seed: 1,
         occupation: Occupation::Hold,
         length: Length::Jobs(1),
+        grid_ns: 0,
     };
     let dags = build(graph, &settings);
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("it is a DAG");

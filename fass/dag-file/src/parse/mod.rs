@@ -20,7 +20,7 @@ use text::{Line, Lines, Malformed, quoted};
 
 use keys::Keys;
 
-use crate::file::{DagFile, FileDag, FileSubtask, Set};
+use crate::file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 use crate::time::{Time, parse_ns};
 
 /// The words that may stand where a record begins.
@@ -291,6 +291,7 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
             "cluster" => spec.cluster = Some(ClusterId(keys.number(key)?)),
             "affinity" => spec.affinity = keys.numbers(key)?,
             "in-flight" => spec.in_flight = Some(keys.number(key)?),
+            "jobs" => spec.jobs = Some(keys.number(key)?.into()),
             "overrun" => {
                 spec.overrun = match keys.value(key)? {
                     "queue" => OverrunPolicy::Queue,
@@ -309,10 +310,8 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
                     "free" => SubtaskOrder::Free,
                     "fixed" => SubtaskOrder::Fixed,
                     other => {
-                        let other = quoted(other);
-                        return Err(
-                            line.malformed(format!("order: {other} is neither free nor fixed"))
-                        );
+                        let why = format!("order: {} is neither free nor fixed", quoted(other));
+                        return Err(line.malformed(why));
                     }
                 }
             }
@@ -320,7 +319,7 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
                 return Err(keys.unknown(
                     other,
                     "`period`, `deadline`, `offset`, `cluster`, `affinity`, `overrun`, `order`, \
-                     `in-flight`",
+                     `in-flight`, `jobs`",
                 ));
             }
         }
@@ -346,11 +345,12 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
         name,
         ..SubtaskSpec::default()
     };
-    let mut samples_ns: Arc<[u64]> = Arc::default();
+    let mut samples = None;
     while let Some(key) = keys.next_key()? {
         match key {
-            "wcet" => read_segments(&mut keys, &mut spec)?,
-            "wait" => {
+            "wcet" if spec.waits.is_empty() => read_segments(&mut keys, &mut spec)?,
+            "wait" if spec.wcet_ns.is_none() => read_waits(&mut keys, &mut spec)?,
+            "wcet" | "wait" => {
                 let message = "`wait` stands between two segments, as in `wcet 1ms wait 3ms wcet \
                                1ms`; move it";
                 return Err(line.malformed(message));
@@ -359,13 +359,7 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
             "core" => spec.core = Some(keys.number(key)?),
             "non-preemptive" => spec.non_preemptive = true,
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
-            "samples" => {
-                let words = keys.value(key)?.split(',');
-                let times = words.map(|word| {
-                    parse_ns(word).map_err(|message| line.malformed(format!("samples: {message}")))
-                });
-                samples_ns = times.collect::<Result<Vec<_>, _>>()?.into();
-            }
+            "samples" => samples = Some(keys.value(key)?),
             other => {
                 return Err(keys.unknown(
                     other,
@@ -375,22 +369,67 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
             }
         }
     }
-    let Some(wcet_ns) = spec.wcet_ns else {
-        let message = format!("subtask {} has no wcet; add `wcet 3ms`", quoted(&spec.name));
-        return Err(line.malformed(message));
-    };
-    if let Some(sample) = samples_ns.iter().find(|&&sample_ns| sample_ns > wcet_ns) {
-        return Err(line.malformed(format!(
-            "the sample {} is longer than the wcet {}; raise the wcet, or drop the sample",
-            Time(*sample),
-            Time(wcet_ns)
-        )));
-    }
-    let subtask = FileSubtask {
+    let mut subtask = FileSubtask {
         line: line.number,
-        samples_ns,
+        ..FileSubtask::default()
     };
+    match samples {
+        Some(samples) => subtask.samples_ns = read_samples(line, samples, &spec)?,
+        None if spec.wcet_ns.is_none() => {
+            let message = format!("subtask {} has no wcet; add `wcet 3ms`", quoted(&spec.name));
+            return Err(line.malformed(message));
+        }
+        None => {}
+    }
     Ok((spec, subtask))
+}
+
+/// Reads samples: with commas between them, and `+` between the times of each one.
+fn read_samples(
+    line: &Line<'_>,
+    samples: &str,
+    spec: &SubtaskSpec,
+) -> Result<Arc<[u64]>, Malformed> {
+    let mut samples_ns = Vec::new();
+    for sample in samples.split(',') {
+        let first = samples_ns.len();
+        for time in sample.split('+') {
+            let time_ns = parse_ns(time);
+            samples_ns.push(time_ns.map_err(|why| line.malformed(format!("samples: {why}")))?);
+        }
+        let (of_sample, wanted) = (&samples_ns[first..], sample_len(spec));
+        if of_sample.len() != wanted {
+            return Err(line.malformed(format!(
+                "the sample {} is not of {wanted} times; give one for each segment, and for each \
+                 wait between, as in 1ms+3ms+1ms",
+                quoted(sample)
+            )));
+        }
+        if let Some(wcet_ns) = spec
+            .wcet_ns
+            .filter(|wcet_ns| executed_ns(of_sample) > *wcet_ns)
+        {
+            return Err(line.malformed(format!(
+                "the sample {} is longer than the wcet {}; raise the wcet, or drop the sample",
+                quoted(sample),
+                Time(wcet_ns)
+            )));
+        }
+    }
+    Ok(samples_ns.into())
+}
+
+/// Reads the limits of waits between segments without WCETs.
+fn read_waits(keys: &mut Keys<'_, '_>, spec: &mut SubtaskSpec) -> Result<(), Malformed> {
+    loop {
+        spec.waits.push(Wait {
+            limit_ns: keys.time_ns("wait")?,
+            segment_ns: None,
+        });
+        if !keys.next_if("wait") {
+            return Ok(());
+        }
+    }
 }
 
 /// Reads the WCET, or those of the first segment and, behind a limit each, of further ones.

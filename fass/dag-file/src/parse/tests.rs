@@ -9,7 +9,7 @@ fn refusal(text: &str) -> String {
 const GOOD: &str = "\
 # Two sets.
 set first
-dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4 # all keys
+dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4 jobs 7 # all keys
 subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms
 subtask show wcet 500us priority 6 deadline 30ms
 edge grab -> show
@@ -17,6 +17,7 @@ edge grab -> show
 set second
 dag alone period 1s
 subtask only wcet 1ns wait 0ns wcet 2ms wait 3ms wcet 1us priority 1 # two waits
+subtask rest wait 2ms wait 1ms priority 2 samples 1ms+2ms+3ms+0ns+1ms,5us+6us+7us+8us+9us
 end
 ";
 
@@ -31,7 +32,10 @@ fn a_file_is_read_and_written_back() {
     );
     assert_eq!(&*camera.subtasks[0].samples_ns, [1_000_000, 2_000_000]);
     assert_eq!(camera.spec.relative_deadline_ns, Some(100_000_000));
-    assert_eq!(camera.spec.in_flight, Some(4));
+    assert_eq!(
+        (camera.spec.in_flight, camera.spec.jobs),
+        (Some(4), Some(7))
+    );
     assert_eq!(camera.spec.affinity, [2, 0]);
     let show = &camera.spec.subtasks[1];
     assert_eq!(show.relative_deadline_ns, Some(30_000_000));
@@ -44,12 +48,19 @@ fn a_file_is_read_and_written_back() {
     assert_eq!(waits, [(0, Some(2_000_000)), (3_000_000, Some(1_000))]);
     // The WCET is that of all segments.
     assert_eq!(alone.spec.subtasks[0].wcet_ns, Some(2_001_001));
+    // Without a WCET the longest sample counts.
+    assert_eq!(
+        (alone.spec.subtasks[1].wcet_ns, alone.most_ns(1)),
+        (None, 5_000_000)
+    );
 
     let written = file.to_string();
     assert_eq!(parse(&written).unwrap().to_string(), written);
-    let kept = "dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4\n\
+    let kept = "dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4 jobs 7\n\
                 subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms\n";
     assert!(written.contains(kept), "{written}");
+    let rest = "subtask rest wait 2ms wait 1ms priority 2 samples 1ms+2ms+3ms+0ns+1ms,5us+6us+7us+8us+9us\n";
+    assert!(written.contains(rest), "{written}");
     let waits = "subtask only wcet 1ns wait 0ns wcet 2ms wait 3ms wcet 1us priority 1\n";
     assert!(written.contains(waits), "{written}");
 }
@@ -82,7 +93,9 @@ dag x period 1ms in-flight 4294967296 => in-flight: `4294967296` is no whole num
 \nsubtask a wcet 1ms => line 2: `subtask` stands before any `dag`; begin with
 {dag}subtask a => line 2: subtask `a` has no wcet; add `wcet 3ms`
 {dag}subtask a wcet 1ms nice 3 => line 2: unknown key `nice`; a subtask has `wcet`,
-{dag}subtask a wcet 1ms samples 1us,2ms => line 2: the sample 2ms is longer than the wcet 1ms
+{dag}subtask a wcet 1ms samples 1us,2ms => line 2: the sample `2ms` is longer than the wcet 1ms
+{dag}subtask a wcet 1ms wait 1ms wcet 1ms samples 1ms => line 2: the sample `1ms` is not of 3 times
+{dag}subtask a wait 1ms => line 2: subtask `a` has no wcet
 {dag}subtask a wcet 0ns => line 2: wcet: it is 0, and
 {dag}subtask a wcet 1ms wait 3ms => line 2: no segment follows `wait 3ms`; add one, as in `wait 3ms wcet 1ms`
 {dag}subtask a wcet 1ms wait 3ms priority 1 wcet 1ms => line 2: no segment follows `wait 3ms`

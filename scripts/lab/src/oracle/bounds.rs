@@ -180,23 +180,10 @@ fn parse_waits(lines: &mut Lines<'_>, task: Task) -> Result<Task, Malformed> {
     let mut waits: Vec<SubtaskWaits> = unsuspended.collect();
     let mut last = None;
     while let Some(line) = lines.next_if("wait") {
-        let [subtask, count, times @ ..] = &line.words[..] else {
-            return Err(line.malformed("expected `wait V n C_0 W_1 C_1 ..`"));
-        };
-        let subtask = line.index("subtask", subtask, waits.len())?;
-        let count = line.at_least_one(count)?;
-        if times.len() as u64 != 2 * u64::from(count) + 1 {
-            let reason = format!(
-                "{count} waits take twice as many times and one, found {}",
-                times.len()
-            );
-            return Err(line.malformed(reason));
-        }
+        let (subtask, count, times) = parse_wait(&line, waits.len())?;
         if waits[subtask].count > 0 {
             return Err(line.malformed(format!("the waits of subtask {subtask} stand here twice")));
         }
-        let times = times.iter().map(|time| line.number(time));
-        let times = times.collect::<Result<Vec<u64>, Malformed>>()?;
         let sum = |first| {
             times
                 .iter()
@@ -221,6 +208,27 @@ fn parse_waits(lines: &mut Lines<'_>, task: Task) -> Result<Task, Malformed> {
         None => Ok(task),
         Some(line) => (task.with_waits(waits)).map_err(|error| line.malformed(error.to_string())),
     }
+}
+
+/// Reads the waits of one of so many subtasks: which, how many, and segments and limits in turn.
+pub(super) fn parse_wait(
+    line: &Line<'_>,
+    subtasks: usize,
+) -> Result<(usize, u32, Vec<u64>), Malformed> {
+    let [subtask, count, times @ ..] = &line.words[..] else {
+        return Err(line.malformed("expected `wait V n C_0 W_1 C_1 ..`"));
+    };
+    let subtask = line.index("subtask", subtask, subtasks)?;
+    let count = line.at_least_one(count)?;
+    if times.len() as u64 != 2 * u64::from(count) + 1 {
+        let reason = format!(
+            "{count} waits take twice as many times and one, found {}",
+            times.len()
+        );
+        return Err(line.malformed(reason));
+    }
+    let times = times.iter().map(|time| line.number(time));
+    Ok((subtask, count, times.collect::<Result<_, _>>()?))
 }
 
 /// Reads the quantities of these names, in any order, of a DAG or set of `size` parts.

@@ -1,17 +1,18 @@
 //! Reference schedules on the bare machine: the kernel against the oracle.
 //!
-//! The app `replay` runs the cases, all with the same number of cores in one boot; their traces are
-//! compared here. For every instance start and finish must be near the reference, the number of
-//! preemptions equal; for every job the release and the miss must be equal, the finish near. *Near*
-//! is within a tolerance, a fraction of a unit below a half, so the order of events a unit apart in
-//! the reference is compared, too.
+//! Cases become sets of a DAG file, whose samples are their execution times; those for the same
+//! machine run in one boot of the app `dag-file`, and their traces are compared here. For every
+//! instance start and finish must be near the reference, the number of preemptions equal; for every
+//! job the release and the miss must be equal, the finish near. *Near* is within a tolerance, a
+//! fraction of a unit below a half, so the order of events a unit apart in the reference is
+//! compared, too.
 //!
 //! The differences between the model and a machine, and the measures against them:
 //!
 //! - *The kernel takes time*, microseconds for every decision and switch, more
 //!   with more cores. That shifts starts, and is most of the tolerance. So that
 //!   it does not add up along chains of instances, execution times include it: a
-//!   unit of execution lasts up to the end of a unit of time (`replay::Scale`).
+//!   segment counts from the latest unit of time on (the app's word `grid_us`).
 //! - *Simultaneous events* of the model come one after the other on a machine, in an arbitrary
 //!   order. A decision between two of them is right by the rules but not the reference's: it would
 //!   start an instance that the model does not, and without preemption that one keeps its core. The
@@ -21,9 +22,6 @@
 //!   simultaneous events pass that way too.
 //! - *Completions come before releases* of the same instant, and a finish at the
 //!   deadline is no miss: execution ends a *guard* before the unit of time does.
-//! - *Functions may compute* at the beginning of each unit of execution, and only then hold their
-//!   cores (`replay::Computing`). Where cores take turns, all of them are done after half a unit,
-//!   so that the schedule stays the same.
 
 use std::ffi::OsString;
 use std::fs;
@@ -31,10 +29,11 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use replay::{Case, Epoch, Scale, build};
+use fass_dag_file::{DagFile, Set};
 use sched_dag::law::RunRecord;
+use sched_dag::{Policy, Preemption};
 
-use super::schedules::{Deviation, compare, compare_turns};
+use super::schedules::{Case, Deviation, Scale, compare, compare_turns};
 use super::{Parse, equal, read};
 use tool::options::{Command, Parsed, Refusal, Takes, options};
 use tool::outcome::{Outcome, boot};
@@ -75,7 +74,7 @@ options! {
     CORES_UP_TO: Takes::Number(1, MOST_CORES), or "64";
     /// The length of a unit of time in microseconds.
     UNIT_US: Takes::Number(100, 10_000_000), or "10000";
-    /// Whether execution is simulated, or cores also compute, for half of each unit in all.
+    /// Whether execution is simulated, or cores compute all the time.
     WORK: Takes::OneOf(&["simulate", "compute"]), or "simulate";
     /// The meaning of time; see ./scripts/run --help.
     MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
@@ -176,25 +175,25 @@ pub struct Judged {
 }
 
 impl Settings {
-    /// Returns the settings for a unit: a guard of a 500th and a window of a
+    /// Returns the settings for a unit: a guard of a 1000th and a window of a
     /// 100th of it, and a tolerance of 2 %, deterministic, on a microvm.
     pub fn for_unit(unit_us: u64) -> Self {
         Self {
             mode: Mode::Deterministic,
             machine: Machine::Microvm,
             unit_us,
-            guard_us: unit_us / 500,
+            guard_us: unit_us / 1000,
             window_us: unit_us / 100,
             tolerance_percent: 2,
             computes: false,
         }
     }
 
-    /// Makes cores compute. As events then wait for the turns of others, guard and window are a
-    /// 40th of a unit, and the tolerance is 5 %.
+    /// Makes cores compute. As events then wait for what others do, the guard is a 160th and the
+    /// window a 40th of a unit, and the tolerance is 5 %.
     pub fn computing(self) -> Self {
         Self {
-            guard_us: self.unit_us / 40,
+            guard_us: self.unit_us / 160,
             window_us: self.unit_us / 40,
             tolerance_percent: 5,
             computes: true,
@@ -236,14 +235,14 @@ const MOST_CASES: usize = 64;
 /// The guest's memory.
 const MEMORY_MIB: u64 = 64;
 
-/// Runs cases in the kernel, in boots of one number of cores each, and compares.
+/// Runs cases in the kernel, in boots of one kind of machine each, and compares.
 ///
 /// # Errors
 ///
 /// In words: there is no QEMU, no image, or a file cannot be written.
 pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
     install::ensure_qemu()?;
-    let image = image::build("replay")?;
+    let image = image::build("dag-file")?;
     let machine = Qemu {
         machine: settings.machine,
         cores: cases
@@ -254,18 +253,26 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
         ..Qemu::default()
     };
     probe::choose(Some(settings.mode), settings.mode, &machine, &image)?;
-    let mut by_cores: Vec<&Case> = cases.iter().collect();
-    by_cores.sort_by_key(|case| case.cores);
-    let mut waiting = &by_cores[..];
+    let mut sorted: Vec<&Case> = cases.iter().collect();
+    sorted.sort_by_key(|case| machine_words(case));
+    let mut waiting = &sorted[..];
     let mut judged = Vec::with_capacity(cases.len());
     let mut progress = Progress::new(cases.len() as u64, "cases");
     while let Some(first) = waiting.first() {
-        // A case that the guest refuses would end the whole boot.
-        let fits = |case: &&&Case| case.cores == first.cores && runs_there(case, settings).is_ok();
-        let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
-        let found = match &waiting[..count] {
-            [] => vec![verdict(first, runs_there(first, settings))],
-            cases => judge(&boot_with(&image, cases, settings)?, cases, settings),
+        let words = machine_words(first);
+        let same = waiting
+            .iter()
+            .take_while(|case| machine_words(case) == words);
+        let mut sets = same.map(|case| case.set_at(settings.scale())).peekable();
+        let found = match sets.next_if(Result::is_err) {
+            // A case that the guest refuses would end the whole boot.
+            Some(refused) => vec![verdict(first, refused.map(|_| Deviation::default()))],
+            None => {
+                let sets: Vec<Set> = sets.take(MOST_CASES).map_while(Result::ok).collect();
+                let cases = &waiting[..sets.len()];
+                let outcome = boot_with(&image, &DagFile { sets }, cases, settings)?;
+                judge(&outcome, cases, settings)
+            }
         };
         // A boot may judge fewer cases than it was given: the rest go into the next one.
         waiting = &waiting[found.len()..];
@@ -276,10 +283,23 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
     Ok(judged)
 }
 
-/// Returns the reason why the guest cannot run a case: its times do not fit in nanoseconds.
-fn runs_there(case: &Case, settings: &Settings) -> Result<Deviation, String> {
-    let built = build(case, settings.scale(), &Epoch::default(), None);
-    built.map(|_| Deviation::default())
+/// Returns how many cores a case is for, and the kernel's words for the rest of its machine.
+fn machine_words(case: &Case) -> (u32, String) {
+    let policy = match case.policy {
+        Policy::StaticPriority => "static",
+        Policy::Edf => "edf",
+    };
+    let preemption = match case.preemption {
+        Preemption::Enabled => "on",
+        Preemption::Disabled => "off",
+    };
+    let sizes: Vec<String> = case.clusters.sizes().iter().map(u32::to_string).collect();
+    let clusters = match &sizes[..] {
+        [] => String::new(),
+        sizes => format!(" clusters={}", sizes.join(",")),
+    };
+    let words = format!("policy={policy} preemption={preemption}{clusters}");
+    (case.cores, words)
 }
 
 fn verdict(case: &Case, outcome: Result<Deviation, String>) -> Judged {
@@ -290,29 +310,28 @@ fn verdict(case: &Case, outcome: Result<Deviation, String>) -> Judged {
     }
 }
 
-fn boot_with(image: &Path, cases: &[&Case], settings: &Settings) -> Result<Outcome, String> {
-    let log = system::new_log("replay")?;
-    let module = log.with_extension("cases");
-    let text: String = cases.iter().map(|case| case.text.as_str()).collect();
-    files::write(&module, text)?;
-    let Settings {
-        mode,
-        machine,
-        unit_us,
-        guard_us,
-        window_us,
-        computes,
-        ..
-    } = *settings;
-    let work = if computes { "compute" } else { "simulate" };
+fn boot_with(
+    image: &Path,
+    file: &DagFile,
+    cases: &[&Case],
+    settings: &Settings,
+) -> Result<Outcome, String> {
+    let log = system::new_log("oracle")?;
+    let module = log.with_extension("dag");
+    files::write(&module, file.to_string())?;
+    let (mode, grid_us, window_us) = (settings.mode, settings.unit_us, settings.window_us);
+    let occupy = if settings.computes { "spin" } else { "hold" };
+    let (cores, words) = cases
+        .first()
+        .map_or((1, String::new()), |case| machine_words(case));
     let qemu = Qemu {
         mode,
-        machine,
-        cores: cases.first().map_or(1, |case| case.cores.into()),
+        machine: settings.machine,
+        cores: cores.into(),
         memory_mib: MEMORY_MIB,
         guest_words: format!(
-            "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us} \
-             work={work} events=on"
+            "mode={mode} {words} execution=sequence occupy={occupy} grid_us={grid_us} \
+             window_us={window_us} events=on"
         ),
         module: Some(module.clone()),
         ..Qemu::default()
@@ -332,7 +351,7 @@ pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> 
         Ok(runs) => (runs, None),
         Err(damaged) => (Vec::new(), Some(damaged.to_string())),
     };
-    let mut ran = outcome.transcript.of_kind("replay").zip(&runs);
+    let mut ran = outcome.transcript.of_kind("dag_set").zip(&runs);
     for case in cases {
         let Some((line, run)) = ran.next() else {
             let why = ending.map(|fault| fault.reason).or(damaged);
@@ -362,7 +381,7 @@ fn compare_run(
     run: &Run,
     settings: &Settings,
 ) -> Result<Deviation, String> {
-    if line.text_at("case") != Some(case.name.as_str()) || run.lost > 0 {
+    if line.text_at("set") != Some(case.name.as_str()) || run.lost > 0 {
         return Err(format!(
             "its trace is not whole, before line {}",
             line.number
@@ -414,7 +433,7 @@ end
 990000 finish c0 0.0.0
 990000 completed c0 0.0
 ;
-{"kind":"replay","case":"small","cores":1,"violations":0,"allocations":0}
+{"kind":"dag_set","set":"small","dags":1,"violations":0,"allocations":0}
 {"kind":"verdict","status":"success","reason":""}
 "#;
 

@@ -16,6 +16,7 @@
 
 pub mod assignment;
 pub mod bounds;
+mod case;
 pub mod in_kernel;
 pub(crate) mod older_bounds;
 mod responses;

@@ -1,13 +1,14 @@
 //! Reference schedules: the execution of every instance, exact to the unit.
 //!
 //! A case is a set of DAGs with the execution time of every instance, and the schedule that two
-//! independent implementations agree on (`replay::Case` has the format). [`check`] replays the DAGs
+//! independent implementations agree on ([`Case`] has the format). [`check`] replays the DAGs
 //! through the real scheduler in virtual time; [`compare`] compares a run, there or on a machine,
 //! with the case: each start, finish and number of preemptions, and of each job release, finish,
 //! response time and miss.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::sync::Arc;
 
 use sched_dag::engine::SubtaskBody;
 use sched_dag::journal::{Event, EventKind, EventSubject};
@@ -16,7 +17,7 @@ use sched_dag::lifecycle::{Request, WaitId, WaitLimit};
 use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, SubtaskId, TaskSet};
 
-pub use ::replay::{Case, parse};
+pub use super::case::{Case, Scale, parse};
 
 use crate::oracle::equal;
 
@@ -49,15 +50,16 @@ impl Deviation {
 ///
 /// The first difference, in one line.
 pub fn check(case: &Case) -> Result<(), String> {
-    let subtasks: usize = case.executions_ns.iter().map(Vec::len).sum();
+    let task_set = Arc::new(case.task_set().map_err(|fault| fault.to_string())?);
+    let subtasks = task_set.vertices();
     let useful = u32::try_from(subtasks.max(ALWAYS_SIMULATED)).unwrap_or(u32::MAX);
     let options = SchedulerOptions {
         policy: case.policy,
         preemption: case.preemption,
         cores: case.cores.min(useful),
     };
-    let bodies = case_bodies(case);
-    let mut run = VirtualTime::of_bodies(&case.task_set, options, bodies, &[]).recording();
+    let bodies = case_bodies(&task_set);
+    let mut run = VirtualTime::of_bodies(&task_set, options, bodies, &[]).recording();
     let mut workload = CaseWorkload {
         case,
         answers: Vec::new(),
@@ -75,8 +77,8 @@ pub fn check(case: &Case) -> Result<(), String> {
         return Err("some jobs have not ended".to_owned());
     }
     let events = run.events().into_iter();
-    let record = RunRecord::of_events(&case.task_set, true, events).ok_or("too many jobs")?;
-    compare(case, &case.task_set, &record, 1, 0)?;
+    let record = RunRecord::of_events(&task_set, true, events).ok_or("too many jobs")?;
+    compare(case, &task_set, &record, 1, 0)?;
     compare_turns(case, run.events(), 1, 0)?;
     for (instance, expected) in &case.turn_times {
         let found = workload.timeouts.get(instance).copied().unwrap_or(0);
@@ -96,8 +98,8 @@ struct CaseBody {
 }
 
 /// Returns the bodies of a case's subtasks.
-fn case_bodies(case: &Case) -> impl Iterator<Item = CaseBody> {
-    let dags = (0..).map(DagId).zip(case.task_set.dags());
+fn case_bodies(task_set: &TaskSet) -> impl Iterator<Item = CaseBody> {
+    let dags = (0..).map(DagId).zip(task_set.dags());
     dags.flat_map(|(dag, model)| {
         let subtasks = (0..).map(SubtaskId).zip(model.subtasks());
         subtasks.map(move |(id, subtask)| CaseBody {
@@ -162,16 +164,13 @@ impl Workload<CaseBody> for CaseWorkload<'_> {
         if body.has_timed_out {
             *self.timeouts.entry(instance).or_default() += 1;
         }
-        if let Some(turns) = self.case.turns.get(&instance) {
-            return Some(turns[body.turn].execution_ns);
-        }
-        let times = &self.case.executions_ns[instance.dag.index()][instance.subtask.index()];
-        Some(times[usize::try_from(instance.job).expect("few jobs")])
+        self.case.sample(instance).get(2 * body.turn).copied()
     }
 
     fn waits(&mut self, wait: WaitId, now_ns: u64) {
-        let turn = &self.case.turns[&wait.instance][wait.number as usize];
-        let answer_ns = turn.answer_ns.and_then(|ns| now_ns.checked_add(ns));
+        let times = self.case.sample(wait.instance);
+        let answer_ns = times.get(2 * wait.number as usize + 1);
+        let answer_ns = answer_ns.and_then(|ns| now_ns.checked_add(*ns));
         self.answers.extend(answer_ns.map(|ns| (ns, wait)));
     }
 
@@ -198,7 +197,10 @@ pub fn compare_turns(
 ) -> Result<Deviation, String> {
     let mut found = BTreeMap::<Instance, Vec<[Option<u64>; 2]>>::new();
     for event in events {
-        let Some(instance) = event.instance().filter(|of| case.turns.contains_key(of)) else {
+        let Some(instance) = event
+            .instance()
+            .filter(|of| case.turn_times.contains_key(of))
+        else {
             continue;
         };
         let spans = found.entry(instance).or_default();

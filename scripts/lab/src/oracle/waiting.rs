@@ -6,12 +6,11 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use replay::parse_block;
 use text::{Malformed, blocks};
 
 use super::bounds::{self, BoundsCase};
 use super::schedules::{self, Case};
-use super::{OPTIONS, in_kernel, of_files, run_files};
+use super::{OPTIONS, case, in_kernel, of_files, run_files};
 use tool::options::Command;
 
 static WAITING: Command = of_files(
@@ -39,7 +38,7 @@ pub fn parse(text: &str) -> Result<Vec<WaitingCase>, Malformed> {
     blocks(text, &["case", "bounds"], |header, lines| {
         match header.kind {
             "bounds" => bounds::parse_case(header, lines).map(WaitingCase::Bounds),
-            _ => parse_block(text, header, lines).map(|case| WaitingCase::Schedule(Box::new(case))),
+            _ => case::parse_case(header, lines).map(|case| WaitingCase::Schedule(Box::new(case))),
         }
     })
 }

@@ -1,9 +1,11 @@
 //! The scheduler against reference schedules, and the refusal of broken files.
 
+use dag_file::{Settings, build};
+use fass::Occupation;
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
-use lab::oracle::schedules::{Case, Deviation, check, compare, compare_turns, parse};
+use fass_dag_file::{DagFile, Execution, Length};
+use lab::oracle::schedules::{Case, Deviation, Scale, check, compare, compare_turns, parse};
 use lab::oracle::waiting::{self, WaitingCase};
-use replay::{Epoch, Scale, build};
 use virtual_time::VirtualTime;
 
 const PUBLIC: &str = include_str!("../../../../tests/oracle/schedules.txt");
@@ -70,8 +72,8 @@ fn assert_cases_agree(cases: &[Case]) {
     }
 }
 
-/// Compares a case with a run, in virtual time, of the DAGs that the app `replay` builds from it,
-/// with units of 1000 ns and this guard.
+/// Compares a case with a run, in virtual time, of the DAGs that the app `dag-file` builds from the
+/// file that the case becomes, with units of 1000 ns and this guard.
 fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, String> {
     let machine = VirtualTime::new()
         .cores(case.cores)
@@ -82,7 +84,16 @@ fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, Str
         unit_ns: 1000,
         guard_ns,
     };
-    let dags = build(case, scale, &Epoch::default(), None).expect("short times");
+    let sets = vec![case.set_at(scale).expect("short times")];
+    let file = fass_dag_file::parse(&DagFile { sets }.to_string()).expect("it is well formed");
+    let settings = Settings {
+        execution: Execution::Sequence,
+        seed: 0,
+        occupation: Occupation::Hold,
+        length: Length::Jobs(0),
+        grid_ns: 1000,
+    };
+    let dags = build(&file.sets[0], &settings);
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
     let report = machine.run();
     assert_eq!(report.violations(), []);
@@ -147,13 +158,13 @@ sub 1 0 1 1 | sub 1 0 0 1 | 3 | not between 1 and the WCET 1
 sub 1 0 1 1 | sub 1 4294967296 1 1 | 3 | too large
 edge 0 1 | edge 0 2 | 5 | no subtask 2
 edge 0 1 | edge 1 1 | 2 | precedes itself
-1 0 1 1\ndag 4 4 0 2 2 1\nsub 1 0 1 1\nsub 4 0 4 4 | 1 0 1 1\ndag 4 4 0 2 2 2\nsub 1 0 1 1\nsub 4 0 4 4\nedge 1 0 | 2 | subtask 0 -> subtask 1 -> subtask 0
+1 0 1 1\ndag 4 4 0 2 2 1\nsub 1 0 1 1\nsub 4 0 4 4 | 1 0 1 1\ndag 4 4 0 2 2 2\nsub 1 0 1 1\nsub 4 0 4 4\nedge 1 0 | 2 | subtask `0` -> subtask `1` -> subtask `0`
 edge 0 1 | edge 0 1\nsink 2 3 | 6 | no subtask 2
 edge 0 1 | edge 0 1\nsink 1 | 6 | takes 2 words
 edge 0 1 | edge 0 1\nsink 1 3\nsink 1 3 | 7 | twice
-edge 0 1 | edge 0 1\nsink 1 0 | 2 | deadline of 0
-edge 0 1 | edge 0 1\nsink 1 5 | 2 | longer than its DAG's
-edge 0 1 | edge 0 1\nsink 0 3 | 2 | is no sink
+edge 0 1 | edge 0 1\nsink 1 0 | 4 | deadline of 0
+edge 0 1 | edge 0 1\nsink 1 5 | 4 | longer than its DAG's
+edge 0 1 | edge 0 1\nsink 0 3 | 3 | is no sink
 x 0 0 1 1 5 0\n |  | 11 | without 1 `x` records
 x 0 0 1 1 5 0 | x 0 0 0 1 5 0 | 7 | twice
 x 0 0 1 1 5 0 | x 0 2 1 1 5 0 | 7 | no job 2
@@ -194,9 +205,8 @@ s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 3 5 6 | dag 0 job 0 subtask 0 segment 0: end: ex
 x 1 0 0 2 7 1 | x 1 0 0 2 7 0 | dag 1 job 0 subtask 0: preemptions: expected 0, found 1";
 
 /// Parts of the waiting case, their replacement, and the line and the reason of the refusal.
-const MALFORMED_WAITS: &str = r"wait 0 1 2 3 1 | wait 0 0 2 | 4 | expected 0 waits
-wait 0 1 2 3 1 | wait 0 1 2 3 | 4 | expected 1 waits, each with its segment
-wait 0 1 2 3 1 | wait 0 2 2 3 1 | 4 | expected 2 waits
+const MALFORMED_WAITS: &str = r"wait 0 1 2 3 1 | wait 0 0 2 | 4 | needs at least 1
+wait 0 1 2 3 1 | wait 0 2 2 3 1 | 4 | 2 waits take twice as many times and one, found 3
 wait 0 1 2 3 1 | wait 1 1 2 3 1 | 4 | no subtask 1
 wait 0 1 2 3 1 | wait 0 1 2 18446744073709551615 1 | 1 | may end after
 act 0 0 2 3 1 | act 0 1 2 3 1 | 5 | expected `act 0 0 ..`
@@ -204,8 +214,8 @@ act 0 0 2 3 1 | act 0 0 1 3 1 | 5 | do not come to its execution time 3
 act 0 0 2 3 1 | act 0 0 2 3 1\nwait 0 1 2 3 1 | 6 | has its waits already
 act 0 0 2 3 1 | act 0 0 2 3 | 5 | takes 5 words
 act 0 0 2 3 1\n |  | 5 | expected a `act` record
-s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 | 10 | the spans of 2 segments
-s 0 0 0 0 0 2 5 6 | s 1 0 0 0 0 2 5 6 | 10 | the spans of 0 segments
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 | 10 | the spans of the segments
+s 0 0 0 0 0 2 5 6 | s 1 0 0 0 0 2 5 6 | 10 | the spans of the segments
 s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 6\ns 0 0 0 0 0 2 5 6 | 11 | twice
 s 0 0 0 0 0 2 5 6\n |  | 12 | 1 `s` records";
 

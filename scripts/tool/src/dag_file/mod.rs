@@ -356,9 +356,10 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
         seconds += u128::from(records(set, length) / 500);
         let length = length.of(set);
         let (mut span_ns, mut busy_ns) = (0_u128, 0_u128);
-        for FileDag { spec, .. } in &set.dags {
+        for dag in &set.dags {
+            let spec = &dag.spec;
             let jobs = u128::from(length.jobs(spec));
-            let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
+            let wcets = (0..spec.subtasks.len()).map(|subtask| dag.most_ns(subtask));
             let waits = spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
             let each_ns = wcets.chain(waits.map(|wait| wait.limit_ns));
             let of_job_ns: u128 = each_ns.map(u128::from).sum();

@@ -24,7 +24,7 @@ fn an_image_of_another_app_is_2_before_it_boots() {
     let fork_join = words_of("fork-join");
     for (option, value, wanted) in [
         ("--dag", "apps/dag-file/examples/demo.dag", "dag-file"),
-        ("--app", "replay", "replay"),
+        ("--app", "hand-off", "hand-off"),
         ("--app", "re\nplay", "re\\nplay"),
     ] {
         let words = fork_join.iter().map(String::as_str).chain([option, value]);
@@ -36,8 +36,8 @@ fn an_image_of_another_app_is_2_before_it_boots() {
 
 #[test]
 fn an_image_alone_runs_as_what_it_is() {
-    let said = call(workspace(), words_of("replay")).out;
-    assert!(said.starts_with("app replay, guest words: "), "{said}");
+    let said = call(workspace(), words_of("hand-off")).out;
+    assert!(said.starts_with("app hand-off, guest words: "), "{said}");
 }
 
 #[test]

@@ -18,33 +18,31 @@
 //! end
 //! ```
 //!
-//! One unit of the file's time counts as a nanosecond here; the one that runs
-//! a case chooses how long a unit is. WCETs play no part in a schedule; they are only
-//! checked against the execution times.
+//! One unit of the file's time counts as a nanosecond here. WCETs play no part in a schedule; they
+//! are only checked against the execution times.
 //!
-//! Reading is strict: whatever is not as the format says is refused with its line.
+//! Reading is strict: whatever is not as the format says is refused with its line. The DAGs are
+//! those of a DAG file; samples are the execution times, job by job.
 
-use alloc::borrow::ToOwned;
-use alloc::collections::BTreeMap;
-use alloc::format;
-use alloc::string::String;
-use alloc::sync::Arc;
-use alloc::vec::Vec;
+use std::collections::BTreeMap;
 
+use fass_dag_file::{
+    FileDag, FileSubtask, Length, Set, check, executed_ns, is_name, no_name, sample_len,
+};
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Instance, Policy,
     Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
-use text::{Line, Lines, Malformed, cases, of_file, quoted};
+use text::{Line, Lines, Malformed, cases, quoted};
+
+use super::bounds::parse_wait;
 
 /// One set of DAGs with its expected schedule.
 #[derive(Debug)]
 pub struct Case {
     /// The case's name.
     pub name: String,
-    /// Its records, from which it can be read again.
-    pub text: String,
     /// The number of cores.
     pub cores: u32,
     /// How these are divided.
@@ -53,13 +51,9 @@ pub struct Case {
     pub policy: Policy,
     /// Whether a started instance may lose its core.
     pub preemption: Preemption,
-    /// The verified DAGs.
-    pub task_set: Arc<TaskSet>,
-    /// The execution times: of each DAG, for each subtask that of each job.
-    pub executions_ns: Vec<Vec<Vec<u64>>>,
-    /// The turns of each instance of a subtask with waits.
-    pub turns: BTreeMap<Instance, Vec<Turn>>,
-    /// When each of these is expected to take place.
+    /// The DAGs.
+    pub set: Set,
+    /// When each segment of the subtasks with waits is expected to take place.
     pub turn_times: BTreeMap<Instance, TurnTimes>,
     /// The expected instances.
     pub instances: BTreeMap<Instance, InstanceTimes>,
@@ -76,15 +70,6 @@ pub struct InstanceTimes {
     pub finish_ns: u64,
     /// How many dispatches took its core away.
     pub preemptions: u64,
-}
-
-/// A turn of an instance: a segment, and the wait behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
-    /// How long it executes.
-    pub execution_ns: u64,
-    /// How long after it the answer to its wait comes; `None` behind the last segment.
-    pub answer_ns: Option<u64>,
 }
 
 /// The times of the turns of an instance.
@@ -109,6 +94,89 @@ pub struct JobTimes {
     pub missed: bool,
 }
 
+/// How the times of a case become times of the machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// The length of a unit, in nanoseconds.
+    pub unit_ns: u64,
+    /// How much less each segment executes, in nanoseconds.
+    pub guard_ns: u64,
+}
+
+impl Case {
+    /// Returns how long the segments of an instance execute, and how long after each of them the
+    /// answer to its wait comes.
+    pub(super) fn sample(&self, instance: Instance) -> &[u64] {
+        let dag = &self.set.dags[instance.dag.index()];
+        let subtask = instance.subtask.index();
+        let mut samples = dag.subtasks[subtask]
+            .samples_ns
+            .chunks(sample_len(&dag.spec.subtasks[subtask]));
+        let job = usize::try_from(instance.job).ok();
+        job.and_then(|job| samples.nth(job)).unwrap_or_default()
+    }
+
+    /// Verifies the DAGs.
+    ///
+    /// # Errors
+    ///
+    /// The first fault, with its line.
+    pub fn task_set(&self) -> Result<TaskSet, Malformed> {
+        let options = CommitOptions::new(self.policy, self.cores)
+            .with_clusters(self.clusters.clone())
+            .with_construction(ConstructionPolicy::any_graph())
+            .with_instance_limit(u32::MAX);
+        check(&self.set, &options, Length::Jobs(1)).map_err(|mut faults| faults.remove(0))?;
+        let specs: Vec<DagSpec> = self.set.dags.iter().map(|dag| dag.spec.clone()).collect();
+        let verified = verify(&specs, &options).map_err(|rejected| Malformed {
+            line: 1,
+            reason: rejected.to_string(),
+        });
+        Ok(verified?.task_set)
+    }
+
+    /// Returns the DAGs with times of the machine.
+    ///
+    /// # Errors
+    ///
+    /// In words: a time is too long at this scale.
+    pub fn set_at(&self, scale: Scale) -> Result<Set, String> {
+        let unit_ns = scale.unit_ns;
+        let at_scale = |units: u64| {
+            unit_ns.checked_mul(units).ok_or_else(|| {
+                format!(
+                    "{units} units of {unit_ns} ns are more than 64 bits hold; choose a shorter unit"
+                )
+            })
+        };
+        let mut set = self.set.clone();
+        for FileDag { spec, subtasks, .. } in &mut set.dags {
+            let mut times = vec![&mut spec.offset_ns];
+            times.extend(&mut spec.period_ns);
+            times.extend(&mut spec.relative_deadline_ns);
+            for (spec, of_file) in spec.subtasks.iter_mut().zip(subtasks) {
+                let len = sample_len(spec);
+                let samples = of_file
+                    .samples_ns
+                    .iter()
+                    .enumerate()
+                    .map(|(place, &units)| {
+                        let is_segment = (place % len).is_multiple_of(2);
+                        let guard_ns = if is_segment { scale.guard_ns } else { 0 };
+                        Ok(at_scale(units)?.saturating_sub(guard_ns))
+                    });
+                of_file.samples_ns = samples.collect::<Result<_, String>>()?;
+                times.extend(spec.waits.iter_mut().map(|wait| &mut wait.limit_ns));
+                times.extend(&mut spec.relative_deadline_ns);
+            }
+            for ns in times {
+                *ns = at_scale(*ns)?;
+            }
+        }
+        Ok(set)
+    }
+}
+
 /// Reads all cases of a file.
 ///
 /// # Errors
@@ -116,29 +184,15 @@ pub struct JobTimes {
 /// [`Malformed`] for the first record that is not as described above, and for
 /// DAGs that cannot be committed.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    cases(text, |header, lines| parse_block(text, header, lines))
+    cases(text, parse_case)
 }
 
-/// Reads the case of a text that begins with the record `header`.
-///
-/// # Errors
-///
-/// As [`parse`].
-pub fn parse_block(
-    text: &str,
-    header: &Line<'_>,
-    lines: &mut Lines<'_>,
-) -> Result<Case, Malformed> {
-    let case = parse_case(header, lines)?;
-    let records = text.lines().take(lines.last()).skip(header.number - 1);
-    Ok(Case {
-        text: records.flat_map(|record| [record, "\n"]).collect(),
-        ..case
-    })
-}
-
-fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
+/// Reads a case from its header on.
+pub(super) fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
     let [name, cores, edf, preemptive, count] = header.fixed()?;
+    if !is_name(name) {
+        return Err(header.malformed(no_name(name)));
+    }
     let cores = header.cores(cores)?;
     let policy = match header.flag(edf)? {
         true => Policy::Edf,
@@ -152,40 +206,30 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         Some(line) => CoreDivision::Of(parse_clusters(&line, cores)?),
         None => CoreDivision::Undivided,
     };
-    let options = CommitOptions::new(policy, cores)
-        .with_clusters(clusters.clone())
-        .with_construction(ConstructionPolicy::any_graph())
-        .with_instance_limit(u32::MAX);
-
-    let mut specs = Vec::new();
-    let mut executions_ns = Vec::new();
-    let mut turns = BTreeMap::new();
-    for dag in (0..header.at_least_one(count)?).map(DagId) {
-        let line = lines.expect("dag")?;
-        let (mut spec, of_dag_ns) = parse_dag(&line, lines, &clusters)?;
+    let mut set = Set {
+        name: name.to_owned(),
+        dags: Vec::new(),
+    };
+    for number in 0..header.at_least_one(count)? {
+        let mut dag = parse_dag(number, lines, &clusters)?;
         while let Some(line) = lines.next_if("wait") {
-            parse_waits(&line, lines, (dag, &mut spec), &of_dag_ns, &mut turns)?;
+            parse_waits(&line, lines, &mut dag)?;
         }
-        commit(&line, core::slice::from_ref(&spec), &options)?;
-        specs.push(spec);
-        executions_ns.push(of_dag_ns);
+        set.dags.push(dag);
     }
-    let task_set = commit(header, &specs, &options)?;
-    check_horizon(header, &specs, &executions_ns)?;
     let mut case = Case {
         name: name.to_owned(),
-        text: String::new(),
         cores,
         clusters,
         policy,
         preemption,
-        task_set: Arc::new(task_set),
-        executions_ns,
-        turns,
+        set,
         turn_times: BTreeMap::new(),
         instances: BTreeMap::new(),
         jobs: BTreeMap::new(),
     };
+    case.task_set()?;
+    check_horizon(header, &case.set)?;
     parse_schedule(lines, &mut case)?;
     Ok(case)
 }
@@ -207,15 +251,17 @@ fn parse_clusters(line: &Line<'_>, cores: u32) -> Result<Vec<u32>, Malformed> {
 
 /// Reads a DAG and the execution times of its subtasks' instances.
 fn parse_dag(
-    header: &Line<'_>,
+    number: u32,
     lines: &mut Lines<'_>,
     clusters: &CoreDivision,
-) -> Result<(DagSpec, Vec<Vec<u64>>), Malformed> {
+) -> Result<FileDag, Malformed> {
+    let header = lines.expect("dag")?;
     let [period, deadline, offset, jobs, subtasks, edges] = header.fixed()?;
     let jobs = header.at_least_one(jobs)?;
     let subtasks = header.at_least_one(subtasks)?;
     let edges: u32 = header.number(edges)?;
     let mut spec = DagSpec {
+        name: number.to_string(),
         period_ns: Some(header.number(period)?),
         relative_deadline_ns: Some(header.number(deadline)?),
         offset_ns: header.number(offset)?,
@@ -230,11 +276,11 @@ fn parse_dag(
         let cluster = line.index("cluster", cluster, clusters.sizes().len())?;
         spec.cluster = u32::try_from(cluster).ok().map(ClusterId);
     }
-    let mut executions_ns = Vec::new();
-    for _ in 0..subtasks {
-        let (subtask, of_subtask_ns) = parse_subtask(&lines.expect("sub")?, jobs)?;
+    let mut of_file = Vec::new();
+    for number in 0..subtasks {
+        let (subtask, more) = parse_subtask(number, &lines.expect("sub")?, jobs)?;
         spec.subtasks.push(subtask);
-        executions_ns.push(of_subtask_ns);
+        of_file.push(more);
     }
     let subtasks = spec.subtasks.len();
     spec.edges = lines.edges(edges, subtasks)?;
@@ -244,11 +290,20 @@ fn parse_dag(
         let place = &mut spec.subtasks[sink].relative_deadline_ns;
         once(&line, place.replace(line.number(deadline)?))?;
     }
-    Ok((spec, executions_ns))
+    Ok(FileDag {
+        spec,
+        line: header.number,
+        subtasks: of_file,
+        ..FileDag::default()
+    })
 }
 
 /// Reads a subtask and the execution time of each job's instance.
-fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(SubtaskSpec, Vec<u64>), Malformed> {
+fn parse_subtask(
+    number: u32,
+    line: &Line<'_>,
+    jobs: u32,
+) -> Result<(SubtaskSpec, FileSubtask), Malformed> {
     let [wcet, priority, executions @ ..] = &line.words[..] else {
         return Err(line.malformed("expected `sub wcet prio e_0 ..`"));
     };
@@ -265,103 +320,67 @@ fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(SubtaskSpec, Vec<u64>), 
             "the execution time {execution_ns} is not between 1 and the WCET {wcet_ns}"
         ))),
     };
-    let executions_ns = executions.iter().map(execution).collect::<Result<_, _>>()?;
     let subtask = SubtaskSpec {
+        name: number.to_string(),
         priority: Some(Priority(line.number(priority)?)),
         ..SubtaskSpec::default()
     };
-    Ok((subtask, executions_ns))
+    let of_file = FileSubtask {
+        line: line.number,
+        samples_ns: executions.iter().map(execution).collect::<Result<_, _>>()?,
+    };
+    Ok((subtask, of_file))
 }
 
 /// Reads the waits of a subtask, and the turns of its instance in each job.
-fn parse_waits(
-    line: &Line<'_>,
-    lines: &mut Lines<'_>,
-    (dag, spec): (DagId, &mut DagSpec),
-    executions_ns: &[Vec<u64>],
-    turns: &mut BTreeMap<Instance, Vec<Turn>>,
-) -> Result<(), Malformed> {
-    let numbers: Vec<u64> = line.numbers(line.words.len())?;
-    let [_, count, _, pairs @ ..] = &numbers[..] else {
-        return Err(line.malformed("expected `wait v n C_0 W_1 C_1 ..`"));
-    };
-    let subtask = line.index("subtask", line.words[0], executions_ns.len())?;
-    let (pairs, rest) = pairs.as_chunks::<2>();
-    if pairs.is_empty() || pairs.len() as u64 != *count || !rest.is_empty() {
-        return Err(line.malformed(format!("expected {count} waits, each with its segment")));
-    }
-    let waits = &mut spec.subtasks[subtask].waits;
+fn parse_waits(line: &Line<'_>, lines: &mut Lines<'_>, dag: &mut FileDag) -> Result<(), Malformed> {
+    let (subtask, _, times) = parse_wait(line, dag.subtasks.len())?;
+    let waits = &mut dag.spec.subtasks[subtask].waits;
     if !waits.is_empty() {
         return Err(line.malformed(format!("subtask {subtask} has its waits already")));
     }
-    // WCETs play no part in a schedule.
-    *waits = (pairs.iter())
-        .map(|&[limit_ns, _]| Wait {
-            limit_ns,
-            segment_ns: None,
-        })
-        .collect();
-    for (job, &execution_ns) in (0..).zip(&executions_ns[subtask]) {
+    waits.extend(times[1..].iter().step_by(2).map(|&limit_ns| Wait {
+        limit_ns,
+        // WCETs play no part in a schedule.
+        segment_ns: None,
+    }));
+    let samples_ns = &mut dag.subtasks[subtask].samples_ns;
+    let mut turns_ns = Vec::new();
+    for (job, &execution_ns) in (0..).zip(&**samples_ns) {
         let line = lines.expect("act")?;
-        let numbers: Vec<u64> = line.numbers(2 * pairs.len() + 3)?;
-        let named = [
-            line.index("subtask", line.words[0], executions_ns.len())? as u64,
-            numbers[1],
-        ];
-        if named != [subtask as u64, job] {
+        let numbers: Vec<u64> = line.numbers(times.len() + 2)?;
+        if numbers[..2] != [subtask as u64, job] {
             return Err(line.malformed(format!("expected `act {subtask} {job} ..`")));
         }
-        let of_job = numbers[2..].chunks(2).map(|turn| Turn {
-            execution_ns: turn[0],
-            answer_ns: turn.get(1).copied(),
-        });
-        let of_job: Vec<Turn> = of_job.collect();
-        if of_job.iter().map(|turn| turn.execution_ns).sum::<u64>() != execution_ns {
+        if executed_ns(&numbers[2..]) != execution_ns {
             return Err(line.malformed(format!(
                 "the segments of job {job} do not come to its execution time {execution_ns}"
             )));
         }
-        let subtask = SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX));
-        turns.insert(Instance { dag, job, subtask }, of_job);
+        turns_ns.extend(&numbers[2..]);
     }
+    *samples_ns = turns_ns.into();
     Ok(())
-}
-
-/// Verifies DAGs that the record `line` begins.
-fn commit(
-    line: &Line<'_>,
-    specs: &[DagSpec],
-    options: &CommitOptions,
-) -> Result<TaskSet, Malformed> {
-    match verify(specs, options) {
-        Ok(verified) => Ok(verified.task_set),
-        Err(rejected) => {
-            let reasons: Vec<String> = of_file(&rejected).map(|(_, reason)| reason).collect();
-            Err(line.malformed(reasons.join("; ")))
-        }
-    }
 }
 
 /// Refuses a case in which even a schedule on one core might end after the last
 /// time there is.
-fn check_horizon(
-    header: &Line<'_>,
-    specs: &[DagSpec],
-    executions_ns: &[Vec<Vec<u64>>],
-) -> Result<(), Malformed> {
-    let last_release_ns = specs.iter().map(|spec| {
-        let jobs = spec.jobs.unwrap_or(1);
-        u128::from(spec.offset_ns) + u128::from(spec.period_ns.unwrap_or(0)) * u128::from(jobs - 1)
-    });
-    let executions_ns = executions_ns.iter().flatten().flatten().copied();
-    let busy_ns: u128 = executions_ns.map(u128::from).sum();
-    let waiting_ns = specs.iter().map(|spec| {
-        let waits = spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
-        let of_job_ns: u128 = waits.map(|wait| u128::from(wait.limit_ns)).sum();
-        of_job_ns * u128::from(spec.jobs.unwrap_or(1))
-    });
-    let held_ns = busy_ns + waiting_ns.sum::<u128>();
-    if last_release_ns.max().unwrap_or(0) + held_ns > u128::from(u64::MAX) {
+fn check_horizon(header: &Line<'_>, set: &Set) -> Result<(), Malformed> {
+    let (mut last_release_ns, mut held_ns) = (0, 0);
+    for FileDag { spec, subtasks, .. } in &set.dags {
+        let jobs = u128::from(spec.jobs.unwrap_or(1));
+        let period_ns = u128::from(spec.period_ns.unwrap_or(0));
+        last_release_ns = last_release_ns.max(u128::from(spec.offset_ns) + period_ns * (jobs - 1));
+        for (subtask, of_file) in spec.subtasks.iter().zip(subtasks) {
+            let samples = of_file
+                .samples_ns
+                .chunks(sample_len(subtask))
+                .map(executed_ns);
+            let limits = subtask.waits.iter().map(|wait| u128::from(wait.limit_ns));
+            held_ns += samples.map(u128::from).sum::<u128>() + jobs * limits.sum::<u128>();
+        }
+    }
+    if last_release_ns + held_ns > u128::from(u64::MAX) {
         return Err(header.malformed("the schedule may end after the last time that 64 bits hold"));
     }
     Ok(())
@@ -389,10 +408,10 @@ fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malforme
                 };
                 let of = [line.words[0], line.words[1], line.words[2]];
                 let instance = instance_of(&line, case, of)?;
-                let turns = case.turns.get(&instance).map_or(0, Vec::len);
-                if turns == 0 || 2 * turns != spans.len() {
+                let turns = case.sample(instance).len();
+                if turns == 1 || turns + 1 != spans.len() {
                     return Err(line.malformed(format!(
-                        "expected the spans of {turns} segments of {instance}"
+                        "expected the spans of the segments of {instance}, which waits"
                     )));
                 }
                 let times = TurnTimes {
@@ -434,23 +453,35 @@ fn instance_of(
     [dag, job, subtask]: [&str; 3],
 ) -> Result<Instance, Malformed> {
     let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
-    let dag = line.index("dag", dag, case.executions_ns.len())?;
-    let of_dag = &case.executions_ns[dag];
+    let dag = line.index("dag", dag, case.set.dags.len())?;
+    let FileDag { spec, subtasks, .. } = &case.set.dags[dag];
+    let jobs = usize::try_from(spec.jobs.unwrap_or(0)).unwrap_or(usize::MAX);
     Ok(Instance {
         dag: DagId(id(dag)),
-        job: line.index("job", job, of_dag[0].len())? as u64,
-        subtask: SubtaskId(id(line.index("subtask", subtask, of_dag.len())?)),
+        job: line.index("job", job, jobs)? as u64,
+        subtask: SubtaskId(id(line.index("subtask", subtask, subtasks.len())?)),
     })
 }
 
 /// Refuses a case that ends without what is expected of some instance or job.
 fn check_all_told(end: &Line<'_>, case: &Case) -> Result<(), Malformed> {
-    let jobs: usize = case.executions_ns.iter().map(|dag| dag[0].len()).sum();
-    let instances: usize = case.executions_ns.iter().flatten().map(Vec::len).sum();
-    let instances = instances - case.instances.len();
-    let jobs = jobs - case.jobs.len();
-    let turns = case.turns.len() - case.turn_times.len();
-    if instances + jobs + turns > 0 {
+    let mut left = [0; 3];
+    for FileDag { spec, .. } in &case.set.dags {
+        let waiting = spec
+            .subtasks
+            .iter()
+            .filter(|subtask| !subtask.waits.is_empty());
+        let each = [spec.subtasks.len(), waiting.count(), 1];
+        for (left, each) in left.iter_mut().zip(each) {
+            *left += spec.jobs.unwrap_or(0) * each as u64;
+        }
+    }
+    let told = [case.instances.len(), case.turn_times.len(), case.jobs.len()];
+    for (left, told) in left.iter_mut().zip(told) {
+        *left -= told as u64;
+    }
+    let [instances, turns, jobs] = left;
+    if left != [0; 3] {
         return Err(end.malformed(format!(
             "the case ends without {instances} `x` records, {turns} `s` records and {jobs} `j` \
              records"
