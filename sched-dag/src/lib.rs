@@ -116,6 +116,7 @@ pub mod lifecycle;
 mod nearest;
 mod order;
 pub mod placement;
+mod policies;
 mod policy;
 mod request;
 mod scheduler;
@@ -133,9 +134,9 @@ pub use kept::Journal;
 pub use key::{DagKey, SubtaskKey};
 pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
+pub use policies::{Policy, SchedulerOptions};
 pub use policy::{
-    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Policy, Preemption, Priority,
-    SchedulerOptions, SubtaskOrder,
+    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Preemption, Priority, SubtaskOrder,
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,

@@ -1,5 +1,5 @@
-//! The choices that govern scheduling: policy, preemption, priority, overrun, faults; and what
-//! may become of a job.
+//! The choices that govern scheduling besides the policy: preemption, priority, overrun, faults; and
+//! what may become of a job.
 //!
 //! # Clusters: parts of the cores that schedule by themselves
 //!
@@ -24,15 +24,6 @@ pub enum Activation {
     Sporadic,
 }
 
-/// How the ready instances are ordered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Policy {
-    /// By the subtask's [`Priority`], the same for every job.
-    StaticPriority,
-    /// By the job's absolute deadline, the earliest first.
-    Edf,
-}
-
 /// Whether a started instance may lose its core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Preemption {
@@ -42,7 +33,7 @@ pub enum Preemption {
     Disabled,
 }
 
-/// The urgency of a subtask under [`Policy::StaticPriority`].
+/// The urgency of a subtask under [`Policy::StaticPriority`](crate::Policy::StaticPriority).
 ///
 /// The smaller number is the *higher* priority. There is no `Ord`, because
 /// `a < b` would read as the opposite of what it means.
@@ -109,18 +100,6 @@ pub enum SubtaskOrder {
     /// schedule of the WCETs on the DAG's cores, if these prove a shorter response time and none
     /// of another DAG a longer one. All subtasks need a WCET, and no sink a deadline of its own.
     Fixed,
-}
-
-/// How a scheduler orders instances, and for how many cores.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct SchedulerOptions {
-    /// How the ready instances are ordered.
-    pub policy: Policy,
-    /// Whether a started instance may lose its core. With
-    /// [`Preemption::Enabled`], non-preemptive subtasks still keep theirs.
-    pub preemption: Preemption,
-    /// The number of cores, at least 1.
-    pub cores: u32,
 }
 
 /// How a job ended.

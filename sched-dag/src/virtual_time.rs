@@ -56,7 +56,7 @@ use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
 use crate::lifecycle::{self, Lifecycle, Mailboxes, PendingRequests, Request, WaitId, WaitLimit};
 use crate::placement::NextWork;
-use crate::policy::SchedulerOptions;
+use crate::policies::SchedulerOptions;
 use crate::scheduler::{DriverNotice, Moment, Scheduler};
 use crate::task_set::TaskSet;
 

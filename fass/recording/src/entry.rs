@@ -283,8 +283,8 @@ crate::recordable! {
     /// ```
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct Commit {
-        /// Whether instances are ordered by deadline rather than by priority.
-        pub is_edf: bool,
+        /// The policy that orders instances: its place in the table of policies.
+        pub policy: u8,
         /// Whether an instance that has started may lose its core.
         pub is_preemptive: bool,
         /// All cores.

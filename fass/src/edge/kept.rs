@@ -17,8 +17,8 @@ use sched_dag::analysis::Overheads;
 use sched_dag::engine::Run;
 use sched_dag::law::Histogram;
 use sched_dag::{
-    Dag, DagId, Instance, Journal, LockUse, OnFault, OverrunPolicy, Policy, Preemption,
-    SchedulerOptions, Subtask, SubtaskId, TaskSet, Vertex, Wait,
+    Dag, DagId, Instance, Journal, LockUse, OnFault, OverrunPolicy, Preemption, SchedulerOptions,
+    Subtask, SubtaskId, TaskSet, Vertex, Wait,
 };
 
 use super::{Outgoing, Record, RecordingState};
@@ -153,7 +153,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
     let ids = (0..).map(DagId);
     let dags = ids.zip(task_set.dags()).zip(&plan.proven.bounds_ns);
     Commit {
-        is_edf: options.policy == Policy::Edf,
+        policy: options.policy as u8,
         is_preemptive: options.preemption == Preemption::Enabled,
         cores: options.cores,
         clusters: clusters.map(cores).collect(),

@@ -15,7 +15,7 @@ use crate::report::{PanicRecord, Report};
 const USAGE: &str = "\
 Replays a recording of this app in virtual time, and compares what it computes.
 
-usage: FILE [--from DAG/JOB] [--until DAG/JOB] [--cores N] [--policy edf|static]
+usage: FILE [--from DAG/JOB] [--until DAG/JOB] [--cores N] [--policy WORD]
 
 --from begins with that job, or with the last one before it of which all states of the DAG are
 recorded. --until shows what the subtasks of a job got and gave, as far as it is recorded. Without it the
@@ -56,7 +56,7 @@ pub fn replay_command(
 ) -> ExitCode {
     let words: Vec<OsString> = env::args_os().skip(1).collect();
     if words.iter().any(|word| word == "--help" || word == "-h") {
-        println!("{USAGE}");
+        println!("{}", USAGE.replace("WORD", &Policy::WORDS.join("|")));
         return ExitCode::SUCCESS;
     }
     let result = read(words).and_then(|words| replay(&words, commit));
@@ -83,7 +83,7 @@ fn read(words: Vec<OsString>) -> Result<Words, String> {
         }
         let value = words.next().unwrap_or_default();
         let value = value.to_string_lossy();
-        let refused = |wanted| format!("`{text} {value}`: {wanted} is wanted");
+        let refused = |wanted: &str| format!("`{text} {value}`: {wanted} is wanted");
         match &*text {
             "--from" | "--until" => {
                 let (dag, job) = job_of(&value).ok_or_else(|| refused("DAG/JOB"))?;
@@ -98,11 +98,8 @@ fn read(words: Vec<OsString>) -> Result<Words, String> {
                 read.cores = cores.ok_or_else(|| refused("a number from 1 to 64"))?;
             }
             "--policy" => {
-                read.policy = match &*value {
-                    "edf" => Policy::Edf,
-                    "static" => Policy::StaticPriority,
-                    _ => return Err(refused("`edf` or `static`")),
-                }
+                let words = || refused(&format!("one of {}", Policy::WORDS.join(", ")));
+                read.policy = Policy::of_word(&value).ok_or_else(words)?;
             }
             _ => return Err(format!("there is no option `{text}`; see --help")),
         }

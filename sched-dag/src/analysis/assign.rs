@@ -40,7 +40,7 @@ use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, answer, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
-use crate::policy::{AssignmentReason, LendingAttempt, Policy, Preemption};
+use crate::policy::{AssignmentReason, LendingAttempt, Preemption};
 use crate::task_set::{Dag, Subtask, TaskSet};
 use crate::worded::texts;
 
@@ -163,7 +163,8 @@ fn lend_cores(
         dag.least_deadline_ns() == dag.relative_deadline_ns()
             && !subtasks.any(Subtask::is_non_preemptive)
     };
-    let applies = settings.policy == Policy::StaticPriority
+    // It ranks DAGs, and no order that depends on releases does.
+    let applies = !settings.policy.adds_release()
         && settings.preemption == Preemption::Enabled
         && task_set.dags().iter().all(is_plain);
     if !applies {

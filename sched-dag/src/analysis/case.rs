@@ -9,14 +9,14 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::features::Features;
-use super::ranks::{PreemptionMix, RankRelation};
+use super::ranks::{InstanceOrder, PreemptionMix, RankRelation};
 use super::set::{EquationSet, constrained};
 use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
 use super::{AnalysisResult, AnalysisSettings, NotProvenReason};
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
-use crate::policy::{Policy, Preemption};
+use crate::policy::Preemption;
 use crate::task_set::{Dag, Subtask};
 
 /// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
@@ -87,9 +87,9 @@ impl<'a> AnalysisInput<'a> {
         relation: RankRelation,
         settings: &'a AnalysisSettings,
     ) -> Self {
-        let order = sorted_by_key(members.len(), |dag| match settings.policy {
-            Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
-            Policy::Edf => tasks[dag].relative_deadline_ns(),
+        let order = sorted_by_key(members.len(), |dag| match relation.order {
+            InstanceOrder::Ranked => relation.ranks(dag)[0].0,
+            _ => tasks[dag].relative_deadline_ns(),
         });
         let mut case = Self {
             all,
@@ -239,7 +239,7 @@ impl<'a> AnalysisInput<'a> {
         let is_pinned = self.is_pinned();
         self.set.keep_cores = !is_pinned && self.relation.preemption == PreemptionMix::None;
         self.set.deadlines_limit = !is_pinned
-            && self.settings.policy == Policy::Edf
+            && self.relation.order == InstanceOrder::ByDeadline
             && self.relation.preemption != PreemptionMix::Some
             && constrained(self.tasks, self.settings.cores);
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {

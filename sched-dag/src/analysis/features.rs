@@ -11,9 +11,9 @@ use alloc::vec::Vec;
 
 use super::AnalysisSettings;
 use super::overheads::Overheads;
-use super::ranks::{PreemptionMix, RankRelation};
+use super::ranks::{InstanceOrder, PreemptionMix, RankRelation};
 use super::workload::WorkloadBursts;
-use crate::policy::{Activation, Policy};
+use crate::policy::Activation;
 use crate::task_set::{Dag, Subtask};
 
 /// Some features.
@@ -33,10 +33,12 @@ macro_rules! features {
 }
 
 features! {
-    /// Static priorities: the same order for every job.
+    /// The same order for every job, as by static priorities.
     RANKED
     /// The earliest absolute deadline first.
     BY_DEADLINE
+    /// Any other order.
+    ANY_ORDER
     /// One core.
     ONE_CORE
     /// Several cores.
@@ -49,7 +51,7 @@ features! {
     SOME_KEEP
     /// Sinks have deadlines of their own, and the order depends on them.
     SINK_DEADLINES
-    /// Of two DAGs each may outrank the other, under static priorities.
+    /// Of two DAGs each may outrank the other, in the same order for every job.
     INTERLEAVED
     /// Cores are told apart: subtasks are pinned, or DAGs confined to groups of cores.
     PINS
@@ -109,17 +111,18 @@ impl Features {
         is_pinned: bool,
     ) -> Self {
         let AnalysisSettings {
-            policy,
-            // It is in the relation, with the subtasks' own.
+            // Both are in the relation, with what subtasks state.
+            policy: _,
             preemption: _,
             cores,
             overheads,
         } = settings;
-        let order = match policy {
-            Policy::StaticPriority => {
+        let order = match relation.order {
+            InstanceOrder::Ranked => {
                 Self::RANKED.and(Self::INTERLEAVED.if_so(relation.interleaves()))
             }
-            Policy::Edf => Self::BY_DEADLINE,
+            InstanceOrder::ByDeadline => Self::BY_DEADLINE,
+            InstanceOrder::Any => Self::ANY_ORDER,
         };
         let preemption = match relation.preemption {
             PreemptionMix::All => Self::PREEMPTION,

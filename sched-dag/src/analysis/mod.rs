@@ -97,7 +97,8 @@ use core::fmt;
 use core::time::Duration;
 
 use crate::ids::{DagId, SubtaskId};
-use crate::policy::{Policy, Preemption};
+use crate::policies::Policy;
+use crate::policy::Preemption;
 use crate::worded::texts;
 
 pub use assign::{AssignmentFailure, Federation, NotAssigned, assign, federated};
@@ -171,7 +172,7 @@ texts! {
         Edf = "multiple paths under global EDF";
         /// The multi-path bound of subtasks that keep their core.
         NonPreemptive = "multiple paths of non-preemptive subtasks";
-        /// Jobs that overlap, with either policy.
+        /// Jobs that overlap, in any order.
         Pipelined = "overlapping jobs";
         /// The multi-path bound in any work-conserving order: all other DAGs count in full.
         AnyOrder = "multiple paths in any work-conserving order";

@@ -1,24 +1,36 @@
 //! Which DAG may delay which: the relation that the policy makes between DAGs.
 //!
-//! It depends on the policy, on the priorities and on which subtasks can be preempted, not on
+//! It depends on the policy's numbers and on which subtasks can be preempted, not on
 //! any execution time; so it is known also for DAGs that cannot be analysed. A DAG *outranks*
 //! another if an instance of it may win a core over one of the other's, and *delays* it also
 //! where it merely keeps a core. `judge` says why each case is sound.
 
 use alloc::vec::Vec;
 
-use crate::policy::{Policy, Preemption};
-use crate::task_set::Dag;
+use crate::policies::Policy;
+use crate::policy::Preemption;
+use crate::task_set::{Dag, Subtask};
 
 /// The relation between the DAGs of a commit, by their positions.
 #[derive(Clone, Debug)]
 pub(super) struct RankRelation {
-    policy: Policy,
+    pub(super) order: InstanceOrder,
     pub(super) preemption: PreemptionMix,
-    /// Per DAG the most and the least urgent priority, as numbers.
-    priorities: Vec<(u32, u32)>,
-    /// Whether subtasks of one job may have different deadlines, under EDF.
+    /// Per DAG the policy's smallest and largest number.
+    numbers: Vec<[u64; 2]>,
+    /// Whether subtasks of one job may have different deadlines, and the order is by these.
     pub(super) ranks_sinks: bool,
+}
+
+/// The order of instances as far as proofs know it, whatever the policy is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum InstanceOrder {
+    /// By numbers that are the same for every job, as static priorities are.
+    Ranked,
+    /// By absolute deadlines.
+    ByDeadline,
+    /// By something else: what holds is what any work-conserving order gives.
+    Any,
 }
 
 /// Which subtasks can be preempted.
@@ -32,13 +44,26 @@ pub(super) enum PreemptionMix {
 impl RankRelation {
     /// Makes the relation between those that are at the positions `own`.
     pub(super) fn new(dags: &[Dag], own: &[usize], policy: Policy, preemption: Preemption) -> Self {
-        let has_sink_deadlines =
-            |&dag: &usize| dags[dag].least_deadline_ns() != dags[dag].relative_deadline_ns();
+        let mut own_dags = own.iter().map(|&dag| &dags[dag]);
+        let is_by_deadline = |dag: &Dag| {
+            let deadlines_ns = dag.subtasks().iter().map(Subtask::relative_deadline_ns);
+            deadlines_ns.eq(policy.numbers(dag))
+        };
+        let order = match policy.adds_release() {
+            false => InstanceOrder::Ranked,
+            true if own_dags.clone().all(is_by_deadline) => InstanceOrder::ByDeadline,
+            true => InstanceOrder::Any,
+        };
+        let has_sink_deadlines = |dag: &Dag| dag.least_deadline_ns() != dag.relative_deadline_ns();
+        let range = |dag| {
+            let numbers = policy.numbers(dag);
+            [numbers.iter().min(), numbers.iter().max()].map(|end| end.copied().unwrap_or(0))
+        };
         Self {
-            policy,
+            order,
             preemption: mixture(dags, own, preemption),
-            priorities: dags.iter().map(priority_range).collect(),
-            ranks_sinks: policy == Policy::Edf && own.iter().any(has_sink_deadlines),
+            numbers: dags.iter().map(range).collect(),
+            ranks_sinks: order == InstanceOrder::ByDeadline && own_dags.any(has_sink_deadlines),
         }
     }
 
@@ -46,7 +71,7 @@ impl RankRelation {
     /// these. The others still are on the machine: what can be preempted stays.
     pub(super) fn among(&self, members: &[usize]) -> Self {
         Self {
-            priorities: members.iter().map(|&dag| self.priorities[dag]).collect(),
+            numbers: members.iter().map(|&dag| self.numbers[dag]).collect(),
             ..*self
         }
     }
@@ -55,10 +80,9 @@ impl RankRelation {
     /// of `dag` waits for.
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
         other != dag
-            && match (self.policy, self.preemption) {
-                (Policy::Edf, _) | (_, PreemptionMix::Some) => true,
-                (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
-            }
+            && (self.order != InstanceOrder::Ranked
+                || self.preemption == PreemptionMix::Some
+                || self.ranks(other)[0] < self.ranks(dag)[1])
     }
 
     /// Reports whether `dag` may have to wait for `other`, be it only because
@@ -69,32 +93,26 @@ impl RankRelation {
 
     /// Reports whether of two DAGs each may outrank the other.
     pub(super) fn interleaves(&self) -> bool {
-        let all = 0..self.priorities.len();
+        let all = 0..self.numbers.len();
         let both = |a: usize, b: usize| self.may_outrank(a, b) && self.may_outrank(b, a);
         all.clone().any(|a| all.clone().any(|b| both(a, b)))
     }
 
-    /// Returns the most and the least urgent priority of a DAG among all; the smaller wins.
-    pub(super) fn ranks(&self, dag: usize) -> [(u32, usize); 2] {
-        let (most, least) = self.priorities[dag];
-        [(most, dag), (least, dag)]
+    /// Returns the smallest and the largest number of a DAG among all; the smaller wins.
+    pub(super) fn ranks(&self, dag: usize) -> [(u64, usize); 2] {
+        self.numbers[dag].map(|number| (number, dag))
     }
 
     /// Reports whether a younger job of a DAG may win over an older one.
     pub(super) fn younger_may_win(&self, dag: usize) -> bool {
-        let (most, least) = self.priorities[dag];
-        let unequal = match self.policy {
-            Policy::StaticPriority => most != least,
+        let unequal = match self.order {
+            InstanceOrder::Ranked => self.numbers[dag][0] != self.numbers[dag][1],
             // It may have a subtask that leads to a more urgent sink.
-            Policy::Edf => self.ranks_sinks,
+            InstanceOrder::ByDeadline => self.ranks_sinks,
+            InstanceOrder::Any => true,
         };
         unequal || self.preemption != PreemptionMix::All
     }
-}
-
-fn priority_range(dag: &Dag) -> (u32, u32) {
-    let numbers = || dag.subtasks().iter().map(|subtask| subtask.priority().0);
-    (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
 }
 
 fn mixture(dags: &[Dag], own: &[usize], preemption: Preemption) -> PreemptionMix {

@@ -6,14 +6,14 @@
 //! whose text says what it requires of each line, computes each term again from the others.
 //!
 //! ```text
-//! machine CORES POLICY OVERHEAD_NS            static or edf
+//! machine CORES ORDER OVERHEAD_NS             static: by the numbers of subtasks; edf: by deadlines; any
 //! bursts READY_NS LATE                        only if it takes time to make instances ready
 //! moves MOVE_NS                               likewise to move them, where subtasks are pinned
 //! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! queue WAITING                               of `bursts`, the most releases that wait for room: none, or
 //!                                             1 for each job in flight; without it any number
-//! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
+//! subtask WCET NUMBER KEEPS_ITS_CORE          (a WCET of 0 is an unknown one)
 //! edge FROM TO
 //! wait SUBTASK WCET LIMIT WCET ..             of segments and waits, likewise
 //! pin SUBTASK CORE                            of the cluster, counted from 0
@@ -64,12 +64,13 @@ use alloc::vec::Vec;
 use super::AnalysisSettings;
 use super::case::{AnalysisInput, of_cluster, with_case};
 use super::cover::{heaviest, peel};
+use super::ranks::InstanceOrder;
 use super::schedulability::{write_certificates, write_terms};
 use super::witness_text::WitnessText;
 use super::workload::waiting_rooms;
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
-use crate::policy::{Policy, Preemption};
+use crate::policy::Preemption;
 use crate::task_set::{Dag, Subtask, TaskSet};
 
 /// Writes a witness for the bounds that [`answer()`](super::answer()) gives; where the cores
@@ -134,13 +135,14 @@ impl WitnessText {
 
     fn machine(&mut self, place: Option<(u32, usize)>, case: &AnalysisInput<'_>) {
         let (settings, bursts) = (case.settings, &case.set.bursts);
-        let policy = match settings.policy {
-            Policy::StaticPriority => "static",
-            Policy::Edf => "edf",
+        let order = match case.relation.order {
+            InstanceOrder::Ranked => "static",
+            InstanceOrder::ByDeadline => "edf",
+            InstanceOrder::Any => "any",
         };
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
-        self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
+        self.line(format_args!("machine {cores} {order} {overhead_ns}"));
         if !bursts.are_none() {
             let ready_ns = settings.overheads.ready_ns;
             self.line(format_args!("bursts {ready_ns} {}", bursts.late_ns));
@@ -169,15 +171,16 @@ impl WitnessText {
             if let Some(waiting) = waiting_rooms(dag).filter(|_| !bursts.are_none()) {
                 self.line(format_args!("queue {waiting}"));
             }
-            for subtask in dag.subtasks() {
+            for (subtask, number) in dag.subtasks().iter().zip(settings.policy.numbers(dag)) {
                 let keeps =
                     subtask.is_non_preemptive() || settings.preemption == Preemption::Disabled;
-                let (wcet, priority) =
-                    (subtask.locking_wcet_ns().unwrap_or(0), subtask.priority().0);
-                self.line(format_args!(
-                    "subtask {wcet} {priority} {}",
-                    u8::from(keeps)
-                ));
+                let number = match case.relation.order {
+                    InstanceOrder::Ranked => number,
+                    // They tell nothing.
+                    _ => subtask.priority().0.into(),
+                };
+                let wcet = subtask.locking_wcet_ns().unwrap_or(0);
+                self.line(format_args!("subtask {wcet} {number} {}", u8::from(keeps)));
             }
             for (from, to) in edges {
                 self.line(format_args!("edge {from} {to}"));

@@ -32,7 +32,7 @@ use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, Parts, PendingRequests, Request, WaitLimit};
 use crate::placement::{NextWork, Placement};
-use crate::policy::SchedulerOptions;
+use crate::policies::SchedulerOptions;
 use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
 use crate::task_set::{Dag, TaskSet};
 

@@ -10,7 +10,7 @@ use crate::ids::{DagId, SubtaskId};
 use crate::kept::{FINEST, Journal};
 use crate::key::{DagKey, SubtaskKey};
 use crate::law::{self, JudgeOptions, RunRecord, RunTally, Violation};
-use crate::policy::SchedulerOptions;
+use crate::policies::SchedulerOptions;
 use crate::scheduler::{DagSnapshot, DagStatistics, Scheduler};
 use crate::task_set::TaskSet;
 

@@ -117,7 +117,8 @@ mod tests {
     use crate::ids::{CoreId, DagId, SubtaskId};
     use crate::law;
     use crate::law::dispatch::tests::dags;
-    use crate::policy::{Policy, Preemption, SchedulerOptions};
+    use crate::policies::{Policy, SchedulerOptions};
+    use crate::policy::Preemption;
 
     fn events(happened: &[(u64, EventKind, u32, u64)]) -> Vec<Event> {
         let event = |&(time_ns, what, dag, job): &(u64, EventKind, u32, u64)| Event {

@@ -26,7 +26,8 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
-use crate::policy::{Policy, Preemption, SchedulerOptions};
+use crate::policies::SchedulerOptions;
+use crate::policy::Preemption;
 use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
@@ -36,6 +37,8 @@ pub(super) type Key = (u64, Instance);
 pub(super) struct DispatchModel<'a> {
     pub(super) task_set: &'a TaskSet,
     pub(super) options: &'a SchedulerOptions,
+    /// By DAG and subtask the policy's number.
+    pub(super) numbers: Vec<Vec<u64>>,
     pub(super) cores: Range<u32>,
     /// The affinities of its DAGs, each once.
     pub(super) groups: Vec<&'a [u32]>,
@@ -53,23 +56,19 @@ pub(super) enum Place<'a> {
 }
 
 impl<'a> DispatchModel<'a> {
-    /// Returns an instance's place in the order of dispatch. Static priority: (priority, DAG,
-    /// job, subtask). EDF: the deadline instead, that of the most urgent sink that the subtask
-    /// reaches.
+    /// Returns an instance's place in the order of dispatch: (the policy's number, with the job's
+    /// release if that is added, DAG, job, subtask).
     pub(super) fn key(&self, instance: Instance) -> Key {
         let Instance { dag, job, subtask } = instance;
         let model = self.task_set.dag(dag);
-        let urgency = match self.options.policy {
-            Policy::StaticPriority => model.subtask(subtask).priority().0.into(),
-            Policy::Edf => {
-                let due_ns = self.due_ns.get(&(dag, job)).copied();
-                // A sporadic job whose signal is lost has the least urgent key: it is blamed for
-                // nothing.
-                let release_ns = model.release_ns(job, due_ns.unwrap_or(u64::MAX));
-                release_ns.saturating_add(model.subtask(subtask).relative_deadline_ns())
-            }
-        };
-        (urgency, instance)
+        let number = self.numbers[dag.index()][subtask.index()];
+        if !self.options.policy.adds_release() {
+            return (number, instance);
+        }
+        let due_ns = self.due_ns.get(&(dag, job)).copied();
+        // A sporadic job whose signal is lost has the least urgent key: it is blamed for nothing.
+        let release_ns = model.release_ns(job, due_ns.unwrap_or(u64::MAX));
+        (release_ns.saturating_add(number), instance)
     }
 
     /// Returns the cores that may execute an instance.

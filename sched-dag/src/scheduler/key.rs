@@ -4,25 +4,24 @@
 //! its job's release, and the same in every comparison, whether the instances
 //! wait or run. No two are equal.
 //!
-//! R5 orders by (priority or absolute deadline, DAG, job, subtask). All of that
-//! is one number here, so that one comparison does it. Its low 32 bits are the
+//! R5 orders by (the policy's number, with the job's release if that is added, DAG, job,
+//! subtask). All of that is one number here, so that one comparison does it. Its low 32 bits are the
 //! vertex, which counts subtasks DAG by DAG; what is above depends on the
 //! [`KeyOrder`]:
 //!
 //! | order | 127..96 | 95..64 | 63..32 |
 //! |---|---|---|---|
-//! | `Rank` | rank of (priority, DAG, subtask) | 0 | 0 |
-//! | `Job` | rank of (priority, DAG) | sequence number | of the job |
-//! | `Deadline` | absolute | deadline | slot |
-//! | `SinkDeadline` | absolute | deadline | rank of (DAG, relative deadline) |
+//! | `Rank` | rank of (number, DAG, subtask) | 0 | 0 |
+//! | `Job` | rank of (number, DAG) | sequence number | of the job |
+//! | `Release` | release and | number | slot |
+//! | `Sum` | release and | number | rank of (DAG, number) |
 //!
-//! Two jobs of one DAG have different deadlines, since it has a period, and a
-//! slot is of one DAG and counts DAG by DAG; so (deadline, slot, vertex) is the
-//! order of (deadline, DAG, job, subtask). Where sinks have deadlines of their own, two
-//! jobs of a DAG may have an absolute deadline in common: the older one by the longer
-//! relative deadline. So there the longer one has the smaller rank.
+//! Two jobs of one DAG have different releases, since it has a period, and a
+//! slot is of one DAG and counts DAG by DAG; so, if all of a DAG have one number, (sum, slot,
+//! vertex) is the order of (sum, DAG, job, subtask). Otherwise two
+//! jobs of a DAG may have a sum in common: the older one by the larger
+//! number. So there the larger one has the smaller rank.
 
-use super::jobs::Job;
 use super::vertices::Vertex;
 
 /// The parts of which keys are made.
@@ -32,10 +31,10 @@ pub(super) enum KeyOrder {
     Rank,
     /// Subtasks of one DAG may have the same rank; then the older job is first.
     Job,
-    /// The earlier absolute deadline is first, and all subtasks of a job have the same.
-    Deadline,
-    /// The same, and sinks have deadlines of their own.
-    SinkDeadline,
+    /// The smaller sum of release and number is first, and all subtasks of a DAG have one number.
+    Release,
+    /// The same, and they have several.
+    Sum,
 }
 
 /// An instance's place in the order of dispatch; the smaller key goes first.
@@ -56,13 +55,6 @@ impl DispatchKey {
     pub(super) fn by_job(number: u32, vertex: &Vertex) -> Self {
         let [high, low] = halves(vertex.progress);
         Self::of_parts(u64::from(vertex.rank) << 32 | u64::from(high), low, number)
-    }
-
-    /// Makes the key of a vertex's instance of a job under the order `SinkDeadline`, from
-    /// the relative deadline of its rank.
-    pub(super) fn by_sink(deadline_ns: u64, number: u32, vertex: &Vertex, job: &Job) -> Self {
-        let deadline_ns = job.release_ns + deadline_ns;
-        Self::of_parts(deadline_ns, vertex.rank, number)
     }
 
     #[inline]
@@ -103,7 +95,7 @@ impl DispatchKey {
         Self(before << 32 | vertex as u128)
     }
 
-    /// Returns the slot, under the order `Deadline`.
+    /// Returns the slot, under the order `Release`.
     #[inline]
     pub(super) const fn slot(self) -> usize {
         low(self.0 >> 32) as usize

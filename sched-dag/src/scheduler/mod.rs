@@ -59,7 +59,7 @@ use core::ops::Range;
 
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
 use crate::journal::EventKind;
-use crate::policy::SchedulerOptions;
+use crate::policies::SchedulerOptions;
 use crate::scheduler::dispatch::CoreTable;
 use crate::scheduler::jobs::JobTable;
 use crate::scheduler::phase::SurvivedFaults;
@@ -166,7 +166,7 @@ impl Scheduler {
                 // Also those of other clusters' DAGs: so a slot's number is the same in all
                 // clusters' keys.
                 slots += dag.slots();
-                let mut jobs = JobTable::new(dag, first_slot);
+                let mut jobs = JobTable::new(dag, options.policy, first_slot);
                 // Ended from the beginning on, they never come into the timers or the queue.
                 if cluster != dag.cluster() {
                     jobs.end_all();

@@ -45,7 +45,7 @@ use super::key::DispatchKey;
 use super::ready_queue::ReadyQueue;
 use super::vertices::{LineId, Vertex, VertexTable};
 use crate::ids::{ClusterId, CoreId, DagId};
-use crate::policy::SchedulerOptions;
+use crate::policies::SchedulerOptions;
 use crate::task_set::{Dag, TaskSet};
 
 /// The line of the cluster, and those of its cores and groups.

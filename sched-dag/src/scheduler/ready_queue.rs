@@ -10,13 +10,14 @@
 //!
 //! # The rest
 //!
-//! Under static priority the order of all instances that can ever wait together
+//! If the policy adds no release, the order of all instances that can ever wait together
 //! is mostly known at commit: then each subtask has a *rank*, and the rest is a
 //! set of bits, which costs the same however many wait; up to 64 subtasks are bits of
 //! one word, which is at hand without any call. That holds unless two
-//! subtasks of one DAG share a priority and jobs of that DAG overlap, because
-//! then the job comes before the subtask. In that case the rest is a heap. Under
-//! EDF it is a heap of jobs or, where sinks have deadlines of their own, of instances.
+//! subtasks of one DAG share a number and jobs of that DAG overlap, because
+//! then the job comes before the subtask. In that case the rest is a heap. If the policy
+//! adds the release it is a heap of jobs or, where subtasks of one DAG have different numbers, of
+//! instances.
 //!
 //! # The heap of items that are known by index
 //!
@@ -27,10 +28,10 @@
 //! moves is written once, where it ends (LaMarca and Ladner, Journal of Experimental
 //! Algorithmics 1, 1996). All memory is taken when the heap is made.
 //!
-//! # By deadline
+//! # The heap of jobs
 //!
-//! All instances of a job have the deadline of the job. So it is jobs that are put
-//! in order, by a heap, and each has a set of bits for its subtasks: a job with a
+//! Where all instances of a job have the same sum, as under EDF with one deadline, it is jobs that
+//! are put in order, by a heap, and each has a set of bits for its subtasks: a job with a
 //! hundred ready subtasks is one entry of the heap, not a hundred.
 
 use alloc::boxed::Box;
@@ -41,9 +42,9 @@ use super::bits::BitSet;
 use super::jobs::Job;
 use super::key::{DispatchKey, KeyOrder};
 use super::vertices::{Vertex, VertexTable};
-use crate::ids::{DagId, SubtaskId, to_u32};
+use crate::ids::{DagId, to_u32};
 use crate::order::{sorted, sorted_by_key};
-use crate::policy::Policy;
+use crate::policies::Policy;
 use crate::task_set::{Dag, TaskSet};
 
 /// The instances in line. At most one of a vertex waits at a time.
@@ -54,8 +55,8 @@ pub(super) struct ReadyQueue {
     /// How many are in the rest.
     others: u32,
     order: KeyOrder,
-    /// Under `SinkDeadline` the relative deadline of each rank, else nothing.
-    deadlines_ns: Box<[u64]>,
+    /// Under `Sum` the policy's number of each vertex, else nothing.
+    numbers_ns: Box<[u64]>,
     rest: QueueStorage,
 }
 
@@ -77,8 +78,8 @@ enum QueueStorage {
         /// The key of each rank.
         keys: Box<[DispatchKey]>,
     },
-    /// For keys that begin with a deadline.
-    ByDeadline(ByDeadline),
+    /// For keys that begin with what all of a job have.
+    OfJobs(JobHeap),
     /// For any keys, by vertex.
     Keyed(IndexedHeap<DispatchKey>),
 }
@@ -88,27 +89,35 @@ impl ReadyQueue {
     #[inline]
     pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut VertexTable) -> Self {
         let in_any_order = |count| QueueStorage::Keyed(IndexedHeap::new(count));
-        if policy == Policy::Edf {
-            if task_set
-                .dags()
-                .iter()
-                .all(|dag| deadlines_ns(dag).len() == 1)
-            {
-                let rest = QueueStorage::ByDeadline(ByDeadline::new(task_set));
-                return Self::of(KeyOrder::Deadline, rest);
+        let numbers = task_set.dags().iter().map(|dag| policy.numbers(dag));
+        let numbers: Vec<Vec<u64>> = numbers.collect();
+        let mut dags = task_set.dags().iter().zip(&numbers);
+        let of_vertices = numbers.concat();
+        if policy.adds_release() {
+            if dags.all(|(_, numbers)| numbers.iter().all(|number| *number == numbers[0])) {
+                return Self::of(
+                    KeyOrder::Release,
+                    QueueStorage::OfJobs(JobHeap::new(task_set)),
+                );
             }
+            // Of two jobs of a DAG with the same sum the older one has the larger number.
+            let of_dag = |dag: DagId, number: u64| u128::from(dag.0) << 64 | u128::from(!number);
+            let keys = (0..).zip(&of_vertices);
+            let keys = keys.map(|(vertex, number)| of_dag(vertices.get(vertex).dag, *number));
+            rank(&keys.collect::<Vec<_>>(), vertices, KeyOrder::Sum);
             return Self {
-                deadlines_ns: rank_by_deadline(task_set, vertices).into(),
-                ..Self::of(KeyOrder::SinkDeadline, in_any_order(vertices.len()))
+                numbers_ns: of_vertices.into(),
+                ..Self::of(KeyOrder::Sum, in_any_order(vertices.len()))
             };
         }
+        let keys: Vec<u128> = of_vertices.into_iter().map(u128::from).collect();
         // Then no key needs its job: the whole order is known at the commit.
-        if task_set.dags().iter().all(has_ranks) {
-            let order = rank(vertices, KeyOrder::Rank);
+        if dags.all(|(dag, numbers)| has_ranks(dag, numbers)) {
+            let order = rank(&keys, vertices, KeyOrder::Rank);
             return Self::of(KeyOrder::Rank, ranked(&order));
         }
-        // The rank stands for (priority, DAG), so that the job's number can follow it in the key.
-        rank(vertices, KeyOrder::Job);
+        // The rank stands for (number, DAG), so that the job's number can follow it in the key.
+        rank(&keys, vertices, KeyOrder::Job);
         Self::of(KeyOrder::Job, in_any_order(vertices.len()))
     }
 
@@ -123,7 +132,7 @@ impl ReadyQueue {
             front: DispatchKey::NONE,
             others: 0,
             order,
-            deadlines_ns: Box::default(),
+            numbers_ns: Box::default(),
             rest,
         }
     }
@@ -141,8 +150,8 @@ impl ReadyQueue {
             return DispatchKey::of_rank(vertex.rank, number);
         }
         let job = job();
-        if self.order == KeyOrder::Deadline {
-            return DispatchKey::of_parts(job.deadline_ns, job.slot, number);
+        if self.order == KeyOrder::Release {
+            return DispatchKey::of_parts(job.sum_ns, job.slot, number);
         }
         self.rare_key(number, vertex, job)
     }
@@ -151,9 +160,9 @@ impl ReadyQueue {
     #[inline(never)]
     fn rare_key(&self, number: u32, vertex: &Vertex, job: &Job) -> DispatchKey {
         match self.order {
-            KeyOrder::SinkDeadline => {
-                let deadline_ns = self.deadlines_ns[vertex.rank as usize];
-                DispatchKey::by_sink(deadline_ns, number, vertex, job)
+            KeyOrder::Sum => {
+                let sum_ns = job.release_ns + self.numbers_ns[number as usize];
+                DispatchKey::of_parts(sum_ns, vertex.rank, number)
             }
             _ => DispatchKey::by_job(number, vertex),
         }
@@ -240,7 +249,7 @@ impl QueueStorage {
                 Some(DispatchKey::of_rank(rank, *vertex))
             }
             Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
-            Self::ByDeadline(jobs) => jobs.peek(),
+            Self::OfJobs(jobs) => jobs.peek(),
             Self::Keyed(heap) => heap.peek().map(|(key, _)| key),
         }
     }
@@ -260,7 +269,7 @@ impl QueueStorage {
         match self {
             Self::Word { .. } => {}
             Self::Ranked { ranks, .. } => ranks.insert(key.rank()),
-            Self::ByDeadline(jobs) => jobs.insert(key),
+            Self::OfJobs(jobs) => jobs.insert(key),
             Self::Keyed(heap) => heap.set(key.vertex() as usize, key),
         }
     }
@@ -270,7 +279,7 @@ impl QueueStorage {
         match self {
             Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
             Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
-            Self::ByDeadline(jobs) => jobs.remove(key),
+            Self::OfJobs(jobs) => jobs.remove(key),
             Self::Keyed(heap) => heap.remove(key.vertex() as usize),
         }
     }
@@ -295,7 +304,7 @@ impl QueueStorage {
         let first = match self {
             Self::Word { .. } => None,
             Self::Ranked { ranks, keys } => ranks.pop().map(|rank| keys[rank]),
-            Self::ByDeadline(jobs) => jobs.pop(),
+            Self::OfJobs(jobs) => jobs.pop(),
             Self::Keyed(heap) => heap.pop().map(|(key, _)| key),
         };
         first.expect("as many are in line as were counted")
@@ -323,26 +332,22 @@ fn ranked(order: &[u32]) -> QueueStorage {
 
 /// Reports whether the subtasks of a DAG, as far as they wait together, are in
 /// the same order whatever jobs they do.
-fn has_ranks(dag: &Dag) -> bool {
-    let priorities: Vec<_> = dag.subtasks().iter().map(|s| s.priority().0).collect();
-    let priorities = sorted(&priorities);
-    dag.in_flight() == 1 || priorities.windows(2).all(|pair| pair[0] != pair[1])
+fn has_ranks(dag: &Dag, numbers: &[u64]) -> bool {
+    dag.in_flight() == 1 || (sorted(numbers).windows(2)).all(|pair| pair[0] != pair[1])
 }
 
-/// Replaces each vertex's priority by its place in the order of (priority, DAG,
-/// subtask), or of (priority, DAG) if the job comes next; returns the vertices in
-/// that order.
-fn rank(vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
+/// Gives each vertex its place in the order of (key, DAG, subtask), or of (key, DAG) if something
+/// of the job comes next; returns the vertices in that order.
+fn rank(keys: &[u128], vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
     // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
-    let urgency = |vertex| vertices.get(to_u32(vertex)).rank;
-    let order = sorted_by_key(vertices.len(), urgency);
+    let order = sorted_by_key(keys.len(), |vertex| keys[vertex]);
     let order: Vec<u32> = order.into_iter().map(to_u32).collect();
     let mut rank = 0;
     let mut last = None;
     for &number in &order {
         let vertex = vertices.get_mut(number);
-        // Under `Job` equals share a rank, and the job's number decides between them.
-        let group = (vertex.rank, vertex.dag);
+        // Otherwise equals share a rank, and the job decides between them.
+        let group = (keys[number as usize], vertex.dag);
         if last.is_some_and(|last| kind == KeyOrder::Rank || last != group) {
             rank += 1;
         }
@@ -350,34 +355,6 @@ fn rank(vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
         vertex.rank = rank;
     }
     order
-}
-
-/// Replaces each vertex's priority by its place in the order of (DAG, relative deadline,
-/// the longest first), and returns the relative deadline of each place.
-fn rank_by_deadline(task_set: &TaskSet, vertices: &mut VertexTable) -> Vec<u64> {
-    let mut of_ranks = Vec::new();
-    for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
-        let first = task_set.first_vertex(id);
-        let of_dag = deadlines_ns(dag);
-        for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
-            let own_ns = attributes.relative_deadline_ns();
-            // The longest deadline has the smallest rank: of two jobs with one absolute deadline
-            // the older one has the longer.
-            let longer = of_dag.partition_point(|&longer_ns| longer_ns > own_ns);
-            vertices.get_mut(first + subtask.0).rank = to_u32(of_ranks.len() + longer);
-        }
-        of_ranks.extend(of_dag);
-    }
-    of_ranks
-}
-
-/// Returns the relative deadlines of a DAG's subtasks, each once, the longest first.
-fn deadlines_ns(dag: &Dag) -> Vec<u64> {
-    let of_subtasks = dag.subtasks().iter().map(|of| of.relative_deadline_ns());
-    let mut deadlines_ns = sorted(&of_subtasks.collect::<Vec<_>>());
-    deadlines_ns.dedup();
-    deadlines_ns.reverse();
-    deadlines_ns
 }
 
 /// How many entries stand below each.
@@ -543,9 +520,9 @@ fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
     Some(least)
 }
 
-/// Instances by the absolute deadline, then by the slot of the job, then by vertex.
+/// Instances by what all of a job have, then by the slot of the job, then by vertex.
 #[derive(Clone, Debug, Hash)]
-struct ByDeadline {
+struct JobHeap {
     /// The part before the vertex in the keys of the jobs that have ready instances, by slot.
     jobs: IndexedHeap<u128>,
     /// By slot.
@@ -561,7 +538,7 @@ struct JobQueue {
     subtasks: BitSet,
 }
 
-impl ByDeadline {
+impl JobHeap {
     #[inline]
     pub(super) fn new(task_set: &TaskSet) -> Self {
         let mut lines = Vec::new();

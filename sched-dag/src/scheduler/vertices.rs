@@ -89,8 +89,7 @@ pub(super) struct Vertex {
     pub(super) progress: u64,
     /// The number of the job that it is doing.
     pub(super) job: u64,
-    /// Its order under static priority: first the priority itself, later the
-    /// [`ReadyQueue`](super::ready_queue::ReadyQueue)'s rank.
+    /// The rank that the [`ReadyQueue`](super::ready_queue::ReadyQueue) gives it, if keys have one.
     pub(super) rank: u32,
     pub(super) dag: DagId,
     pub(super) subtask: SubtaskId,
@@ -144,7 +143,7 @@ impl VertexTable {
                     phase: InstancePhase::Absent,
                     progress: 0,
                     job: 0,
-                    rank: attributes.priority().0,
+                    rank: 0,
                     dag: id,
                     subtask,
                     is_preemptible: preemption == Preemption::Enabled

@@ -13,7 +13,7 @@ use super::names::Interner;
 use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
-use crate::policy::{OnFault, Policy, Priority};
+use crate::policy::{OnFault, Priority};
 use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
 /// Checks the attributes of the whole commit.
@@ -34,11 +34,11 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
         check_counts(page);
         check_times(page);
         check_subtasks(page);
-        if options.policy == Policy::StaticPriority {
+        if options.policy.reads_priorities() {
             check_priorities_given(page);
         }
     }
-    if options.policy == Policy::StaticPriority {
+    if options.policy.reads_priorities() {
         warn_of_equal_priorities(findings);
     }
     check_clusters(options, findings);

@@ -25,7 +25,8 @@ use core::borrow::Borrow;
 use core::fmt;
 
 use crate::order::sorted_by_key;
-use crate::policy::{CoreDivision, Policy};
+use crate::policies::Policy;
+use crate::policy::CoreDivision;
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 

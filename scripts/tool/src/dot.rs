@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use recording::{CommittedDag, CommittedSubtask};
+use sched_dag::Policy;
 
 use crate::output::briefly;
 use crate::record::Committed;
@@ -137,8 +138,8 @@ impl Dag<'_> {
                 label += &segment_ns.map_or(String::new(), |ns| format!(", then {}", briefly(ns)));
             }
         }
-        // Under EDF the priority has no effect.
-        if !self.commit.told.is_edf {
+        // Under other policies it has no effect.
+        if self.commit.options().policy == Policy::StaticPriority {
             label += &format!("\npriority {}", subtask.priority);
         }
         for &(dag, of, core) in &self.commit.told.pins {
@@ -213,6 +214,7 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use recording::{Commit, CommittedTopic};
+    use sched_dag::Policy;
 
     use super::{quoted, text, without_paths};
     use crate::made::commit;
@@ -222,7 +224,7 @@ mod tests {
     const EYE: &str = "static 2
 eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2";
 
-    fn committed(is_edf: bool) -> Record {
+    fn committed(policy: Policy) -> Record {
         let mut told = commit(EYE);
         let eye = &mut told.dags[0];
         eye.jobs = Some(20);
@@ -247,7 +249,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
         eye.samples = vec![(0, 0, 0, Some(12_000_000)), (2, 0, 0, None)];
         let waits = vec![(0, 0, 3_000_000, Some(400_000)), (0, 2, 0, None)];
         let told = Commit {
-            is_edf,
+            policy: policy as u8,
             waits,
             pins: vec![(0, 1, 1)],
             affinities: vec![(0, 0)],
@@ -283,12 +285,12 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
     /// `tests/tests/boots/seeing.rs` shows samples of other DAGs.
     #[test]
     fn a_dag_is_a_cluster_with_all_that_was_committed() {
-        let dot = text(&committed(false)).expect("a commit");
+        let dot = text(&committed(Policy::StaticPriority)).expect("a commit");
         let (head, _) = dot.split_once("  subgraph").expect("a cluster");
         assert!(head.starts_with("digraph committed {\n"));
         assert_eq!(&dot[head.len()..], format!("{DRAWN}}}\n"));
         // Under EDF no priority is shown.
-        let dot = text(&committed(true)).expect("a commit");
+        let dot = text(&committed(Policy::Edf)).expect("a commit");
         assert!(!dot.contains("priority"), "{dot}");
         let nothing = text(&Record::default()).unwrap_err();
         assert_eq!(nothing, "the guest has committed no DAG");

@@ -1,5 +1,7 @@
 //! The options of `run`: the one table behind its parser and its help text.
 
+use sched_dag::Policy;
+
 use crate::options::{Command, Name, Takes, options};
 use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 
@@ -74,8 +76,8 @@ options! {
     MECHANISM: Takes::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
     /// On debian: so many programs next to it.
     BUSY: Takes::Number(0, 64);
-    /// Fixed priorities, or by deadline.
-    POLICY in "rules": Takes::OneOf(&["static", "edf"]);
+    /// The order of instances; see docs/guide.md.
+    POLICY in "rules": Takes::OneOf(Policy::WORDS);
     /// Whether instances may lose their cores.
     PREEMPTION: Takes::OneOf(&["on", "off"]);
     /// Sizes of clusters of cores: N,N,... or auto.

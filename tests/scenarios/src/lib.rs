@@ -25,7 +25,7 @@
 //! | `scenario TITLE` | begins one |
 //! | `cores N` | on so many; 1 if not said |
 //! | `clusters N,N` | which are divided so |
-//! | `policy edf` | instead of static priorities |
+//! | `policy WORD` | instead of static priorities |
 //! | `preemption off` | nobody loses its core |
 //! | `mode NAME DAG DAG` | a mode, in which these DAGs run |
 //! | `dag NAME WORDS` | a DAG, see [`dag::DagText`] |
@@ -214,7 +214,9 @@ impl Scenario {
                 self.clusters = sizes.collect::<Result<_, _>>()?;
                 self.cores = self.clusters.iter().sum();
             }
-            ("policy", "edf") => self.policy = fass::Policy::Edf,
+            ("policy", word) => {
+                self.policy = fass::Policy::of_word(word).ok_or("there is no such policy")?;
+            }
             ("preemption", "off") => self.preemption = fass::Preemption::Disabled,
             ("mode", _) => {
                 let (name, dags) = rest.split_once(' ').unwrap_or((rest, ""));

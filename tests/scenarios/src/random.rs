@@ -56,10 +56,8 @@ impl Scenario {
     #[must_use]
     pub fn random(seed: u64, round: u64, cores: u32, length: Duration) -> Self {
         let random = &mut Random::new(nth(seed, round));
-        let (policy, name) = match random.once_in(2) {
-            true => (Policy::Edf, "edf"),
-            false => (Policy::StaticPriority, "static"),
-        };
+        let policy = random.one_of(&Policy::ALL);
+        let name = policy.word();
         let (load, computes) = (random.within(60..=140), random.once_in(8));
         let sizes = random.within(3..=8);
         let sizes: Vec<u64> = (0..sizes).map(|_| random.within(3..=12)).collect();

@@ -12,8 +12,6 @@ use fass::{Policy, Preemption};
 
 use crate::options::{CommandLine, UsageError};
 
-const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
-
 const PREEMPTIONS: [(&str, Preemption); 2] =
     [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
@@ -34,8 +32,9 @@ impl RunTerms {
         let levels = [Some(Info), None, Some(Error), Some(Warn), Some(Debug)];
         let levels = levels.map(|most| (most.map_or("off", Level::word), most));
         set_level(options.choice("log", &levels)?);
+        let policies = Policy::ALL.map(|policy| (policy.word(), policy));
         Ok(Self {
-            policy: options.choice("policy", &POLICIES)?,
+            policy: options.choice("policy", &policies)?,
             preemption: options.choice("preemption", &PREEMPTIONS)?,
             budget_factor: options.number("budget_factor", 0..=1_000_000, 10)?,
             overheads: overheads(options)?,

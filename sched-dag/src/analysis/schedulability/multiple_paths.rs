@@ -14,6 +14,7 @@
 //!   counts as soon as the first of its deadlines is no later.
 //! - *No preemption at all.* Lower-ranked subtasks block besides; those of
 //!   DAGs that count in full are counted already.
+//! - *Any other order.* Every other DAG counts in full.
 //! - *Preemption for some subtasks and not for others.* A subtask preempted
 //!   again and again may find other non-preemptible ones each time, which the
 //!   blocking term does not cover. Then every other DAG counts in full, in
@@ -52,13 +53,12 @@ use crate::analysis::cover::covering;
 use crate::analysis::features::covers;
 use crate::analysis::interference::{DelaySources, InterferingDag};
 use crate::analysis::pipelined::{PipelineTerms, SolverFailure};
-use crate::analysis::ranks::PreemptionMix;
+use crate::analysis::ranks::{InstanceOrder, PreemptionMix};
 use crate::analysis::set::BoundFailure;
 use crate::analysis::waiting::reserved;
 use crate::analysis::witness_text::WitnessText;
 use crate::analysis::{NotProvenReason, SchedulabilityTest};
 use crate::ids::to_u32;
-use crate::policy::Policy;
 
 pub(super) const TEST: BoundTest = BoundTest {
     names: &[
@@ -71,8 +71,8 @@ pub(super) const TEST: BoundTest = BoundTest {
         SchedulabilityTest::BesidePins,
     ],
     covers: covers!(
-        RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES INTERLEAVED
-        PINS WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
+        RANKED BY_DEADLINE ANY_ORDER ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES
+        INTERLEAVED PINS WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
     ),
     jobs,
     ..BoundTest::NONE
@@ -114,11 +114,11 @@ fn form(case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) -> SchedulabilityTe
     } else if case.is_alone(dag) {
         SchedulabilityTest::Alone
     } else {
-        match (case.relation.preemption, case.settings.policy) {
-            (PreemptionMix::Some, _) => SchedulabilityTest::AnyOrder,
+        match (case.relation.preemption, case.relation.order) {
+            (PreemptionMix::Some, _) | (_, InstanceOrder::Any) => SchedulabilityTest::AnyOrder,
             (PreemptionMix::None, _) => SchedulabilityTest::NonPreemptive,
-            (PreemptionMix::All, Policy::StaticPriority) => SchedulabilityTest::FixedPriority,
-            (PreemptionMix::All, Policy::Edf) => SchedulabilityTest::Edf,
+            (PreemptionMix::All, InstanceOrder::Ranked) => SchedulabilityTest::FixedPriority,
+            (PreemptionMix::All, InstanceOrder::ByDeadline) => SchedulabilityTest::Edf,
         }
     }
 }

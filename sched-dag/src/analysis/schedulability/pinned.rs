@@ -31,8 +31,8 @@ use crate::task_set::Subtask;
 pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::Owner, SchedulabilityTest::Member],
     covers: covers!(
-        RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION SINK_DEADLINES INTERLEAVED PINS OVERHEADS
-        BURSTS SPORADIC
+        RANKED BY_DEADLINE ANY_ORDER ONE_CORE CORES PREEMPTION SINK_DEADLINES INTERLEAVED PINS
+        OVERHEADS BURSTS SPORADIC
     ),
     jobs,
     sinks,

@@ -40,11 +40,11 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
 
 fn by_priorities(case: &AnalysisInput<'_>, dag: usize) -> Option<u64> {
     let (task, cores) = (case.tasks[dag], case.settings.cores);
-    let subtasks = case.dag(dag).subtasks();
-    if subtasks.len() > SUBTASK_LIMIT || !case.is_alone(dag) {
+    let numbers = case.settings.policy.numbers(case.dag(dag));
+    if numbers.len() > SUBTASK_LIMIT || !case.is_alone(dag) {
         return None;
     }
-    let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
+    let order = sorted_by_key(numbers.len(), |subtask| numbers[subtask]);
     let others = multi_path::alone(task, &case.set.shapes[dag].left, cores, Rounding::Up)?;
     let limit = task.relative_deadline_ns().min(task.period_ns());
     let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);

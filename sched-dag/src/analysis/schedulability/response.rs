@@ -110,7 +110,7 @@ struct DagDemand {
     /// The longest response time that is of use.
     limit_ns: u64,
     /// Its most and its least urgent priority; each wins over the larger ones.
-    priorities: [(u32, usize); 2],
+    priorities: [(u64, usize); 2],
     /// The largest WCET of those that keep the core, or 0.
     keeps_ns: u64,
 }

@@ -6,9 +6,9 @@
 //!
 //! - Of the job itself only subtasks count that may win over an ancestor. If all can be
 //!   preempted these are, under EDF, those that reach a sink whose deadline is no later
-//!   (all ancestors have deadlines no later than the sink's); under static priority,
-//!   those that are not less urgent than the least urgent ancestor. If not all can be
-//!   preempted, all count.
+//!   (all ancestors have deadlines no later than the sink's); in an order that is the same for
+//!   every job, those that are not less urgent than the least urgent ancestor. If not all can be
+//!   preempted, or in any other order, all count.
 //! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. What is
 //!   due later and keeps its core may block.
 //!
@@ -26,16 +26,15 @@ use crate::analysis::case::AnalysisInput;
 use crate::analysis::features::covers;
 use crate::analysis::interference::DelaySources;
 use crate::analysis::pipelined::{PipelineTerms, STEP_LIMIT};
-use crate::analysis::ranks::PreemptionMix;
+use crate::analysis::ranks::{InstanceOrder, PreemptionMix};
 use crate::analysis::witness_text::WitnessText;
 use crate::ids::SubtaskId;
 use crate::order::sorted_by_key;
-use crate::policy::Policy;
 
 pub(super) const TEST: BoundTest = BoundTest {
     covers: covers!(
-        RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES INTERLEAVED
-        LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
+        RANKED BY_DEADLINE ANY_ORDER ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES
+        INTERLEAVED LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
     ),
     sinks,
     ..BoundTest::NONE
@@ -106,14 +105,10 @@ fn equations<'a>(
 
 fn reaches(case: &AnalysisInput<'_>, dag: usize) -> Vec<SinkPath> {
     let (task, model) = (case.tasks[dag], case.dag(dag));
-    let subtasks = model.subtasks();
-    // The smaller number wins, in both.
-    let urgency = |subtask: usize| match case.settings.policy {
-        Policy::StaticPriority => u64::from(subtasks[subtask].priority().0),
-        Policy::Edf => subtasks[subtask].relative_deadline_ns(),
-    };
-    // The largest number among the ancestors.
-    let mut least_urgent: Vec<u64> = (0..subtasks.len()).map(urgency).collect();
+    // The smaller one wins.
+    let numbers = case.settings.policy.numbers(model);
+    // The largest one among the ancestors.
+    let mut least_urgent = numbers.clone();
     for subtask in task.topological_order() {
         for next in task.successors(subtask) {
             least_urgent[next] = least_urgent[next].max(least_urgent[subtask]);
@@ -121,7 +116,7 @@ fn reaches(case: &AnalysisInput<'_>, dag: usize) -> Vec<SinkPath> {
     }
     // By urgency, with the sums of WCETs: a look at all subtasks for each sink takes as long
     // as the square of a large DAG's size.
-    let order = sorted_by_key(subtasks.len(), urgency);
+    let order = sorted_by_key(numbers.len(), |subtask| numbers[subtask]);
     let mut sums_ns = vec![0];
     for &subtask in &order {
         sums_ns.push(sums_ns[sums_ns.len() - 1] + task.wcets_ns()[subtask]);
@@ -129,9 +124,11 @@ fn reaches(case: &AnalysisInput<'_>, dag: usize) -> Vec<SinkPath> {
     let finishes_ns = task.finishes_ns();
     let reach = model.sinks().iter().map(|sink| {
         let least = least_urgent[sink.index()];
-        let counted = match case.relation.preemption {
-            PreemptionMix::All => order.partition_point(|&subtask| urgency(subtask) <= least),
-            PreemptionMix::None | PreemptionMix::Some => order.len(),
+        let is_known = case.relation.preemption == PreemptionMix::All
+            && case.relation.order != InstanceOrder::Any;
+        let counted = match is_known {
+            true => order.partition_point(|&subtask| numbers[subtask] <= least),
+            false => order.len(),
         };
         SinkPath {
             length_ns: finishes_ns[sink.index()],

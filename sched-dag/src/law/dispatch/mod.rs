@@ -9,7 +9,8 @@ use super::sweep::{DispatchModel, DispatchState, DispatchSweep, Place, WaitCount
 use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
-use crate::policy::{OnFault, SchedulerOptions};
+use crate::policies::SchedulerOptions;
+use crate::policy::OnFault;
 use crate::task_set::{Dag, TaskSet};
 
 /// The findings about R5 in a journal.
@@ -49,6 +50,9 @@ pub fn judge_dispatch(
         let mut model = DispatchModel {
             task_set,
             options,
+            numbers: (task_set.dags().iter())
+                .map(|dag| options.policy.numbers(dag))
+                .collect(),
             cores: task_set.cores_of(cluster, options.cores),
             groups: groups.into_iter().collect(),
             due_ns: BTreeMap::new(),

@@ -3,7 +3,8 @@
 
 use super::*;
 use crate::ids::{ClusterId, DagId, SubtaskId};
-use crate::policy::{Policy, Preemption};
+use crate::policies::Policy;
+use crate::policy::Preemption;
 use crate::{CommitOptions, CoreDivision, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each in these clusters, DAG 0 the most urgent; the last one's subtask

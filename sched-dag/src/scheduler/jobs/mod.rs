@@ -26,6 +26,7 @@ use core::ops::Range;
 
 use super::phase::DagPhase;
 use crate::ids::to_u32;
+use crate::policies::Policy;
 use crate::policy::JobOutcome;
 use crate::task_set::Dag;
 use judging::Deadline;
@@ -39,6 +40,8 @@ pub(super) struct JobTable {
     limit: u64,
     /// How many subtasks have no successors.
     ends: u32,
+    /// The policy's number, if the release is added and all subtasks have the same.
+    number_ns: u64,
     /// The sequence number of the oldest job in flight.
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
@@ -68,8 +71,8 @@ pub(super) struct Job {
     pub(super) number: u64,
     /// Its nominal release time.
     pub(super) release_ns: u64,
-    /// Its absolute deadline.
-    pub(super) deadline_ns: u64,
+    /// Its release with the [number](JobTable::number_ns).
+    pub(super) sum_ns: u64,
     /// The instances without successors that have not ended. Each other one ends before
     /// some of these.
     pub(super) unfinished: u32,
@@ -84,7 +87,7 @@ pub(super) struct Job {
 impl JobTable {
     /// Makes the jobs of a DAG whose slots are counted from `first_slot`.
     #[inline]
-    pub(super) fn new(dag: &Dag, first_slot: u32) -> Self {
+    pub(super) fn new(dag: &Dag, policy: Policy, first_slot: u32) -> Self {
         let slots = (first_slot..).take(dag.slots()).map(|slot| Job {
             slot,
             ..Job::default()
@@ -92,10 +95,12 @@ impl JobTable {
         let subtasks = dag.topological_order().iter();
         // Sinks and subtasks that nobody follows alike: the job ends with the last of them.
         let ends = subtasks.filter(|&&subtask| dag.successors(subtask).is_empty());
+        let numbers = policy.adds_release().then(|| policy.numbers(dag));
         Self {
             in_flight: slots.collect(),
             limit: u64::from(dag.in_flight()),
             ends: to_u32(ends.count()),
+            number_ns: numbers.map_or(0, |numbers| numbers[0]),
             oldest: 0,
             next: 0,
             phase: DagPhase::Running,
@@ -248,12 +253,12 @@ impl JobTable {
             deadline.release(number, sequence);
         }
         // The job is complete when as many sinks have ended (R4).
-        let unfinished = self.ends;
+        let (unfinished, number_ns) = (self.ends, self.number_ns);
         let job = self.job_mut(sequence);
         *job = Job {
             number,
             release_ns,
-            deadline_ns: release_ns + dag.relative_deadline_ns(),
+            sum_ns: release_ns + number_ns,
             unfinished,
             // It belongs to the place, not to the job; keys are made of it.
             slot: job.slot,

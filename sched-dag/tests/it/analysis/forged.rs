@@ -133,10 +133,11 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
         let index = |at: usize| usize::try_from(number(at)).expect("an index");
         let small = |at: usize| u32::try_from(number(at)).expect("a small number");
         match (words[0], dags.last_mut()) {
-            ("machine", _) if words[2] == "static" => {
-                machine = (small(1), Policy::StaticPriority, number(3));
+            ("machine", _) => {
+                // `any` is the word of no policy, but the order of most.
+                let policy = Policy::of_word(words[2]).unwrap_or(Policy::Fifo);
+                machine = (small(1), policy, number(3));
             }
-            ("machine", _) => machine = (small(1), Policy::Edf, number(3)),
             ("bursts", _) => ready_ns = number(1),
             ("moves", _) => move_ns = number(1),
             ("queue", Some(dag)) if number(1) == 0 => dag.overrun = OverrunPolicy::Skip,

@@ -57,8 +57,9 @@ impl Sample {
         let clusters = task_set.clusters().map(|cluster| {
             let cores = task_set.cores_of(cluster, self.cores).len();
             let of_machine = mask(&[
-                ("static", self.policy == Policy::StaticPriority),
+                ("static", !self.policy.adds_release()),
                 ("edf", self.policy == Policy::Edf),
+                ("any", is_any(self.policy)),
                 ("preempt", is_preempted && !some_keep),
                 ("keep", !is_preempted),
                 ("somekeep", some_keep),
@@ -74,11 +75,14 @@ impl Sample {
 }
 
 /// The features that a set or a run may have, which a test of schedulability may model or not.
-pub(crate) const FEATURES: [&str; 20] = [
-    "static", "edf", "preempt", "keep", "somekeep", "one core", "clusters", "pins", "groups",
-    "lent", "sinks", "waits", "overlap", "few", "sporadic", "order", "states", "faults", "pauses",
-    "modes",
+pub(crate) const FEATURES: [&str; 21] = [
+    "static", "edf", "any", "preempt", "keep", "somekeep", "one core", "clusters", "pins",
+    "groups", "lent", "sinks", "waits", "overlap", "few", "sporadic", "order", "states", "faults",
+    "pauses", "modes",
 ];
+
+/// The policies that have tests of their own; they are drawn more often.
+const TESTED: [Policy; 2] = [Policy::StaticPriority, Policy::Edf];
 
 /// Returns the bits of those features that there are.
 pub(crate) fn mask(features: &[(&str, bool)]) -> u32 {
@@ -115,6 +119,22 @@ fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
     ])
 }
 
+fn is_any(policy: Policy) -> bool {
+    policy.adds_release() && policy != Policy::Edf
+}
+
+fn draw_policy(is_lent: bool, wanted: u32, random: &mut Random) -> Policy {
+    let orders = ["static", "edf", "any"].map(|name| wanted & bit(name) != 0);
+    let mut policies = [&Policy::ALL[..], &TESTED, &TESTED].concat();
+    policies.retain(|policy| match orders {
+        [is_static, ..] if is_static || is_lent => !policy.adds_release(),
+        [_, true, _] => *policy == Policy::Edf,
+        [_, _, true] => is_any(*policy),
+        _ => true,
+    });
+    random.one_of(&policies)
+}
+
 /// Draws a task set for up to 5 cores with the wanted features, where these go together.
 pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
     let wants = |name| wanted & bit(name) != 0;
@@ -125,7 +145,7 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
     let all = drawn.fold(wanted, |all, drawn| all | drawn);
     let has_one = wants("one core") && !is_lent;
     let is_divided = all & bit("clusters") != 0 && !has_one && !is_lent;
-    let is_edf = !is_lent && !wants("static") && (wants("edf") || random.once_in(2));
+    let policy = draw_policy(is_lent, wanted, random);
     let keeps = ["preempt", "keep", "somekeep"]
         .into_iter()
         .rfind(|kind| wants(kind));
@@ -168,7 +188,7 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
     }
     Sample {
         specs,
-        policy: [Policy::StaticPriority, Policy::Edf][usize::from(is_edf)],
+        policy,
         preemption: match keeps {
             "keep" => Preemption::Disabled,
             _ => Preemption::Enabled,

@@ -196,7 +196,7 @@ fn bounds_hold_whatever_features_come_together() {
             // In the long form every other set is drawn for what is rare.
             let pair = match wanted > JOBS && number % 2 == 1 {
                 true => now().rarest().0,
-                false => number / 2 * 7 % PAIRS,
+                false => number / 2 * 11 % PAIRS,
             };
             let seed = number * PAIRS + pair;
             climb(if only > 0 { only } else { seed }, RUNS, &all);

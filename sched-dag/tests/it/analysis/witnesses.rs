@@ -31,10 +31,14 @@ pub(crate) fn accepted(files: &[String]) -> String {
     said
 }
 
-/// Draws a set; of each four in turn one with lent cores, and one with pins.
+/// Draws a set; of each four in turn one with waits, one with lent cores, and one with pins.
 fn drawn(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
     let turn = number / 4 % 4;
-    let wanted = mask(&[("lent", turn == 2), ("pins", turn == 3)]);
+    let wanted = mask(&[
+        ("waits", turn == 1),
+        ("lent", turn == 2),
+        ("pins", turn == 3),
+    ]);
     let sample = match number {
         0 => full_core(),
         1 => behind_unknown(),

@@ -67,15 +67,17 @@ impl Eligible {
     fn key(&self, set: &Set, task_set: &TaskSet, of: Instance) -> (u64, Instance) {
         let (dag, spec) = (task_set.dag(of.dag), &set.specs[of.dag.index()]);
         let subtask = dag.subtask(of.subtask);
-        let urgency = match set.options.policy {
+        let number = match set.options.policy {
             Policy::StaticPriority => subtask.priority().0.into(),
-            Policy::Edf => {
-                let grid_ns = spec.offset_ns + of.job * dag.period_ns();
-                let due_ns = self.due_ns.get(&(of.dag, of.job)).copied();
-                due_ns.unwrap_or(grid_ns) + subtask.relative_deadline_ns()
-            }
+            Policy::Edf => subtask.relative_deadline_ns(),
+            policy => policy.numbers(dag)[of.subtask.index()],
         };
-        (urgency, of)
+        if !set.options.policy.adds_release() {
+            return (number, of);
+        }
+        let grid_ns = spec.offset_ns + of.job * dag.period_ns();
+        let due_ns = self.due_ns.get(&(of.dag, of.job)).copied();
+        (due_ns.unwrap_or(grid_ns) + number, of)
     }
 }
 

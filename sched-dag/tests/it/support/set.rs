@@ -170,7 +170,7 @@ fn with_sporadic(mut set: Set, random: &mut Random) -> Set {
 
 fn draw_within(random: &mut Random, limits: &Limits, overruns: Overruns) -> Set {
     let options = SchedulerOptions {
-        policy: random.one_of(&[Policy::Edf, Policy::StaticPriority]),
+        policy: random.one_of(&Policy::ALL),
         preemption: match random.chance(75) {
             true => Preemption::Enabled,
             false => Preemption::Disabled,

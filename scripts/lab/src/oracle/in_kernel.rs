@@ -30,8 +30,8 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use fass_dag_file::{DagFile, Set};
+use sched_dag::Preemption;
 use sched_dag::law::RunRecord;
-use sched_dag::{Policy, Preemption};
 
 use super::schedules::{Case, Deviation, Scale, compare, compare_turns};
 use super::{Parse, equal, read};
@@ -285,10 +285,7 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
 
 /// Returns how many cores a case is for, and the kernel's words for the rest of its machine.
 fn machine_words(case: &Case) -> (u32, String) {
-    let policy = match case.policy {
-        Policy::StaticPriority => "static",
-        Policy::Edf => "edf",
-    };
+    let policy = case.policy.word();
     let preemption = match case.preemption {
         Preemption::Enabled => "on",
         Preemption::Disabled => "off",

@@ -218,7 +218,7 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
         }
     }
     let options = SchedulerOptions {
-        policy: random.one_of(&[Policy::StaticPriority, Policy::Edf]),
+        policy: random.one_of(&Policy::ALL),
         preemption: random.one_of(&[Preemption::Enabled, Preemption::Disabled]),
         cores,
     };

@@ -18,6 +18,7 @@ use super::{
     words,
 };
 use crate::bench::hand_off;
+use sched_dag::Policy;
 use tool::image;
 use tool::probe;
 use tool::progress::Lasting;
@@ -63,18 +64,20 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
         let lock = fs::read_to_string(system::workspace().join("Cargo.lock"));
         foreign(&lock.map_err(|error| format!("Cargo.lock: {error}"))?)
     });
-    run("no source file has more than 800 lines", &|| {
-        complain(sources, is_long)
-    });
     run("no folder of the root is unknown", &|| {
         strange_folders(system::workspace())
     });
-    run("every source file opens with an essay", &|| {
-        complain(sources, lacks_essay)
-    });
-    run("no doc sentence begins with a question word", &|| {
-        complain(sources, words::asks)
-    });
+    type Fault = fn(&str, &str) -> Option<String>;
+    let of_each_file: [(&str, Fault); 5] = [
+        ("no source file has more than 800 lines", is_long),
+        ("every source file opens with an essay", lacks_essay),
+        ("no doc sentence begins with a question word", words::asks),
+        ("only the table of policies names one", names_policy),
+        ("no line escapes the budgets", budgets::escape),
+    ];
+    for (name, fault) in of_each_file {
+        run(name, &|| complain(sources, fault));
+    }
     run("types of a crate have names of their own", &|| {
         words::check_names(sources)
     });
@@ -89,9 +92,6 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     );
     run("no crate has more lines than its budget", &|| {
         budgets::check(sources, blessed)
-    });
-    run("no line escapes the budgets", &|| {
-        complain(sources, budgets::escape)
     });
     // From here on the checks need programs of the host, build images and boot guests; what is
     // missing is reported as skipped, not as a failure.
@@ -193,6 +193,19 @@ fn lacks_essay(name: &str, text: &str) -> Option<String> {
     lacks.then(|| "does not open with `//!`".to_string())
 }
 
+/// Finds a policy's name in the library of scheduling, apart from the table of policies: scheduler,
+/// law, analysis and witness go by what the table says of each.
+fn names_policy(name: &str, text: &str) -> Option<String> {
+    let room = name.strip_prefix("sched-dag/src/")?;
+    let code = layers::code(text);
+    let mut names = Policy::ALL
+        .iter()
+        .map(|policy| format!("Policy::{policy:?}"));
+    let named = names.find(|named| code.contains(named))?;
+    let is_free = room.starts_with("policies/") || room.ends_with("tests.rs");
+    (!is_free).then(|| format!("names {named}; ask the table what that policy is like"))
+}
+
 /// Collects the fault of each file, with its name, on one line.
 fn complain(
     sources: &[SourceFile],
@@ -250,7 +263,7 @@ fn free_mib(said: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{foreign, free_mib, judge};
+    use super::{foreign, free_mib, judge, names_policy};
     use std::path::Path;
 
     #[test]
@@ -260,6 +273,19 @@ mod tests {
         let with = format!("{own}\n[[package]]\nname = \"libc\"\nsource = \"registry+x\"\n");
         let fault = foreign(&with).unwrap_err();
         assert_eq!(fault, "packages of others: libc; do without them");
+    }
+
+    #[test]
+    fn a_policy_that_is_named_outside_of_the_table_is_found() {
+        let text = "fn f() {\n    // Policy::Fifo\n    Policy::Edf\n}\n";
+        let found = names_policy("sched-dag/src/law/sweep.rs", text).expect("a fault");
+        assert!(found.starts_with("names Policy::Edf;"), "{found}");
+        for name in [
+            "sched-dag/src/policies/mod.rs",
+            "sched-dag/tests/it/main.rs",
+        ] {
+            assert_eq!(names_policy(name, text), None);
+        }
     }
 
     #[test]

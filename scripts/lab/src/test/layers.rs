@@ -97,7 +97,7 @@ fn module(place: &Path) -> Option<PathBuf> {
 }
 
 /// Returns a file's text without its comments, and without its unit tests, which stand last.
-fn code(text: &str) -> String {
+pub(super) fn code(text: &str) -> String {
     let product = text.split("\n#[cfg(test)]\nmod tests {").next();
     let lines = product.unwrap_or_default().lines();
     let lines = lines.filter(|line| !line.trim_start().starts_with("//"));

@@ -356,6 +356,14 @@ impl Committed {
                 told.cores
             )));
         }
+        let known = Policy::WORDS;
+        if usize::from(told.policy) >= known.len() {
+            return Err(in_commit(format!(
+                "its policy is number {}; known are {}, from 0 on",
+                told.policy,
+                known.join(", ")
+            )));
+        }
         let specs: Result<Vec<_>, String> = told.dags.iter().map(spec).collect();
         let mut specs = specs.map_err(in_commit)?;
         for &(dag, subtask, limit_ns, segment_ns) in &told.waits {
@@ -404,12 +412,9 @@ impl Committed {
     }
 
     /// Returns the options of the scheduler.
-    pub const fn options(&self) -> SchedulerOptions {
+    pub fn options(&self) -> SchedulerOptions {
         SchedulerOptions {
-            policy: match self.told.is_edf {
-                true => Policy::Edf,
-                false => Policy::StaticPriority,
-            },
+            policy: Policy::ALL[usize::from(self.told.policy)],
             preemption: match self.told.is_preemptive {
                 true => Preemption::Enabled,
                 false => Preemption::Disabled,

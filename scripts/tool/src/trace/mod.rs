@@ -46,7 +46,7 @@ use sched_dag::chains::{Chain, SubtaskRef};
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::sweep::WaitCounts;
 use sched_dag::law::{self, Distribution, Violation};
-use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
+use sched_dag::{CoreId, DagId, Instance, Preemption};
 
 use crate::files;
 use crate::json::{Object, quoted};
@@ -214,10 +214,7 @@ const MOST: usize = 20;
 pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64) -> String {
     let mut text = String::new();
     let Findings { breaches, figures } = findings;
-    let policy = match run.options.policy {
-        Policy::StaticPriority => "static",
-        Policy::Edf => "edf",
-    };
+    let policy = run.options.policy.word();
     let preemption = match run.options.preemption {
         Preemption::Enabled => "on",
         Preemption::Disabled => "off",

@@ -204,7 +204,7 @@ enum Runner {
     /// A loop over the functions.
     Floor,
     /// The scheduler, with functions without values.
-    Closures(Policy),
+    Closures(Policy, &'static str),
     /// The scheduler, with a value on each edge, by static priority.
     Typed,
 }
@@ -213,8 +213,7 @@ impl Runner {
     const fn name(self) -> &'static str {
         match self {
             Self::Floor => "floor",
-            Self::Closures(Policy::StaticPriority) => "closures, static",
-            Self::Closures(Policy::Edf) => "closures, edf",
+            Self::Closures(_, name) => name,
             Self::Typed => "typed, static",
         }
     }
@@ -256,8 +255,9 @@ fn throughput(
 fn runners(graph: MeasuredGraph) -> Vec<(Runner, u32)> {
     let mut runners = vec![(Runner::Floor, 1)];
     for workers in WORKERS {
-        let policies = [Policy::StaticPriority, Policy::Edf];
-        runners.extend(policies.map(|policy| (Runner::Closures(policy), workers)));
+        let (ranked, by_deadline) = (Policy::StaticPriority, Policy::Edf);
+        let policies = [(ranked, "closures, static"), (by_deadline, "closures, edf")];
+        runners.extend(policies.map(|(policy, name)| (Runner::Closures(policy, name), workers)));
         runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
     }
     runners
@@ -285,7 +285,7 @@ fn pass(
                 functions.iter_mut().flatten().for_each(|tick| tick(job));
             }
         }
-        Runner::Closures(policy) => {
+        Runner::Closures(policy, _) => {
             let machine = machine(policy, workers)?;
             commit(graph, jobs, vec![functions]);
             run_jobs(&machine, jobs)?;

@@ -30,7 +30,7 @@ pub(crate) fn commit(text: &str) -> Commit {
     let (waits, dags): (Vec<&str>, Vec<_>) =
         (lines[1..].iter()).partition(|line| line.starts_with("wait "));
     Commit {
-        is_edf: policy == "edf",
+        policy: sched_dag::Policy::of_word(policy).expect("a policy") as u8,
         is_preemptive: true,
         cores: number(cores),
         charge_ns: Some(0),

@@ -1,0 +1,114 @@
+//! Policies: the orders in which ready instances go (R5). Each is a file next to this one and a row of
+//! the table at the end.
+//!
+//! A policy gives each subtask of a DAG a *number* and says whether the job's nominal release is
+//! added to it. The smallest sum goes first; of equal ones DAG, job and subtask decide. So the place
+//! of an instance is fixed at the release of its job. Scheduler, law, analysis and witness know no
+//! more of a policy than that; options, scenarios, recordings and pages have its word and its row
+//! from the table.
+//!
+//! An order is no policy in this sense if it changes while an instance waits (least laxity at each
+//! instant, time slices), or depends on the job's number.
+
+use alloc::vec::Vec;
+
+use crate::policy::Preemption;
+use crate::task_set::Dag;
+
+/// All that is to be known of a policy.
+struct PolicyRule {
+    /// Its word in options, scenarios and traces.
+    word: &'static str,
+    /// Returns the number of each subtask of a DAG.
+    numbers: fn(&Dag) -> Vec<u64>,
+    /// Whether the job's nominal release is added.
+    adds_release: bool,
+    /// Whether priorities count, so that each subtask of a DAG has to state one, or none.
+    reads_priorities: bool,
+}
+
+impl Policy {
+    /// Returns the word of options, scenarios and traces.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        Self::WORDS[self as usize]
+    }
+
+    /// Returns the policy of a word.
+    #[must_use]
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|policy| policy.word() == word)
+    }
+
+    /// Returns the number of each subtask of a DAG; the smaller one goes first.
+    #[must_use]
+    pub fn numbers(self, dag: &Dag) -> Vec<u64> {
+        let mut numbers = (Self::RULES[self as usize].numbers)(dag);
+        if self.adds_release() {
+            // Then the sum is a time, as each deadline is.
+            let most_ns = dag.relative_deadline_ns();
+            numbers
+                .iter_mut()
+                .for_each(|number| *number = most_ns.min(*number));
+        }
+        numbers
+    }
+
+    /// Reports whether the nominal release of a job is added to the numbers of its subtasks.
+    #[must_use]
+    pub const fn adds_release(self) -> bool {
+        Self::RULES[self as usize].adds_release
+    }
+
+    /// Reports whether priorities count.
+    pub(crate) const fn reads_priorities(self) -> bool {
+        Self::RULES[self as usize].reads_priorities
+    }
+}
+
+/// How a scheduler orders instances, and for how many cores.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SchedulerOptions {
+    /// How the ready instances are ordered.
+    pub policy: Policy,
+    /// Whether a started instance may lose its core. With
+    /// [`Preemption::Enabled`], non-preemptive subtasks still keep theirs.
+    pub preemption: Preemption,
+    /// The number of cores, at least 1.
+    pub cores: u32,
+}
+
+/// Makes the table of policies.
+macro_rules! policies {
+    ($($(#[doc = $doc:literal])+ $Name:ident = $module:ident;)+) => {
+        $(mod $module;)+
+
+        /// How the ready instances are ordered.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum Policy {
+            $($(#[doc = $doc])+ $Name,)+
+        }
+
+        impl Policy {
+            const RULES: &[PolicyRule] = &[$($module::RULE),+];
+
+            /// All policies. Recordings have their places in this list, so a new one comes last.
+            pub const ALL: [Self; Self::WORDS.len()] = [$(Self::$Name),+];
+
+            /// The words of all policies.
+            pub const WORDS: &[&str] = &[$($module::RULE.word),+];
+        }
+    };
+}
+
+policies! {
+    /// By the subtask's [`Priority`](crate::Priority), the same for every job.
+    StaticPriority = static_priority;
+    /// By the job's absolute deadline, the earliest first.
+    Edf = edf;
+    /// By the job's release, the earliest first.
+    Fifo = fifo;
+    /// By the latest start at which the deadline can still be met at WCETs, the earliest first.
+    LeastSlack = least_slack;
+}
