@@ -45,7 +45,7 @@ pub struct RunConfig {
     ///     context_switch_ns: 300,
     ///     dispatch_ns: 900,
     ///     interrupt_ns: 2_000,
-    ///     ready_ns: 0,
+    ///     ..Overheads::NONE
     /// };
     /// // Into the instance, out of it, one dispatch, one interrupt to preempt another.
     /// assert_eq!(measured.of_an_instance_ns(Preemption::Enabled), Some(3_500));
@@ -75,12 +75,7 @@ impl RunConfig {
             },
             clusters: CoreDivision::Undivided,
             assigns: false,
-            overheads: Overheads {
-                context_switch_ns: 0,
-                dispatch_ns: 0,
-                interrupt_ns: 0,
-                ready_ns: 0,
-            },
+            overheads: Overheads::NONE,
             overhead_source: OverheadSource::Stated,
             wcets: None,
             budget_factor: 0,

@@ -64,11 +64,8 @@ pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
         };
     });
     crate::println!(
-        "overheads measured: {costs}; with a margin of {margin_percent} %: overheads_ns={},{},{},{}",
-        overheads.context_switch_ns,
-        overheads.dispatch_ns,
-        overheads.interrupt_ns,
-        overheads.ready_ns
+        "overheads measured: {costs}; with a margin of {margin_percent} %: overheads_ns={}",
+        overheads.stated()
     );
     json::emit("overheads", |line| {
         line.number("dispatches", costs.dispatches)

@@ -20,23 +20,66 @@
 //! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for
 //! the charges, and the step of it that is not proven.
 
+use alloc::string::{String, ToString};
+
 use crate::law::MeasuredCosts;
 use crate::policy::Preemption;
 use crate::task_set::Dag;
 
-/// Measured costs, each a worst case; all 0 by default.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub struct Overheads {
+/// Makes the terms: what each is of, and how often a segment is charged it, in any case and besides
+/// where instances can be preempted; and how often a move takes it.
+macro_rules! overheads {
+    ($(
+        $(#[doc = $doc:literal])+
+        $term:ident = $word:literal, segment $always:literal + $preemptive:literal, move $moved:literal;
+    )+) => {
+        /// Measured costs, each a worst case; all 0 by default.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+        pub struct Overheads {
+            $($(#[doc = $doc])+ pub $term: u64,)+
+        }
+
+        impl Overheads {
+            /// The names of the terms, in the order of the numbers that state them.
+            pub const WORDS: &[&str] = &[$($word),+];
+
+            const TIMES: &[[u64; 3]] = &[$([$always, $always + $preemptive, $moved]),+];
+
+            /// No overheads.
+            pub const NONE: Self = Self { $($term: 0),+ };
+
+            /// Makes them of the numbers that state them.
+            #[must_use]
+            pub const fn of_terms_ns([$($term),+]: [u64; Self::WORDS.len()]) -> Self {
+                Self { $($term),+ }
+            }
+
+            /// Returns the numbers that state them.
+            #[must_use]
+            pub const fn terms_ns(&self) -> [u64; Self::WORDS.len()] {
+                [$(self.$term),+]
+            }
+
+            /// Returns these as text, with commas between.
+            #[must_use]
+            pub fn stated(&self) -> String {
+                self.terms_ns().map(|ns| ns.to_string()).join(",")
+            }
+        }
+    };
+}
+
+overheads! {
     /// One switch between two execution contexts, in nanoseconds.
-    pub context_switch_ns: u64,
+    context_switch_ns = "context switch", segment 2 + 0, move 2;
     /// One decision of the scheduler, locks included, in nanoseconds.
-    pub dispatch_ns: u64,
+    dispatch_ns = "dispatch", segment 1 + 0, move 0;
     /// From the request for an inter-processor interrupt to the first
     /// instruction of its handler, in nanoseconds.
-    pub interrupt_ns: u64,
+    interrupt_ns = "interrupt", segment 0 + 1, move 1;
     /// By how much a step is longer for each instance that becomes ready in it, in
     /// nanoseconds.
-    pub ready_ns: u64,
+    ready_ns = "readiness", segment 0 + 0, move 0;
 }
 
 /// Where overheads are from.
@@ -75,34 +118,36 @@ impl Overheads {
         let owed_ns = costs.owed_ns.saturating_mul(percent).div_ceil(100);
         let late_ns = costs.late_ns.saturating_mul(percent).div_ceil(100);
         Self {
-            context_switch_ns: 0,
             dispatch_ns: owed_ns.saturating_add(late_ns),
             interrupt_ns: owed_ns,
             ready_ns: match at_once {
                 0 => 0,
                 _ => owed_ns.div_ceil(at_once),
             },
+            // The longest time owed has all others in it.
+            ..Self::NONE
         }
     }
 
     /// Returns the charge of each segment, or `None` if that overflows.
     #[must_use]
     pub fn of_an_instance_ns(&self, preemption: Preemption) -> Option<u64> {
-        let switches = self.context_switch_ns.checked_mul(2)?;
-        let always = switches.checked_add(self.dispatch_ns)?;
-        match preemption {
-            Preemption::Enabled => always.checked_add(self.interrupt_ns),
-            Preemption::Disabled => Some(always),
-        }
+        self.sum_ns(usize::from(preemption == Preemption::Enabled))
+    }
+
+    fn sum_ns(&self, column: usize) -> Option<u64> {
+        let mut terms = self.terms_ns().into_iter().zip(Self::TIMES);
+        terms.try_fold(0_u64, |sum, (ns, times)| {
+            sum.checked_add(ns.checked_mul(times[column])?)
+        })
     }
 
     /// Returns how long it takes to go on with an instance on another core of its group, since a
     /// pinned one takes its core.
     #[must_use]
     pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
-        let switches = self.context_switch_ns.saturating_mul(2);
         match preemption {
-            Preemption::Enabled => switches.saturating_add(self.interrupt_ns),
+            Preemption::Enabled => self.sum_ns(2).unwrap_or(u64::MAX),
             Preemption::Disabled => 0,
         }
     }
@@ -139,7 +184,7 @@ mod tests {
             context_switch_ns: 100,
             dispatch_ns: 30,
             interrupt_ns: 7,
-            ready_ns: 1,
+            ..Overheads::default()
         };
         assert_eq!(overheads.of_an_instance_ns(Preemption::Enabled), Some(237));
         assert_eq!(overheads.of_an_instance_ns(Preemption::Disabled), Some(230));
@@ -157,16 +202,8 @@ mod tests {
             late_ns: 2,
             ..MeasuredCosts::default()
         };
-        let charged = |margin, at_once| {
-            let of = Overheads::measured(&costs, margin, at_once);
-            (
-                of.context_switch_ns,
-                of.dispatch_ns,
-                of.interrupt_ns,
-                of.ready_ns,
-            )
-        };
-        assert_eq!(charged(0, 0), (0, 9, 7, 0));
-        assert_eq!(charged(50, 10), (0, 14, 11, 2));
+        let charged = |margin, at_once| Overheads::measured(&costs, margin, at_once).stated();
+        assert_eq!(charged(0, 0), "0,9,7,0");
+        assert_eq!(charged(50, 10), "0,14,11,2");
     }
 }

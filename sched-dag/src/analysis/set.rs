@@ -386,7 +386,7 @@ impl<'a> EquationSet<'a> {
     ) -> InterferingDag {
         let (task, shape) = (self.tasks[other], &self.shapes[other]);
         let limit = |workload: InterferingWorkload| match limit_ns {
-            Some(limit_ns) => workload.under_edf(task.least_deadline_ns(), limit_ns),
+            Some(limit_ns) => workload.by_deadlines(task.least_deadline_ns(), limit_ns),
             None => workload,
         };
         let cores = self.counted[dag].into();

@@ -125,7 +125,7 @@ impl InterferingWorkload {
     /// `deadline_ns`; `own_deadline_ns` is the least of this task's.
     ///
     /// Only for tasks with a relative deadline no longer than the period.
-    pub(super) fn under_edf(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
+    pub(super) fn by_deadlines(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
         self.ceiling = Some(self.due(own_deadline_ns, deadline_ns));
         self
     }
@@ -437,9 +437,9 @@ mod tests {
 
         let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
         let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
-        let in_two = InterferingWorkload::new(&one, 6, 9, 2, 2).under_edf(10, 20);
+        let in_two = InterferingWorkload::new(&one, 6, 9, 2, 2).by_deadlines(10, 20);
         assert_eq!(in_two.at(1000).value, 12);
-        let in_one = InterferingWorkload::new(&two, 11, 14, 2, 2).under_edf(20, 10);
+        let in_one = InterferingWorkload::new(&two, 11, 14, 2, 2).by_deadlines(20, 10);
         assert_eq!(in_one.at(1000).value, 8);
     }
 
@@ -470,7 +470,7 @@ mod tests {
             for response in 10..22 {
                 let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
                 let plain = InterferingWorkload::new(&task, 10, response, parallelism, 3);
-                for workload in [plain, plain.under_edf(13, 30)] {
+                for workload in [plain, plain.by_deadlines(13, 30)] {
                     let values: Vec<u128> = (0..80).map(|l| workload.at(l).value).collect();
                     assert!(values.is_sorted(), "{values:?}");
                     for window in 0..60 {

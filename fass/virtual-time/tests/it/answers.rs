@@ -165,7 +165,7 @@ fn overheads_are_added_to_every_wcet() {
         context_switch_ns: 100,
         dispatch_ns: 300,
         interrupt_ns: 1_000,
-        ready_ns: 0,
+        ..Overheads::NONE
     };
     for (preemption, said) in [
         (Preemption::Enabled, "dag `two` takes at most 5.003ms"),

@@ -85,21 +85,20 @@ pub fn split(module: Option<&[u8]>, bytes: u64) -> Option<(&[u8], Option<&[u8]>)
 }
 
 fn overheads(options: &CommandLine<'_>) -> Result<Overheads, UsageError> {
-    let mut numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
-    if numbers.len() == 3 {
-        numbers.push(0);
+    /// So many have to be stated.
+    const LEAST: usize = 3;
+    let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0; LEAST])?;
+    let mut terms_ns = [0; Overheads::WORDS.len()];
+    match terms_ns.get_mut(..numbers.len()) {
+        Some(stated) if stated.len() >= LEAST => stated.copy_from_slice(&numbers),
+        _ => {
+            return Err(UsageError::new(format!(
+                "`overheads_ns` has {} numbers; give {LEAST} to {}: {}",
+                numbers.len(),
+                Overheads::WORDS.len(),
+                Overheads::WORDS.join(", ")
+            )));
+        }
     }
-    let [context_switch_ns, dispatch_ns, interrupt_ns, ready_ns] = numbers[..] else {
-        return Err(UsageError::new(format!(
-            "`overheads_ns` has {} numbers; give three or four: context switch, dispatch, \
-             interrupt, readiness",
-            numbers.len()
-        )));
-    };
-    Ok(Overheads {
-        context_switch_ns,
-        dispatch_ns,
-        interrupt_ns,
-        ready_ns,
-    })
+    Ok(Overheads::of_terms_ns(terms_ns))
 }

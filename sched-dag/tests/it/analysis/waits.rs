@@ -47,7 +47,7 @@ fn each_segment_is_charged() {
         context_switch_ns: 2,
         dispatch_ns: 1,
         interrupt_ns: 3,
-        ready_ns: 0,
+        ..Overheads::NONE
     };
     let twice = waiting(waiting(spec(100, 100, &[10], &[], 0), 0, 7, 3), 0, 5, 3);
     assert_eq!(

@@ -146,13 +146,8 @@ fn of_run(run: &Run) -> MeasuredCosts {
 /// Returns the guest's word for the charged overheads, with a margin in per cent.
 pub fn overheads_word(measured: &MeasuredCosts, margin_percent: u64) -> String {
     let margin_percent = u32::try_from(margin_percent).unwrap_or(u32::MAX);
-    let Overheads {
-        context_switch_ns,
-        dispatch_ns,
-        interrupt_ns,
-        ..
-    } = Overheads::measured(measured, margin_percent, 0);
-    format!("overheads_ns={context_switch_ns},{dispatch_ns},{interrupt_ns}")
+    let overheads = Overheads::measured(measured, margin_percent, 0);
+    format!("overheads_ns={}", overheads.stated())
 }
 
 /// Returns the measured overheads as a machine line.
