@@ -23,7 +23,7 @@ use crate::edge::{self, FILE, File, Sending, unpoisoned};
 use crate::level::Levels;
 use crate::office::Office;
 use crate::section;
-use crate::state::{Fault, Number, RunTime, State, ThreadPort};
+use crate::state::{Fault, Number, State, ThreadPort};
 use crate::sys;
 use crate::team::{self, Budgets, Team, with_own_worker};
 
@@ -268,12 +268,9 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
         team.wait_until_ready(workers.len() + 1);
     }
     let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
-    for team in teams.iter() {
-        team.lock().time = RunTime::beginning(epoch_ns);
-    }
     let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
     let allocations = (threads.allocations)();
-    teams.iter().for_each(|team| office.ring(team.cluster));
+    teams.iter().for_each(|team| team.begin(epoch_ns));
     office.wait_until_over();
     let allocations = (threads.allocations)() - allocations;
     releases.into_iter().for_each(join);

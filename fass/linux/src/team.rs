@@ -36,7 +36,7 @@ use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
-use crate::state::{FaultCause, Left, Number, State};
+use crate::state::{FaultCause, Left, Number, RunTime, State};
 use crate::worker::{Lead, Worker};
 use crate::{edge, panics, section, sys};
 
@@ -183,6 +183,19 @@ impl Team {
             }
             sys::wait(&self.begun, begun, None);
         }
+    }
+
+    /// Has the run's time begin at an instant, for which the workers look out from now on. Called by
+    /// none but the thread that starts the run: the release thread may come later than that instant,
+    /// and where idle workers watch, none but they see to events.
+    pub(crate) fn begin(&self, epoch_ns: u64) {
+        let mut state = self.lock();
+        state.time = RunTime::beginning(epoch_ns);
+        self.look_out.announce(epoch_ns);
+        let cores = state.active.len();
+        drop(state);
+        self.workers[..cores].iter().for_each(Worker::call);
+        self.office.ring(self.cluster);
     }
 
     /// Works until all jobs have ended.
@@ -619,10 +632,7 @@ impl Team {
         rests: &mut bool,
     ) -> Option<u64> {
         if sys::now_ns() < state.time.epoch_ns {
-            // What is asked for before time 0 is done then. The workers look out from now on.
-            self.look_out.announce(state.time.epoch_ns);
-            let active = state.active.iter();
-            active.for_each(|worker| self.workers[*worker].call());
+            // What is asked for before time 0 is done then.
             return Some(state.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
@@ -652,27 +662,9 @@ impl Team {
         workers[me].report(self.levels);
         let mut state = self.lock();
         if !state.abandoned.contains(&me) {
-            let (seat, vertex) = (
-                state.seats[me].take(),
-                state.engine.task_set.vertex(instance),
-            );
-            let core = seat.unwrap_or_else(|| state.core_of(me));
-            state.abandoned.push(me);
-            workers[me].give_up_sections();
-            match seat {
-                Some(core) => {
-                    state.engine.placement.lose(core.index());
-                    state.replace(core, workers);
-                }
-                None => state.engine.placement.lose_parked(vertex),
-            }
-            state.fail(
-                workers,
-                (core, vertex),
-                None,
-                FaultCause::Panic(cause.to_owned()),
-            );
-            state.report_left(core, workers);
+            let vertex = state.engine.task_set.vertex(instance);
+            let cause = FaultCause::Panic(cause.to_owned());
+            self.give_up(&mut state, me, vertex, cause);
             self.announce(&state);
         }
         self.call(state);
@@ -690,19 +682,94 @@ impl Team {
         if !self.workers[number].demote(self.levels, Role::Abandoned) {
             return;
         }
-        state.engine.placement.lose(core.index());
-        state.seats[number] = None;
+        self.give_up(state, number, vertex, FaultCause::Overrun);
+    }
+
+    /// Ends the instance of a worker that is never given another one. If it has a core, a spare
+    /// worker gets that, and is called, so that it knows: where idle workers watch, one that does not
+    /// know of its core would sleep, and none but workers see to events.
+    fn give_up(&self, state: &mut State, number: Number, vertex: Vertex, cause: FaultCause) {
+        let (workers, seat) = (&self.workers, state.seats[number].take());
+        let core = seat.unwrap_or_else(|| state.core_of(number));
         state.abandoned.push(number);
-        self.workers[number].give_up_sections();
-        state.replace(core, &self.workers);
-        state.fail(&self.workers, (core, vertex), None, FaultCause::Overrun);
-        state.report_left(core, &self.workers);
+        workers[number].give_up_sections();
+        match seat {
+            Some(core) => {
+                state.engine.placement.lose(core.index());
+                state.replace(core, workers);
+                workers[state.active[core.index()]].call();
+            }
+            None => state.engine.placement.lose_parked(vertex),
+        }
+        state.fail(workers, (core, vertex), None, cause);
+        state.report_left(core, workers);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{IS_OF_RUN, may_call_app, pause_ns};
+    use std::sync::Arc;
+    use std::thread;
+    use std::time::Duration;
+
+    use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+
+    use super::{Budgets, IS_OF_RUN, may_call_app, pause_ns, strand};
+    use crate::platform::HOST;
+    use crate::state::tests::MACHINE;
+    use crate::{Linux, Mechanism, sys};
+
+    /// Runs on one core, by each mechanism that needs no privilege, a job of a DAG that is released
+    /// after so long and calls a function, and one of another DAG later. The release thread comes
+    /// after time 0.
+    fn run(after: Duration, function: fn()) {
+        for mechanism in [Mechanism::Normal, Mechanism::Poll] {
+            let one = MACHINE.lock();
+            let machine = Linux::sharing(1, mechanism).unwrap();
+            let dags = [after, after + Duration::from_millis(200)].map(|offset| {
+                let (dag, period) = (create_dag(), Duration::from_secs(1));
+                dag.jobs(1)
+                    .period(period)
+                    .relative_deadline(period)
+                    .offset(offset);
+                dag
+            });
+            dags[0].register_untyped_subtask(move |_| function(), SubtaskAttributes::default());
+            dags[1].register_untyped_subtask(|_| (), SubtaskAttributes::default());
+            finish_create_dags(&dags).unwrap();
+            let team = Arc::clone(&HOST.take_launched().unwrap().control.teams[0]);
+            drop((machine, one));
+            for worker in 0..team.workers.len() {
+                let team = Arc::clone(&team);
+                thread::spawn(move || team.work(worker));
+            }
+            team.wait_until_ready(team.workers.len());
+            team.begin(sys::now_ns());
+            let (releasing, budgets) = (Arc::clone(&team), Budgets::new(&team.lock(), 0));
+            thread::spawn(move || releasing.release(budgets));
+            // What sleeps for ever makes itself felt by the time, far beyond any delay.
+            let end_ns = sys::now_ns() + 60_000_000_000;
+            while !team.office.is_over() {
+                assert!(sys::now_ns() < end_ns, "by {mechanism:?} all sleep");
+                thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    #[test]
+    fn a_release_thread_that_comes_after_time_0_has_workers_that_look_out() {
+        run(Duration::from_millis(100), || ());
+    }
+
+    #[test]
+    fn who_takes_the_place_of_one_that_is_given_up_looks_out() {
+        run(Duration::ZERO, || {
+            assert!(strand("meant"));
+            loop {
+                thread::park();
+            }
+        });
+    }
 
     #[test]
     fn the_thread_that_decides_calls_nothing_of_the_apps() {

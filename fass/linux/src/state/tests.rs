@@ -21,6 +21,9 @@ use fass::platform::SubtaskRunner;
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
 const DAGS: [&str; 3] = ["low", "urgent", "first"];
 
+/// A program has one machine at a time.
+pub(crate) static MACHINE: Mutex<()> = Mutex::new(());
+
 /// A team whose threads are played by the test.
 struct Stage {
     team: Arc<Team>,
@@ -32,8 +35,6 @@ struct Stage {
 
 impl Stage {
     fn new(cores: u32, urgent_keeps_its_core: bool) -> Self {
-        // A program has one machine at a time.
-        static MACHINE: Mutex<()> = Mutex::new(());
         let _one = MACHINE.lock();
         let machine = Linux::sharing(cores, Mechanism::Normal).unwrap();
         HOST.threads().as_mut().unwrap().terms.scheduler.preemption = Preemption::Enabled;
