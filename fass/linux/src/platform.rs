@@ -254,6 +254,7 @@ impl Deref for Run {
 /// returns what happened. Releases count from `epoch_ns`, or from right now.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
+    section::make_room(teams.iter().map(|team| team.workers.len()).sum());
     let workers = teams.iter().map(|team| {
         let numbers = 0..team.workers.len();
         numbers.map(|number| worker(team, number)).collect()

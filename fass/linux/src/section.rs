@@ -31,6 +31,11 @@ pub(crate) fn own() -> u32 {
     OWN.with(|own| *own)
 }
 
+/// Makes room for so many threads that are given up.
+pub(crate) fn make_room(threads: usize) {
+    given_up().reserve(threads);
+}
+
 /// Gives a thread up: nobody waits for the section that it is in, and it enters no further one.
 pub(crate) fn give_up(thread: u32) {
     given_up().push(thread);

@@ -106,8 +106,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             alternates: (0..vertices).map(|_| None).collect(),
             after_fault: after_fault.to_vec(),
             notices: Vec::with_capacity(room),
-            // No more instances are in flight, and each is cancelled once at most.
-            undiscarded: Vec::with_capacity(instances),
+            // No more instances are in flight at the end of a step, and each is cancelled once at most.
+            // A late one tells of those of several jobs, one after the other.
+            undiscarded: Vec::with_capacity(instances + room),
             scheduler,
             task_set,
         }

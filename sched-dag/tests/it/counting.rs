@@ -2,6 +2,7 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 struct Counting;
@@ -10,13 +11,16 @@ struct Counting;
 static ALLOCATOR: Counting = Counting;
 
 static OF_ALL: AtomicU64 = AtomicU64::new(0);
+/// Tells whether the calling thread is of those whose allocations are added up; without it, all are.
+pub(crate) static COUNTED: OnceLock<fn() -> bool> = OnceLock::new();
 
 thread_local! {
     static OF_THREAD: Cell<u64> = const { Cell::new(0) };
     static BYTES: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Returns the number of this thread's allocations, their bytes, and the number of all threads'.
+/// Returns the number of this thread's allocations, their bytes, and the number of all
+/// threads' that are counted.
 pub(crate) fn allocated() -> (u64, usize, u64) {
     (OF_THREAD.get(), BYTES.get(), OF_ALL.load(Relaxed))
 }
@@ -29,7 +33,9 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         OF_THREAD.set(OF_THREAD.get() + 1);
         BYTES.set(BYTES.get() + layout.size());
-        OF_ALL.fetch_add(1, Relaxed);
+        if COUNTED.get().is_none_or(|is_counted| is_counted()) {
+            OF_ALL.fetch_add(1, Relaxed);
+        }
         // SAFETY: the caller keeps `alloc`'s conditions, which are the same.
         unsafe { System.alloc(layout) }
     }

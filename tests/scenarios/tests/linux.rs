@@ -1,10 +1,14 @@
-//! The suite on Linux by each mechanism that every computer has: counts, and R1 to R4.
+//! The suite on Linux by each mechanism that every computer has: counts, R1 to R4, and allocations.
+
+#[path = "../../../sched-dag/tests/it/counting.rs"]
+mod counting;
 
 use linux::{Linux, Mechanism};
 use scenarios::Scenario;
 
 fn judge(scenario: &Scenario, mechanism: Mechanism) -> Vec<String> {
     let machine = Linux::sharing(scenario.cores, mechanism).expect("a machine");
+    let machine = machine.allocations(|| counting::allocated().2);
     machine.change(|terms| {
         terms.scheduler.policy = scenario.policy;
         terms.scheduler.preemption = scenario.preemption;
@@ -17,6 +21,7 @@ fn judge(scenario: &Scenario, mechanism: Mechanism) -> Vec<String> {
 #[test]
 fn each_scenario_is_as_it_says() {
     let mut wrong = String::new();
+    counting::COUNTED.get_or_init(|| linux::is_of_run);
     for scenario in Scenario::suite().expect("scenarios") {
         for mechanism in [Mechanism::Fifo, Mechanism::Normal, Mechanism::Poll] {
             for line in judge(&scenario, mechanism) {

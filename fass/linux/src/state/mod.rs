@@ -22,6 +22,7 @@
 //!   before, by its own thread, there. For the model it was suspended so long.
 //! - A fault takes an instance away wherever it is: no core is asked for.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
@@ -64,7 +65,7 @@ pub struct Fault {
     /// The core, counted within its cluster.
     pub core: CoreId,
     /// Why.
-    pub cause: String,
+    pub cause: Cow<'static, str>,
     /// Where, if it has panicked: `file:line:column`.
     pub place: Option<String>,
     /// Whether it has exceeded its budget. Unless it has returned, its function runs on then, in
@@ -202,7 +203,6 @@ impl State {
         runners: Vec<SubtaskRunner>,
         processors: Box<[u32]>,
     ) -> Self {
-        let dags = engine.task_set.dags().len();
         let cores = processors.len();
         let workers = cores + runners.len();
         for runner in runners {
@@ -224,7 +224,8 @@ impl State {
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
             opened: 0,
-            faults: Vec::with_capacity(dags),
+            // Each subtask's, if no fault is survived.
+            faults: Vec::with_capacity(workers),
             called: Vec::with_capacity(2 * cores),
             rung: Vec::with_capacity(workers),
             processors,
@@ -304,7 +305,7 @@ impl State {
         cause: FaultCause,
     ) {
         let (cause, is_overrun) = match cause {
-            FaultCause::Panic(message) => (message, false),
+            FaultCause::Panic(message) => (message.into(), false),
             FaultCause::Overrun => ("its budget was exceeded".into(), true),
         };
         let instance = self.engine.scheduler.instance_of(vertex);
