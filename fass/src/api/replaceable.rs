@@ -101,15 +101,18 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::with_replacement(
-            self,
-            Box::new(RemadeFunction {
-                make,
-                present: None,
-                call: |f: &mut F, args| f(args),
-            }),
-            Vec::new(),
-        )
+        Subtask::with_replacement(self, |_, _| {
+            let call = |f: &mut F, args| f(args);
+            let present = None;
+            (
+                Box::new(RemadeFunction {
+                    make,
+                    present,
+                    call,
+                }),
+                Vec::new(),
+            )
+        })
     }
 
     /// Begins the registration of a subtask that falls back on a second function after a
@@ -135,14 +138,10 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::with_replacement(
-            self,
-            Box::new(FallbackPair {
-                first: Some(first),
-                second,
-            }),
-            Vec::new(),
-        )
+        let first = Some(first);
+        Subtask::with_replacement(self, |_, _| {
+            (Box::new(FallbackPair { first, second }), Vec::new())
+        })
     }
 }
 
@@ -161,18 +160,19 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        let (dag, mut held) = self.hold();
-        let states = U::states(&held);
-        let call = move |f: &mut F, args| f(U::borrow(&mut U::enter(&mut held)), args);
-        Subtask::with_replacement(
-            dag,
-            Box::new(RemadeFunction {
-                make,
-                present: None,
-                call,
-            }),
-            states,
-        )
+        Subtask::with_replacement(self.dag, |dag, subtask| {
+            let mut held = self.uses.hold(dag, subtask);
+            let (states, present) = (U::states(&held), None);
+            let call = move |f: &mut F, args| f(U::borrow(&mut U::enter(&mut held)), args);
+            (
+                Box::new(RemadeFunction {
+                    make,
+                    present,
+                    call,
+                }),
+                states,
+            )
+        })
     }
 
     /// Works like [`Dag::falling_back`]; states are reset as by
@@ -202,11 +202,13 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        let (dag, held) = self.hold();
-        let states = U::states(&held);
-        let second = wrap::<U, _, _, _>(U::another(&held), second);
-        let first = Some(wrap::<U, _, _, _>(held, first));
-        Subtask::with_replacement(dag, Box::new(FallbackPair { first, second }), states)
+        Subtask::with_replacement(self.dag, |dag, subtask| {
+            let held = self.uses.hold(dag, subtask);
+            let states = U::states(&held);
+            let second = wrap::<U, _, _, _>(U::another(&held), second);
+            let first = Some(wrap::<U, _, _, _>(held, first));
+            (Box::new(FallbackPair { first, second }), states)
+        })
     }
 }
 
@@ -222,6 +224,9 @@ where
 {
     move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args)
 }
+
+/// The functions of a subtask, and the states that are reset with them.
+type Replacement<Args, Ret> = (Box<dyn Alternatives<Args, Ret>>, Vec<Arc<dyn Reset>>);
 
 /// A subtask whose function another one replaces after a fault.
 pub(super) struct Replaceable(pub(super) usize);
@@ -251,9 +256,12 @@ impl<'d> Subtask<'d> {
     /// Begins with functions of which one replaces the other.
     fn with_replacement<Args: VecToSubs, Ret: VecToPubs>(
         dag: &'d Dag,
-        alternatives: Box<dyn Alternatives<Args, Ret>>,
-        states: Vec<Arc<dyn Reset>>,
+        begin: impl FnOnce(&Dag, usize) -> Replacement<Args, Ret> + 'd,
     ) -> Self {
-        Self::new::<Args, Ret>(dag, defer(alternatives, states)).noted_by(note_replaceable)
+        let begin = move |dag: &Dag, subtask| {
+            let (alternatives, states) = begin(dag, subtask);
+            defer(alternatives, states)
+        };
+        Self::new::<Args, Ret>(dag, begin).noted_by(note_replaceable)
     }
 }

@@ -22,6 +22,7 @@
 //! the function has returned (R3). A platform that starts an instance early is
 //! found out here as it is with typed subtasks.
 
+use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
@@ -63,7 +64,7 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 #[must_use = "it is a subtask of the DAG once it is registered"]
 pub struct Subtask<'d> {
     dag: &'d Dag,
-    body: MakeBody,
+    body: BeginBody<'d>,
     /// Takes note of it, and of what its function is.
     note: fn(&mut DagDraft, usize),
     reads: &'d [&'d str],
@@ -72,6 +73,10 @@ pub struct Subtask<'d> {
     types: [fn() -> Vec<MessageType>; 2],
     due: Option<Duration>,
 }
+
+/// Makes the body of a subtask when it is registered, which then has this number: what it uses is
+/// noted of that number, whichever subtasks are begun or registered meanwhile.
+type BeginBody<'d> = Box<dyn FnOnce(&Dag, usize) -> MakeBody + 'd>;
 
 /// Takes note of a subtask whose function is not async.
 fn note_plain(draft: &mut DagDraft, subtask: usize) {
@@ -104,15 +109,18 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::new::<Args, Ret>(self, defer(f))
+        Subtask::new::<Args, Ret>(self, move |_, _| defer(f))
     }
 }
 
 impl<'d> Subtask<'d> {
-    pub(super) fn new<Args: VecToSubs, Ret: VecToPubs>(dag: &'d Dag, body: MakeBody) -> Self {
+    pub(super) fn new<Args: VecToSubs, Ret: VecToPubs>(
+        dag: &'d Dag,
+        body: impl FnOnce(&Dag, usize) -> MakeBody + 'd,
+    ) -> Self {
         Self {
             dag,
-            body,
+            body: Box::new(body),
             note: note_plain,
             reads: &[],
             writes: &[],
@@ -162,13 +170,15 @@ impl<'d> Subtask<'d> {
     #[inline(never)]
     #[track_caller]
     pub(super) fn register_labelled(self, attributes: SubtaskAttributes) -> SubtaskLabel {
+        let number = self.dag.open().spec.subtasks.len();
+        let body = (self.body)(self.dag, number);
         let mut draft = self.dag.open();
         let [inputs, outputs] = self.types.map(|types| types());
         let ends = NamedTopics {
             inputs: (self.reads, &inputs),
             outputs: (self.writes, &outputs),
         };
-        let subtask = draft.register(self.body, ends, attributes);
+        let subtask = draft.register(body, ends, attributes);
         (self.note)(&mut draft, subtask.id.index());
         if let Some(due) = self.due {
             draft.set_sink_deadline(due, &subtask);

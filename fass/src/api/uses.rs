@@ -44,6 +44,7 @@ use crate::draft::SubtaskAttributes;
 use crate::draft::fault::Fault;
 use crate::draft::part::{CheckedDag, DraftPart};
 use crate::run::replaceable::Reset;
+use crate::run::subtask::defer;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 pub(crate) mod sealed {
@@ -257,8 +258,8 @@ fn is_source(of: &CheckedDag<'_>, input: &OutsideInput) -> bool {
 #[derive(Debug)]
 #[must_use = "register a subtask with it"]
 pub struct SubtaskBuilder<'d, U> {
-    dag: &'d Dag,
-    uses: U,
+    pub(super) dag: &'d Dag,
+    pub(super) uses: U,
 }
 
 impl Dag {
@@ -280,7 +281,7 @@ impl Dag {
     }
 }
 
-impl<'d, U: Uses> SubtaskBuilder<'d, U> {
+impl<'d, U: Uses + 'd> SubtaskBuilder<'d, U> {
     /// Works like [`Dag::source`].
     ///
     /// See [`Subtask`].
@@ -290,8 +291,7 @@ impl<'d, U: Uses> SubtaskBuilder<'d, U> {
         F: for<'a> FnMut(U::Borrowed<'a>) -> Ret + Send + 'static,
         Ret: VecToPubs,
     {
-        let (dag, mut held) = self.hold();
-        dag.source(move || f(U::borrow(&mut U::enter(&mut held))))
+        self.subtask(move |used: U::Borrowed<'_>, ()| f(used))
     }
 
     /// Works like [`Dag::subtask`].
@@ -304,8 +304,10 @@ impl<'d, U: Uses> SubtaskBuilder<'d, U> {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        let (dag, mut held) = self.hold();
-        dag.subtask(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
+        Subtask::new::<Args, Ret>(self.dag, move |dag, subtask| {
+            let mut held = self.uses.hold(dag, subtask);
+            defer(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
+        })
     }
 
     /// Works like [`Dag::register_untyped_subtask`].
@@ -327,15 +329,9 @@ impl<'d, U: Uses> SubtaskBuilder<'d, U> {
     where
         F: for<'a> FnMut(U::Borrowed<'a>, u64) + Send + 'static,
     {
-        let (dag, mut held) = self.hold();
-        let f = move |job| f(U::borrow(&mut U::enter(&mut held)), job);
-        dag.register_untyped_subtask(f, attributes)
-    }
-
-    /// Notes the uses of the subtask that is registered next.
-    #[track_caller]
-    pub(super) fn hold(self) -> (&'d Dag, U::Held) {
         let subtask = self.dag.open().spec.subtasks.len();
-        (self.dag, self.uses.hold(self.dag, subtask))
+        let mut held = self.uses.hold(self.dag, subtask);
+        let f = move |job| f(U::borrow(&mut U::enter(&mut held)), job);
+        self.dag.register_untyped_subtask(f, attributes)
     }
 }

@@ -178,13 +178,13 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::new::<Args, Ret>(self, defer(f)).noted_by(|_, _| ())
+        Subtask::new::<Args, Ret>(self, move |_, _| defer(f)).noted_by(|_, _| ())
     }
 }
 
 /// For uses that are not borrowed but given, such as that of a device: the function's future has
 /// them.
-impl<'d, U: Uses> SubtaskBuilder<'d, U> {
+impl<'d, U: Uses + 'd> SubtaskBuilder<'d, U> {
     /// Works like [`Dag::async_source`].
     ///
     /// See [`Device`](crate::shared::Device).
@@ -211,7 +211,10 @@ impl<'d, U: Uses> SubtaskBuilder<'d, U> {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        let (dag, mut held) = self.hold();
-        dag.async_subtask(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
+        let begin = move |dag: &Dag, subtask| {
+            let mut held = self.uses.hold(dag, subtask);
+            defer(move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args))
+        };
+        Subtask::new::<Args, Ret>(self.dag, begin).noted_by(|_, _| ())
     }
 }

@@ -6,6 +6,7 @@ use std::slice;
 
 use crate::support::{PERIOD, named, panic_message};
 use fass::commit::{ConstructionPolicy, CountLimit, finish_create_dags_with};
+use fass::shared::Parameter;
 use fass::{Dag, create_dag};
 
 /// Commits DAGs that are refused for these reasons: the beginnings of all lines.
@@ -106,4 +107,22 @@ fn all_faults_of_all_dags_come_at_once_and_nothing_else_is_blamed() {
             "dag `6` has no subtask",
         ],
     );
+}
+
+/// Each use is noted of its own subtask, wherever that comes.
+#[test]
+fn builders_may_be_registered_in_another_order() {
+    let (dag, gain) = (create_dag(), Parameter::new("gain", 0.5, 0.0..=2.0));
+    let read = (dag.period(PERIOD).using(gain.reading())).source(|gain: f64| (gain,));
+    let show = dag.subtask(|_: (f64,)| ()).reads(&["gain"]).due(PERIOD);
+    show.register(named("show"));
+    read.writes(&["gain"]).register(named("read"));
+    drop(crate::support::commit(&[dag]));
+}
+
+#[test]
+fn what_is_never_registered_is_no_subtask() {
+    let (dag, gain) = (faultless("done"), Parameter::new("gain", 0.5, 0.0..=2.0));
+    drop(dag.using(gain.reading()).source(|_gain: f64| ()));
+    drop(crate::support::commit(&[dag]));
 }
