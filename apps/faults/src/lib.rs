@@ -10,7 +10,7 @@
 //!
 //! A [`restless`] DAG commits one crime after the other, thousands of them, and goes on.
 
-#![cfg_attr(not(test), no_std)]
+#![no_std]
 
 extern crate alloc;
 
@@ -245,35 +245,4 @@ fn pipeline(
         attributes("store"),
     );
     dag
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use virtual_time::VirtualTime;
-
-    #[test]
-    fn a_driver_answers_until_its_crime() {
-        let machine = VirtualTime::new().cores(1).contain_panics();
-        let [asks, serves] = served(|| panic!("in a driver"));
-        fass::finish_create_dags(&[healthy(), asks, serves]).unwrap();
-        let report = machine.run();
-        let faults = ["healthy", "asks", "doomed"].map(|dag| report.dag(dag).statistics().faults);
-        assert_eq!(faults, [0, 0, 1]);
-        assert_eq!(report.dag("doomed").statistics().completed, FATAL_JOB);
-        assert!(report.dags().all(|dag| dag.statistics().misses == 0));
-    }
-
-    #[test]
-    fn both_meet_every_deadline_without_a_crime() {
-        let machine = VirtualTime::new().cores(1);
-        fass::finish_create_dags(&[
-            healthy(),
-            pipeline("doomed", 1, None, None, Policy::Restart),
-        ])
-        .unwrap();
-        let report = machine.run();
-        let misses: u64 = report.dags().map(|dag| dag.statistics().misses).sum();
-        assert_eq!((report.jobs.len(), misses), (60, 0));
-    }
 }
