@@ -1,6 +1,5 @@
 //! The kernel against reference schedules: the public cases for up to four
-//! cores run on the bare machine as the reference says, and where they do not,
-//! the first difference is named. Cases in which no two completions, and no
+//! cores run on the bare machine as the reference says. Cases in which no two completions, and no
 //! completion and release, fall on the same instant run so without a window,
 //! too: with each event decided at once, as in apps.
 
@@ -75,21 +74,4 @@ fn events_apart_need_no_window() {
         ..Settings::for_unit(UNIT_US)
     };
     are_reproduced(&cases, &settings);
-}
-
-#[test]
-fn a_schedule_that_is_not_the_reference_s_is_found_out() {
-    let mut case = cases(|case| case.name == "pub012").remove(0);
-    // Longer than the reference takes it to be: what follows comes too late.
-    let instance = case
-        .instances
-        .first_entry()
-        .expect("it has some")
-        .into_mut();
-    assert_eq!(instance.finish_ns, 3);
-    instance.finish_ns = 2;
-    let judged = run(&[case], &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
-    let difference = judged[0].outcome.clone().expect_err("a difference");
-    let expected = "dag 0 job 0 subtask 0: finish: expected 2, found 2.99";
-    assert!(difference.starts_with(expected), "{difference}");
 }
