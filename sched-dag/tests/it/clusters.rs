@@ -1,24 +1,14 @@
 //! Clusters: each is bounded as if it were alone on a machine of its own. (That it runs so, each
 //! scenario tells, event by event.)
 
-use std::sync::Arc;
-
-use sched_dag::analysis::{
-    self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest,
-};
+use sched_dag::analysis::{self, AnalysisResult, NotProvenReason, SchedulabilityTest};
 use sched_dag::{
-    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy,
-    SchedulerOptions, SubtaskId, TaskSet, verify,
+    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy, Preemption,
+    SubtaskId, verify,
 };
 
+use crate::analysis::{bounds, settings};
 use crate::support::{self, TWO_CORES};
-
-fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: CoreDivision) -> Arc<TaskSet> {
-    let options = CommitOptions::new(options.policy, options.cores)
-        .with_construction(ConstructionPolicy::any_graph())
-        .with_clusters(clusters);
-    Arc::new(verify(specs, &options).expect("sets are right").task_set)
-}
 
 /// Two DAGs of 6 ms each in 10, and one of unknown length.
 fn three() -> [DagSpec; 3] {
@@ -30,20 +20,13 @@ fn three() -> [DagSpec; 3] {
     })
 }
 
-const EDF: SchedulerOptions = SchedulerOptions {
-    policy: Policy::Edf,
-    ..TWO_CORES
-};
-
 /// Analyses DAGs in two clusters of one core.
 fn answer(specs: &[DagSpec]) -> (AnalysisResult, String) {
-    let settings = AnalysisSettings {
-        policy: EDF.policy,
-        preemption: EDF.preemption,
-        cores: EDF.cores,
-        overheads: Overheads::default(),
-    };
-    let task_set = commit(specs, EDF, CoreDivision::Of(vec![1, 1]));
+    let settings = settings((Policy::Edf, Preemption::Enabled), 2);
+    let options = CommitOptions::new(Policy::Edf, 2)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_clusters(CoreDivision::Of(vec![1, 1]));
+    let task_set = verify(specs, &options).expect("sets are right").task_set;
     let answer = analysis::answer(&task_set, &settings);
     (answer, analysis::witness(&task_set, &settings))
 }
@@ -51,8 +34,7 @@ fn answer(specs: &[DagSpec]) -> (AnalysisResult, String) {
 #[test]
 fn each_cluster_is_analysed_on_its_own_cores() {
     let (one_each, _) = answer(&three()[..2]);
-    let bounds = one_each.bounds.iter().map(|bound| bound.unwrap().bound_ns);
-    assert_eq!(bounds.collect::<Vec<_>>(), [6, 6]);
+    assert_eq!(bounds(&one_each), [Some(6), Some(6)]);
     assert_eq!(one_each.sinks_ns, [[Some(6)], [Some(6)]]);
     // Both on one core: that is too much for it, and the other cluster's core is no help.
     let (one_for_both, _) = answer(&[three()[1].clone(), three()[1].clone()]);
@@ -124,7 +106,7 @@ fn bounds_of_pinned_subtasks_need_an_order_on_cores_of_their_own() {
 fn an_undivided_machine_is_cluster_0() {
     let mut dag = support::dag(10, 10, 1, &[1], &[]);
     dag.cluster = Some(ClusterId(0));
-    let task_set = commit(&[dag], EDF, CoreDivision::Undivided);
+    let task_set = support::commit(&[dag], TWO_CORES);
     assert!(!task_set.is_divided());
     assert_eq!(task_set.clusters().collect::<Vec<_>>(), [ClusterId(0)]);
     assert_eq!(task_set.cores_of(ClusterId(0), 2), 0..2);

@@ -14,7 +14,8 @@ mod witnesses;
 mod worked;
 
 use sched_dag::analysis::{
-    AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError, answer, fix_orders,
+    AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError,
+    answer, fix_orders,
 };
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, OverrunPolicy,
@@ -26,13 +27,24 @@ use simulate::{commit, responses, spec};
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
 const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
 
-fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> AnalysisSettings {
+pub(crate) fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> AnalysisSettings {
     AnalysisSettings {
         policy,
         preemption,
         cores,
         overheads: Overheads::default(),
     }
+}
+
+/// Commits DAGs of any shape, and analyses them.
+fn answered(specs: &[DagSpec], settings: &AnalysisSettings) -> AnalysisResult {
+    answer(&commit(specs, settings.policy, settings.cores), settings)
+}
+
+/// Returns the bounds of all DAGs.
+pub(crate) fn bounds(answer: &AnalysisResult) -> Vec<Option<u64>> {
+    let bounds = answer.bounds.iter();
+    bounds.map(|bound| Some((*bound)?.bound_ns)).collect()
 }
 
 #[test]
@@ -67,8 +79,8 @@ fn overlapping_jobs_take_more_cores() {
         if instance.dag.0 == 0 { 6 } else { 3 }
     });
     assert_eq!(observed[1], 9);
-    let bound = answer(&stacked, &settings(FP, 4)).bounds[1];
-    assert!(bound.is_some_and(|bound| bound.bound_ns >= 9), "{bound:?}");
+    let bound = bounds(&answer(&stacked, &settings(FP, 4)))[1];
+    assert!(bound >= Some(9), "{bound:?}");
 }
 
 #[test]
@@ -124,8 +136,7 @@ fn each_dag_without_a_bound_has_its_reason_and_the_surest_one_is_the_first() {
                  specs: &[DagSpec],
                  expected: &[Option<NotProvenReason>],
                  first: Option<usize>| {
-        let task_set = commit(specs, kind.0, cores);
-        let answer = answer(&task_set, &settings(kind, cores));
+        let answer = answered(specs, &settings(kind, cores));
         assert_eq!(answer.reasons, expected);
         for (bound, reason) in answer.bounds.iter().zip(expected) {
             assert_ne!(bound.is_some(), reason.is_some());
@@ -157,14 +168,9 @@ fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
     let fork: Vec<(usize, usize)> = (1..=18).map(|branch| (0, branch)).collect();
     let one = |priority| spec(100, 100, &[10], &[], priority);
     let on = |policy, cores, last: DagSpec| {
-        let task_set = commit(&[one(0), last], policy, cores);
         let mut with = settings((policy, Preemption::Enabled), cores);
         with.overheads.ready_ns = 1;
-        let bounds = answer(&task_set, &with).bounds;
-        bounds
-            .iter()
-            .map(|bound| bound.map(|bound| bound.bound_ns))
-            .collect::<Vec<_>>()
+        bounds(&answered(&[one(0), last], &with))
     };
     // Two releases, and a window begins 2 before the first may be served.
     assert_eq!(on(Policy::StaticPriority, 1, one(1)), [Some(12), Some(22)]);
@@ -187,7 +193,7 @@ fn what_falls_behind_is_charged_for_all_that_it_releases_late() {
         let specs = [urgent.clone(), hog.clone(), last];
         let mut with = settings(FP, 2);
         with.overheads.ready_ns = 1;
-        answer(&commit(&specs, FP.0, 2), &with)
+        answered(&specs, &with)
     };
     let bound = |sources, edges: &[_], overrun| {
         let answer = beside(sources, edges, overrun);
@@ -215,24 +221,19 @@ fn overheads_beside_pinned_subtasks_count_in_each_bound() {
     let mut owner = spec(10, 10, &[3], &[], 0);
     owner.subtasks[0].core = Some(0);
     let mut member = spec(20, 20, &[5], &[], 1);
-    let bounds = |member: &DagSpec, ready_ns, interrupt_ns| {
-        let task_set = commit(&[owner.clone(), member.clone()], Policy::StaticPriority, 2);
+    let both = |member: &DagSpec, ready_ns, interrupt_ns| {
         let mut with = settings(FP, 2);
         (with.overheads.ready_ns, with.overheads.interrupt_ns) = (ready_ns, interrupt_ns);
-        let bounds = answer(&task_set, &with).bounds;
-        bounds
-            .iter()
-            .map(|bound| bound.unwrap().bound_ns)
-            .collect::<Vec<_>>()
+        bounds(&answered(&[owner.clone(), member.clone()], &with))
     };
     // It has both cores: one is always free, and a whole unit is halved and rounded up.
-    assert_eq!(bounds(&member, 0, 0), [3, 6]);
+    assert_eq!(both(&member, 0, 0), [3, 6].map(Some));
     // Twice the owner moves it to the other core; and of what the owner takes each has half.
-    assert_eq!(bounds(&member, 0, 1), [3 + 1, 5 + 1 + 2 + 2]);
+    assert_eq!(both(&member, 0, 1), [3 + 1, 5 + 1 + 2 + 2].map(Some));
     member.affinity = vec![0];
-    assert_eq!(bounds(&member, 0, 0), [3, 5 + 3]);
+    assert_eq!(both(&member, 0, 0), [3, 5 + 3].map(Some));
     // Releases are 2 late, and so is the owner: at 12 it may come for the second time in 14.
-    assert_eq!(bounds(&member, 1, 0), [3 + 2, 5 + 2 * 3 + 3]);
+    assert_eq!(both(&member, 1, 0), [3 + 2, 5 + 2 * 3 + 3].map(Some));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use sched_dag::analysis::{AnalysisResult, SchedulabilityTest, answer};
 use sched_dag::{DagSpec, Policy, Preemption, TaskSet};
 
 use super::simulate::{commit, responses, spec};
-use super::{FP, settings};
+use super::{FP, answered, bounds, settings};
 
 /// Draws DAGs of one subtask that are all released at once, and again after 120, and that are no
 /// overload in the long run; answers, and observes the longest responses.
@@ -83,8 +83,6 @@ fn what_a_carry_in_would_count_twice_is_proven() {
     let specs = (0..).zip(dags);
     let specs =
         specs.map(|(priority, (period, wcet))| spec(period, period, &[wcet], &[], priority));
-    let task_set = commit(&specs.collect::<Vec<_>>(), FP.0, 1);
-    let bounds = answer(&task_set, &settings(FP, 1)).bounds;
-    let bounds = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
-    assert!(bounds.eq([Some(42), Some(771), Some(772)]));
+    let answer = answered(&specs.collect::<Vec<_>>(), &settings(FP, 1));
+    assert_eq!(bounds(&answer), [Some(42), Some(771), Some(772)]);
 }

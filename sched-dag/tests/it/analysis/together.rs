@@ -25,6 +25,7 @@ use sched_dag::analysis::{
 };
 use sched_dag::{Activation, AssignmentReason, LendingAttempt, SubtaskId, TaskSet};
 
+use super::bounds;
 use super::climb::{Case, Climbed};
 use super::random::{FEATURES, Sample, bit, sample_with};
 use crate::support::number;
@@ -274,15 +275,9 @@ fn tighter(answer: &AnalysisResult) -> u64 {
 /// Reports whether bounds are shorter than others; `None`: one is longer.
 fn is_no_longer(fixed: &AnalysisResult, free: &AnalysisResult) -> Option<bool> {
     // None is longer than all.
-    let [fixed, free] = [fixed, free].map(|answer| {
-        let bounds = answer
-            .bounds
-            .iter()
-            .map(|bound| bound.map(|bound| bound.bound_ns));
-        bounds
-            .map(|bound| bound.unwrap_or(u64::MAX))
-            .collect::<Vec<_>>()
-    });
-    let is_longer = fixed.iter().zip(&free).any(|(fixed, free)| fixed > free);
+    let [fixed, free] = [fixed, free].map(bounds);
+    let none = |bound: &Option<u64>| bound.unwrap_or(u64::MAX);
+    let mut pairs = fixed.iter().map(none).zip(free.iter().map(none));
+    let is_longer = pairs.any(|(fixed, free)| fixed > free);
     (!is_longer).then_some(fixed != free)
 }

@@ -2,13 +2,11 @@
 
 use std::slice;
 
-use sched_dag::analysis::{
-    AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, answer,
-};
+use sched_dag::analysis::{NotProvenReason, Overheads, SchedulabilityTest, answer};
 use sched_dag::{DagId, DagSpec, Policy, Preemption, SubtaskOrder, Wait};
 
 use super::simulate::{commit, spec};
-use super::{DIAMOND, FP, settings};
+use super::{DIAMOND, FP, answered, bounds, settings};
 
 const EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Enabled);
 
@@ -19,15 +17,6 @@ fn waiting(mut spec: DagSpec, subtask: usize, limit_ns: u64, segment_ns: u64) ->
         segment_ns: Some(segment_ns),
     });
     spec
-}
-
-fn answered(specs: &[DagSpec], settings: &AnalysisSettings) -> AnalysisResult {
-    answer(&commit(specs, settings.policy, settings.cores), settings)
-}
-
-fn bounds(answer: &AnalysisResult) -> Vec<Option<u64>> {
-    let bounds = answer.bounds.iter();
-    bounds.map(|bound| Some((*bound)?.bound_ns)).collect()
 }
 
 #[test]

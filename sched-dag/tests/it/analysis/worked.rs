@@ -1,13 +1,13 @@
 //! Worked examples: values from the papers, and schedules that show them.
 
 use sched_dag::analysis::{
-    InterferenceBound, NotProvenReason, Task, answer, covers, intra_task, multi_path,
-    multi_path_edf, multi_path_fp, width,
+    InterferenceBound, NotProvenReason, Task, covers, intra_task, multi_path, multi_path_edf,
+    multi_path_fp, width,
 };
 use sched_dag::{DagSpec, Instance, Policy, Preemption, Priority};
 
 use super::simulate::{commit, observe, responses, spec};
-use super::{DIAMOND, FP, settings};
+use super::{DIAMOND, FP, answered, bounds, settings};
 use crate::support::Script;
 
 const NON_PREEMPTIVE_EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Disabled);
@@ -64,7 +64,11 @@ fn e2_e3_and_e13_two_dags() {
     ];
     for (policy, expected) in [(Policy::StaticPriority, [4, 14]), (Policy::Edf, [8, 14])] {
         let kind = (policy, Preemption::Enabled);
-        assert_eq!(bounds(&specs, kind, 2).0, expected.map(Some), "{policy:?}");
+        assert_eq!(
+            bounds(&answered(&specs, &settings(kind, 2))),
+            expected.map(Some),
+            "{policy:?}"
+        );
     }
     assert_eq!(width(&fork_join()), Some(4));
 }
@@ -138,21 +142,9 @@ fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
         &[(0, 1), (1, 2)],
         1,
     );
-    let task_set = commit(&[urgent, slow], FP.0, 2);
-    let answer = answer(&task_set, &settings(FP, 2));
-    assert_eq!(answer.bounds[0].map(|bound| bound.bound_ns), Some(40_000));
+    let answer = answered(&[urgent, slow], &settings(FP, 2));
+    assert_eq!(bounds(&answer)[0], Some(40_000));
     assert_eq!(answer.reasons, [None, Some(NotProvenReason::Limit)]);
-}
-
-/// Returns the bounds of jobs and of their sinks.
-fn bounds(
-    specs: &[DagSpec],
-    kind: (Policy, Preemption),
-    cores: u32,
-) -> (Vec<Option<u64>>, Vec<Vec<Option<u64>>>) {
-    let answer = answer(&commit(specs, kind.0, cores), &settings(kind, cores));
-    let jobs = answer.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
-    (jobs.collect(), answer.sinks_ns)
 }
 
 #[test]
@@ -162,8 +154,8 @@ fn under_edf_what_has_a_shorter_deadline_may_block_too() {
     // before it.
     let chain = spec(40, 40, &[2, 3], &[(0, 1)], 0);
     let short = spec(20, 20, &[6], &[], 1);
-    let (jobs, _) = bounds(&[chain, short], NON_PREEMPTIVE_EDF, 2);
-    assert_eq!(jobs, [Some(14), Some(9)]);
+    let answer = answered(&[chain, short], &settings(NON_PREEMPTIVE_EDF, 2));
+    assert_eq!(bounds(&answer), [Some(14), Some(9)]);
 }
 
 #[test]
@@ -173,15 +165,14 @@ fn a_sink_waits_for_what_is_due_later_and_keeps_its_core() {
     quick.offset_ns = 1;
     let slow = spec(1000, 1000, &[50], &[], 0);
     let specs = [quick.clone(), slow.clone()];
-    assert_eq!(bounds(&specs, NON_PREEMPTIVE_EDF, 1).0[0], None);
+    let settings = settings(NON_PREEMPTIVE_EDF, 1);
+    assert_eq!(answered(&specs, &settings).bounds[0], None);
     // With time to wait for it, that is what the bounds count.
     quick.subtasks[0].relative_deadline_ns = Some(60);
     let specs = [quick, slow];
-    let (jobs, sinks) = bounds(&specs, NON_PREEMPTIVE_EDF, 1);
-    assert_eq!(
-        (jobs[0], &sinks[0][..]),
-        (Some(52), &[Some(52), Some(52)][..])
-    );
+    let answer = answered(&specs, &settings);
+    assert_eq!(bounds(&answer)[0], Some(52));
+    assert_eq!(answer.sinks_ns[0], [Some(52), Some(52)]);
     let (policy, preemption) = NON_PREEMPTIVE_EDF;
     let task_set = commit(&specs, policy, 1);
     let script = Script::new(|instance: Instance| [1, 50, 50][instance.dag.index()]);
