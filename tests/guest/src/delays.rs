@@ -23,6 +23,9 @@ const TIMES: u64 = 60;
 /// The text of a disturbance.
 const LINES: u64 = 10;
 
+/// How often its section was entered.
+static LOCK: Lock<u64> = Lock::new("shared", 0).longest(us(25));
+
 type Work = Box<dyn FnMut() + Send>;
 
 /// A disturbance: its name, and what makes its DAGs.
@@ -62,8 +65,11 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
             let attributes = named(name).priority(priority).wcet(us(20));
             single_every(us(1_000), name, TIMES + 5, attributes, || hold(19))
         };
-        let mut dags = alloc::vec![bounded("urgent", 0), bounded("modest", 9)];
+        let mut dags = alloc::vec![bounded("urgent", 0)];
         dags.extend(disturb());
+        if cause != "sections" {
+            dags.push(bounded("modest", 9));
+        }
         tell(machine, cause, &dags, &["urgent", "modest"])?;
     }
     Ok(())
@@ -121,7 +127,10 @@ fn tell(machine: &Machine, cause: &str, dags: &[Dag], names: &[&str]) -> Result<
                 .text("dag_name", name)
                 .number("bound_ns", run.bound_ns(name).unwrap_or(0))
                 .number("longest_ns", run.response_times_ns(name).max().unwrap_or(0))
-                .number("jobs", run.statistics(name).completed);
+                .number("jobs", run.statistics(name).completed)
+                .number("entered", LOCK.with(|entered| *entered))
+                .number("allocations", run.allocations())
+                .number("violations", run.violations().count() as u64);
         });
     }
     Ok(())
@@ -207,16 +216,22 @@ fn backlog() -> Vec<Dag> {
     alloc::vec![switch, over]
 }
 
-/// They enter sections of one lock, on each core.
+/// They enter sections of one lock, on each core; and so does the less urgent DAG with a bound.
 fn sections() -> Vec<Dag> {
-    static LOCK: Lock<()> = Lock::new("shared", ()).longest(us(25));
-    let single = |number| {
-        let dag = disturbance(&format!("section-{number}"));
-        let attributes = named("enters").priority(5).wcet(us(30));
+    let entering = |dag: Dag, priority| {
+        let enter = |entered: &mut u64| {
+            hold(15);
+            *entered += 1;
+        };
+        let attributes = named("enters").priority(priority).wcet(us(30));
         dag.using(LOCK.entering(1))
-            .source(|()| LOCK.with(|_| hold(15)))
+            .source(move |()| LOCK.with(enter))
             .register(attributes);
         dag
     };
-    (0..4).map(single).collect()
+    let modest = disturbance("modest");
+    (modest.jobs(TIMES + 5).period(us(1_000))).relative_deadline(us(1_000));
+    modest.offset(Duration::ZERO);
+    let others = (0..4).map(|number| entering(disturbance(&format!("section-{number}")), 5));
+    others.chain([entering(modest, 9)]).collect()
 }

@@ -15,7 +15,6 @@ mod input;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
-mod locks;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -54,7 +53,6 @@ const TESTS: &[(&str, Test)] = &[
     ("exceeded", single::exceeded),
     ("input", input::run),
     ("large", large::run),
-    ("locks", locks::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_long", recorded::long),

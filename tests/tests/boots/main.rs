@@ -17,7 +17,6 @@ mod in_bochs;
 mod input;
 mod join_latency;
 mod kernel;
-mod locks;
 mod module;
 mod new_app;
 mod on_screen;
