@@ -85,9 +85,9 @@ fn events(schedule: &str) -> Vec<Event> {
     events
 }
 
-/// Compares what is found in a schedule.
+/// Compares what is found in a schedule with lines.
 #[track_caller]
-fn must(task_set: &TaskSet, cores: u32, schedule: &str, expected: &[&str]) {
+fn must(task_set: &TaskSet, cores: u32, schedule: &str, expected: &str) {
     // The deadlines are in the order of the priorities.
     for policy in [Policy::StaticPriority, Policy::Edf] {
         let options = SchedulerOptions {
@@ -98,7 +98,7 @@ fn must(task_set: &TaskSet, cores: u32, schedule: &str, expected: &[&str]) {
         let events = events(schedule).into_iter();
         let found = dispatch_violations(task_set, &options, JudgeOptions::EXACT, events);
         let found: Vec<_> = found.iter().map(ToString::to_string).collect();
-        assert_eq!(found, expected, "{policy:?}");
+        assert_eq!(found.join("\n"), expected, "{policy:?}");
     }
 }
 
@@ -109,39 +109,53 @@ fn passed_over(at_ns: u64, waiting: u32, length_ns: u64, why: &str) -> String {
     )
 }
 
+/// What a DAG's subtask does from 0 to so long where it must not.
+fn misplaced(dag: u32, end_ns: u64, why: &str) -> String {
+    let does = |at_ns, what| {
+        format!("at {at_ns} ns, R5 dispatch: subtask 0 of dag {dag} job 0 {what} on core {why}")
+    };
+    does(0, "starts") + "\n" + &does(end_ns, "finishes")
+}
+
+/// The last DAG's subtask keeps core 0 from 0 on.
+fn chosen(last: u32) -> String {
+    format!(
+        "at 0 ns, R5 dispatch: subtask 0 of dag {last} job 0 starts on core 0 and keeps it, \
+         although subtask 0 of dag 0 job 0 waits since 0 ns and goes first"
+    )
+}
+
 #[test]
 fn r5_accepts_preemption_and_a_full_machine() {
     let two = dags(&[0, 0], false);
-    must(&two, 1, "4 0: 1@0 0-4, 0@0 4-9, 1@0 9-12", &[]);
-    must(&two, 2, "2 0: 1@0 0-4, 0@1 2-9", &[]);
-    must(&two, 1, "0 0: 1@0 0-0, 0@0 0-3", &[]);
+    must(&two, 1, "4 0: 1@0 0-4, 0@0 4-9, 1@0 9-12", "");
+    must(&two, 2, "2 0: 1@0 0-4, 0@1 2-9", "");
+    must(&two, 1, "0 0: 1@0 0-0, 0@0 0-3", "");
 }
 
 #[test]
 fn r5_finds_an_idle_core_and_a_missing_preemption() {
     let two = dags(&[0, 0], false);
     let idle = passed_over(0, 1, 4, "core 1 is idle");
-    must(&two, 2, "0 0: 0@0 0-4, 1@0 4-9", &[&idle]);
+    must(&two, 2, "0 0: 0@0 0-4, 1@0 4-9", &idle);
     let not_preempted = passed_over(4, 0, 5, "core 0 runs subtask 0 of dag 1 job 0");
-    must(&two, 1, "4 0: 1@0 0-9, 0@0 9-12", &[&not_preempted]);
+    must(&two, 1, "4 0: 1@0 0-9, 0@0 9-12", &not_preempted);
     // Of two, the one with the larger key is preempted.
     let three = dags(&[0, 0, 0], false);
     let wrong_one = passed_over(4, 1, 2, "core 1 runs subtask 0 of dag 2 job 0");
     let ran = "4 0 0: 1@0 0-4, 2@1 0-9, 0@0 4-6, 1@0 6-8";
-    must(&three, 2, ran, &[&wrong_one]);
+    must(&three, 2, ran, &wrong_one);
 }
 
 #[test]
 fn r5_lets_a_started_instance_keep_its_core() {
     let two = dags(&[0, 0], true);
-    must(&two, 1, "4 0: 1@0 0-9, 0@0 9-12", &[]);
+    must(&two, 1, "4 0: 1@0 0-9, 0@0 9-12", "");
     // Chosen at one instant, the smaller key comes first all the same.
-    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 0 and keeps it, \
-                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
-    must(&two, 1, "0 0: 1@0 0-9, 0@0 9-12", &[chosen]);
+    must(&two, 1, "0 0: 1@0 0-9, 0@0 9-12", &chosen(1));
     let lost = "at 6 ns, R5 dispatch: subtask 0 of dag 1 job 0 is resumed on core 0 although it \
                 keeps its core until it finishes";
-    must(&two, 1, "4 0: 1@0 0-4, 0@0 4-6, 1@0 6-9", &[lost]);
+    must(&two, 1, "4 0: 1@0 0-4, 0@0 4-6, 1@0 6-9", lost);
 }
 
 #[test]
@@ -158,16 +172,10 @@ fn finds_a_core_or_an_instance_in_two_places() {
 fn r5_holds_within_each_cluster() {
     let three = dags(&[0, 0, 1], false);
     // DAG 1 waits for core 0, though core 1 is idle and runs a less urgent one.
-    must(&three, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", &[]);
+    must(&three, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", "");
     let idle = passed_over(2, 2, 3, "core 1 is idle");
-    must(&three, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 5-7", &[&idle]);
-    let outside = [(0, "starts"), (5, "finishes")].map(|(at_ns, what)| {
-        format!(
-            "at {at_ns} ns, R5 dispatch: subtask 0 of dag 1 job 0 {what} on core 1, outside its \
-             cluster"
-        )
-    });
-    let outside = outside.each_ref().map(String::as_str);
+    must(&three, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 5-7", &idle);
+    let outside = misplaced(1, 5, "1, outside its cluster");
     must(&three, 2, "0 0 5: 0@0 0-4, 1@1 0-5, 2@1 5-7", &outside);
 }
 
@@ -176,52 +184,41 @@ fn r5_lets_pinned_instances_go_first_on_their_core() {
     // DAG 2, the least urgent, takes core 0 from DAG 0, which takes core 1 from DAG 1.
     let last = pinned(&[0, 0, 0], false, &[None, None, Some(0)]);
     let right = "0 0 4: 0@0 0-4, 1@1 0-4, 2@0 4-6, 0@1 4-9, 1@0 6-9";
-    must(&last, 2, right, &[]);
+    must(&last, 2, right, "");
     let waits = passed_over(4, 2, 5, "core 0 runs subtask 0 of dag 0 job 0");
-    must(&last, 2, "0 0 4: 0@0 0-9, 1@1 0-9, 2@0 9-12", &[&waits]);
+    must(&last, 2, "0 0 4: 0@0 0-9, 1@1 0-9, 2@0 9-12", &waits);
     // DAG 1 is the one that has to go.
     let wrong_one = passed_over(4, 0, 2, "core 1 runs subtask 0 of dag 1 job 0");
     let ran = "0 0 4: 0@0 0-4, 1@1 0-9, 2@0 4-6, 0@0 6-9";
-    must(&last, 2, ran, &[&wrong_one]);
+    must(&last, 2, ran, &wrong_one);
     // An idle core is not idle for one that is pinned to another.
-    must(&last, 2, "0 9 0: 2@0 0-4, 0@1 0-4, 1@0 9-12", &[]);
+    must(&last, 2, "0 9 0: 2@0 0-4, 0@1 0-4, 1@0 9-12", "");
     let both = pinned(&[0, 0], false, &[Some(1), Some(1)]);
-    must(&both, 2, "0 0: 0@1 0-4, 1@1 4-9", &[]);
+    must(&both, 2, "0 0: 0@1 0-4, 1@1 4-9", "");
     let order = passed_over(0, 0, 4, "core 1 runs subtask 0 of dag 1 job 0");
-    must(&both, 2, "0 0: 1@1 0-4, 0@1 4-9", &[&order]);
+    must(&both, 2, "0 0: 1@1 0-4, 0@1 4-9", &order);
     let idle = passed_over(0, 0, 2, "core 1 is idle");
-    must(&both, 2, "0 0: 0@1 2-4, 1@1 4-9", &[&idle]);
+    must(&both, 2, "0 0: 0@1 2-4, 1@1 4-9", &idle);
     // While core 1 waits for that, core 0 is idle for what is not pinned.
     let one = pinned(&[0, 0], false, &[Some(1)]);
     let of_other = passed_over(0, 1, 4, "core 0 is idle");
-    must(&one, 2, "0 0: 0@1 0-4, 1@0 4-9", &[&of_other]);
+    must(&one, 2, "0 0: 0@1 0-4, 1@0 4-9", &of_other);
 }
 
 #[test]
 fn r5_judges_cores_and_starts_of_pinned_instances() {
-    let off = |dag, core, pin| {
-        [(0, "starts"), (4, "finishes")].map(|(at_ns, what)| {
-            format!(
-                "at {at_ns} ns, R5 dispatch: subtask 0 of dag {dag} job 0 {what} on core {core}, \
-                 and is pinned to core {pin}"
-            )
-        })
-    };
     let one = pinned(&[0, 0], false, &[Some(1)]);
-    let found = off(0, 0, 1);
-    let found = found.each_ref().map(String::as_str);
-    must(&one, 2, "0 4: 0@0 0-4, 1@1 4-9", &found);
+    let off = misplaced(0, 4, "0, and is pinned to core 1");
+    must(&one, 2, "0 4: 0@0 0-4, 1@1 4-9", &off);
     // A core of its cluster is meant.
     let second = pinned(&[0, 0, 1], false, &[None, None, Some(0)]);
-    must(&second, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", &[]);
+    must(&second, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", "");
     // What keeps its core keeps it from pinned ones, but starts after them.
     let keeps = pinned(&[0, 0], true, &[Some(0)]);
-    must(&keeps, 1, "2 0: 1@0 0-4, 0@0 4-9", &[]);
+    must(&keeps, 1, "2 0: 1@0 0-4, 0@0 4-9", "");
     let least = pinned(&[0, 0], true, &[None, Some(0)]);
-    must(&least, 1, "0 0: 1@0 0-4, 0@0 4-9", &[]);
-    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 0 and keeps it, \
-                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
-    must(&keeps, 1, "0 0: 1@0 0-4, 0@0 4-9", &[chosen]);
+    must(&least, 1, "0 0: 1@0 0-4, 0@0 4-9", "");
+    must(&keeps, 1, "0 0: 1@0 0-4, 0@0 4-9", &chosen(1));
 }
 
 #[test]
@@ -231,34 +228,26 @@ fn r5_judges_each_group_of_cores_by_itself() {
     let lent = placed(&[0; 4], false, &pins, &[&[2, 0], &[0, 2], &[1], &[]]);
     // DAG 0 gives way to the owner, and DAG 1 to it, though it is more urgent than DAG 2.
     let right = "0 0 0 4: 0@0 0-4, 1@2 0-4, 2@1 0-9, 3@0 4-6, 0@2 4-7, 1@0 6-9";
-    must(&lent, 3, right, &[]);
+    must(&lent, 3, right, "");
     let wrong_one = passed_over(4, 0, 2, "core 2 runs subtask 0 of dag 1 job 0");
     let ran = "0 0 0 4: 0@0 0-4, 1@2 0-9, 2@1 0-9, 3@0 4-6, 0@0 6-9";
-    must(&lent, 3, ran, &[&wrong_one]);
+    must(&lent, 3, ran, &wrong_one);
     // Core 1 is not idle for DAG 1, and core 0 is, whatever runs elsewhere.
-    must(&lent, 3, "0 0 0 0: 3@0 0-4, 0@2 0-4, 1@2 4-9, 2@1 0-2", &[]);
+    must(&lent, 3, "0 0 0 0: 3@0 0-4, 0@2 0-4, 1@2 4-9, 2@1 0-2", "");
     let inside = passed_over(4, 1, 5, "core 0 is idle");
     let ran = "0 0 0 0: 3@0 0-4, 0@2 0-9, 1@0 9-12, 2@1 0-2";
-    must(&lent, 3, ran, &[&inside]);
+    must(&lent, 3, ran, &inside);
     let idle = passed_over(0, 2, 2, "core 1 is idle");
     let ran = "0 0 0 9: 0@0 0-9, 1@2 0-9, 2@1 2-4, 3@0 9-12";
-    must(&lent, 3, ran, &[&idle]);
-    let away = [(0, "starts"), (4, "finishes")].map(|(at_ns, what)| {
-        format!(
-            "at {at_ns} ns, R5 dispatch: subtask 0 of dag 1 job 0 {what} on core 3, to which its \
-             DAG has no affinity"
-        )
-    });
-    let away = away.each_ref().map(String::as_str);
+    must(&lent, 3, ran, &idle);
+    let away = misplaced(1, 4, "3, to which its DAG has no affinity");
     let ran = "0 0 0 4: 0@0 0-4, 1@3 0-4, 2@1 0-4, 3@0 4-9";
     must(&lent, 4, ran, &away);
     // What keeps its core starts after the more urgent of its group, though another core is idle.
     let keeps = placed(&[0; 3], true, &[], &[&[0], &[1], &[0]]);
-    must(&keeps, 2, "0 0 0: 0@0 0-4, 2@0 4-9, 1@1 0-9", &[]);
-    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 2 job 0 starts on core 0 and keeps it, \
-                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
-    must(&keeps, 2, "0 9 0: 2@0 0-4, 0@0 4-9, 1@1 9-12", &[chosen]);
+    must(&keeps, 2, "0 0 0: 0@0 0-4, 2@0 4-9, 1@1 0-9", "");
+    must(&keeps, 2, "0 9 0: 2@0 0-4, 0@0 4-9, 1@1 9-12", &chosen(2));
     // Cores of its cluster are meant.
     let second = placed(&[0, 1, 1], false, &[None, None, Some(0)], &[&[], &[], &[]]);
-    must(&second, 2, "0 0 2: 0@0 0-4, 1@1 0-2, 2@1 2-5, 1@1 5-6", &[]);
+    must(&second, 2, "0 0 2: 0@0 0-4, 1@1 0-2, 2@1 2-5, 1@1 5-6", "");
 }
