@@ -116,43 +116,17 @@ fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
 }
 
 /// `eye`, of period 100, is sampled by `arm`, of period 40. The eye's value of 0 is there at 20;
-/// the arm's outputs of 10 find nothing, those of 55, 90 and 132 go back to 0, that of 170 to 100.
-const CHAIN: &str = "
-0 released c0 0.0
-0 released c0 1.0
-0 ready c0 0.0.0
-0 ready c0 1.0.0
-1 start c0 0.0.0
-1 start c1 1.0.0
-10 finish c1 1.0.0
-10 completed c1 1.0
-20 finish c0 0.0.0
-20 completed c0 0.0
-40 released c0 1.1
-40 ready c0 1.1.0
-41 start c0 1.1.0
-55 finish c0 1.1.0
-55 completed c0 1.1
-80 released c0 1.2
-80 ready c0 1.2.0
-81 start c0 1.2.0
-90 finish c0 1.2.0
-90 completed c0 1.2
-100 released c0 0.1
-100 ready c0 0.1.0
-101 start c0 0.1.0
-120 released c0 1.3
-120 ready c0 1.3.0
-121 start c1 1.3.0
-125 finish c0 0.1.0
-125 completed c0 0.1
-132 finish c1 1.3.0
-132 completed c1 1.3
-160 released c0 1.4
-160 ready c0 1.4.0
-161 start c0 1.4.0
-170 finish c0 1.4.0
-170 completed c0 1.4";
+/// the arm's outputs of 10 find nothing, those of 55, 90 and 132 go back to 0, that of 170 to 100. Of each job: when it is
+/// released, starts and finishes, and on which core.
+const CHAIN: [(&str, [u64; 3], u32); 7] = [
+    ("0.0", [0, 1, 20], 0),
+    ("1.0", [0, 1, 10], 1),
+    ("1.1", [40, 41, 55], 0),
+    ("1.2", [80, 81, 90], 0),
+    ("0.1", [100, 101, 125], 0),
+    ("1.3", [120, 121, 132], 1),
+    ("1.4", [160, 161, 170], 0),
+];
 
 /// The record of it, with this bound of the first DAG.
 fn chain(bound_ns: u64) -> Vec<u8> {
@@ -164,7 +138,20 @@ fn chain(bound_ns: u64) -> Vec<u8> {
     let mut commit = commit(&text);
     commit.dags[0].topics = vec![CommittedTopic::default()];
     commit.dags[1].samples = vec![(0, 0, 0, Some(130))];
-    record_of("", &commit, CHAIN)
+    let mut events: Vec<(u64, String)> = CHAIN
+        .iter()
+        .flat_map(|&(job, [at, start, finish], core)| {
+            [
+                (at, format!("{at} released c0 {job}\n{at} ready c0 {job}.0")),
+                (start, format!("{start} start c{core} {job}.0")),
+                (finish, format!("{finish} finish c{core} {job}.0")),
+                (finish, format!("{finish} completed c{core} {job}")),
+            ]
+        })
+        .collect();
+    events.sort_by_key(|event| event.0);
+    let events: Vec<String> = events.into_iter().map(|event| event.1).collect();
+    record_of("", &commit, &events.join("\n"))
 }
 
 #[test]
