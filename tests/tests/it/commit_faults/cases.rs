@@ -80,10 +80,7 @@ pub(crate) const CASES: &[Case] = &[
         untyped(|dag| _ = dag.relative_deadline(PERIOD))
     }),
     ("zero_period", || {
-        let dag = dag("lidar:");
-        let read = attributes("read");
-        dag.register_periodic_subtask(|| (1_u32,), vec!["points"], Duration::ZERO, read);
-        with(dag, "points > store >")
+        read_by(Duration::ZERO, attributes("read"))
     }),
     ("periods_differ", || {
         let dag = dag("lidar: > left > left_points");
@@ -108,10 +105,7 @@ pub(crate) const CASES: &[Case] = &[
         vec![dag]
     }),
     ("duration_too_long", || {
-        let dag = dag("lidar:");
-        let read = attributes("read");
-        dag.register_periodic_subtask(|| (1_u32,), vec!["points"], Duration::MAX, read);
-        with(dag, "points > store >")
+        read_by(Duration::MAX, attributes("read"))
     }),
     ("wcet_exceeds_deadline", || {
         due(PERIOD, attributes("store").wcet(PERIOD * 2))
@@ -121,7 +115,7 @@ pub(crate) const CASES: &[Case] = &[
         due(PERIOD, store.budget(PERIOD / 5))
     }),
     ("priorities_partly_given", || {
-        read_by("lidar", "points", attributes("read").priority(7))
+        read_by(PERIOD, attributes("read").priority(7))
     }),
     ("priorities_exhausted", || {
         // The last numbers there are; those of the other DAG are to be derived below them.
@@ -132,13 +126,13 @@ pub(crate) const CASES: &[Case] = &[
         vec![given, sound("lidar", "points")]
     }),
     ("core_out_of_range", || {
-        read_by("lidar", "points", attributes("read").core(9))
+        read_by(PERIOD, attributes("read").core(9))
     }),
     ("affinity_out_of_range", || {
         changed(|dag| _ = dag.affinity(&[0, 9]))
     }),
     ("stack_out_of_range", || {
-        read_by("lidar", "points", attributes("read").stack_bytes(4096))
+        read_by(PERIOD, attributes("read").stack_bytes(4096))
     }),
     ("zero_jobs", || changed(|dag| _ = dag.jobs(0))),
     ("zero_in_flight", || changed(|dag| _ = dag.in_flight(0))),
@@ -191,12 +185,7 @@ pub(crate) const CASES: &[Case] = &[
         dag.survive_faults(FAULT_LIMIT);
         let map = dag.state("map", 0_u32);
         let store = || |map: &mut u32, (points,): (u32,)| *map += points;
-        let store = dag.using(map.update()).restarting(store);
-        store
-            .reads(&["points"])
-            .due(PERIOD)
-            .register(attributes("store"));
-        vec![dag]
+        stored(dag, |dag| dag.using(map.update()).restarting(store))
     }),
     // Waits.
     ("cannot_wait", || {
@@ -223,11 +212,7 @@ pub(crate) const CASES: &[Case] = &[
         let (accelerator, _driver) = create_device::<u32, u32>("accelerator");
         let dag = dag("lidar: > read > points");
         dag.record::<u32>("points");
-        let store = dag.using(accelerator.asking());
-        let store = store.subtask(|_: Asker<u32, u32>, (_,): (u32,)| ());
-        let store = store.reads(&["points"]).due(PERIOD);
-        store.register(attributes("store"));
-        vec![dag]
+        storing(dag, accelerator.asking(), |_: Asker<u32, u32>| ())
     }),
     ("too_many_waits", || {
         let read = (0..255).fold(attributes("read"), |read, _| read.wait(PERIOD / 300));
@@ -239,20 +224,11 @@ pub(crate) const CASES: &[Case] = &[
         let read = dag.period(PERIOD).using(accelerator.asking());
         let read = read.source(|_: Asker<u32, u32>| (1_u32,));
         read.writes(&["points"]).register(attributes("read"));
-        let store = dag.using(accelerator.asking());
-        let store = store.subtask(|_: Asker<u32, u32>, (_,): (u32,)| ());
-        let store = store.reads(&["points"]).due(PERIOD);
-        store.register(attributes("store"));
-        vec![dag]
+        storing(dag, accelerator.asking(), |_: Asker<u32, u32>| ())
     }),
     ("replaced_in_vain", || {
         let dag = dag("lidar: > read > points");
-        let store = dag.restarting(|| |(_,): (u32,)| ());
-        store
-            .reads(&["points"])
-            .due(PERIOD)
-            .register(attributes("store"));
-        vec![dag]
+        stored(dag, |dag| dag.restarting(|| |(_,): (u32,)| ()))
     }),
     ("nothing_replaceable", || surviving(FAULT_LIMIT)),
     ("state_over_jobs", || {
@@ -460,11 +436,11 @@ fn surviving(limit: FaultLimit) -> Vec<Dag> {
     changed(|dag| _ = dag.survive_faults(limit))
 }
 
-/// One whose source has attributes.
-fn read_by(name: &str, topic: &str, read: SubtaskAttributes) -> Vec<Dag> {
-    let dag = dag(&format!("{name}:"));
-    dag.register_periodic_subtask(|| (1_u32,), vec![topic], PERIOD, read);
-    with(dag, &format!("{topic} > store >"))
+/// One whose source has a period and attributes.
+fn read_by(period: Duration, read: SubtaskAttributes) -> Vec<Dag> {
+    let dag = dag("lidar:");
+    dag.register_periodic_subtask(|| (1_u32,), vec!["points"], period, read);
+    with(dag, "points > store >")
 }
 
 /// One whose sink has a deadline and attributes.
@@ -512,7 +488,12 @@ fn storing<U: Uses + 'static>(
     mut store: impl for<'a> FnMut(U::Borrowed<'a>) + Send + 'static,
 ) -> Vec<Dag> {
     let sink = move |used: U::Borrowed<'_>, (_,): (u32,)| store(used);
-    let sink = dag.using(uses).subtask(sink).reads(&["points"]).due(PERIOD);
-    sink.register(attributes("store"));
+    stored(dag, |dag| dag.using(uses).subtask(sink))
+}
+
+/// Registers what becomes the sink `store`, which reads the topic `points`.
+fn stored(dag: Dag, store: impl for<'d> FnOnce(&'d Dag) -> Subtask<'d>) -> Vec<Dag> {
+    let store = store(&dag).reads(&["points"]).due(PERIOD);
+    store.register(attributes("store"));
     vec![dag]
 }
