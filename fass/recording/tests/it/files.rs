@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use random::Random;
 use recording::{
     Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, EntryKind,
-    Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Stream, Times,
+    Header, MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Stream, Times,
     VERSION, Writer, mended, to_bytes,
 };
 
@@ -65,6 +65,19 @@ fn times() -> Times {
     }
 }
 
+/// An entry of a DAG, with a place in its header or in its graph.
+fn entry(what: EntryKind, (dag, place): (u16, u16), job: u64, value: &[u8]) -> Entry<'_> {
+    Entry {
+        what,
+        dag,
+        place,
+        job,
+        release_ns: job * 1_000,
+        at_ns: job * 1_000 + 10,
+        value,
+    }
+}
+
 /// Returns a recording of some jobs, a job of which is lost.
 fn recording() -> Vec<u8> {
     let mut writer = Writer::new(&header());
@@ -73,15 +86,7 @@ fn recording() -> Vec<u8> {
         let samples = vec![0.5; usize::try_from(job % 4).expect("it is small")];
         let value = to_bytes(&samples);
         let sample = to_bytes(&Some((job, job * 10, samples)));
-        let entry = |what, dag, place, value| Entry {
-            what,
-            dag,
-            place,
-            job,
-            release_ns: job * 1_000,
-            at_ns: job * 1_000 + 10,
-            value,
-        };
+        let entry = |what, dag, place, value| entry(what, (dag, place), job, value);
         writer.write(&match job {
             5 => entry(EntryKind::Lost, 0, 0, &[]),
             6 => entry(EntryKind::Skip, 0, 0, &[]),
@@ -192,15 +197,7 @@ fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
         Recording::read(&writer.end()).expect_err("it is wrong")
     };
     let value = to_bytes(&vec![1.0]);
-    let right = Entry {
-        what: EntryKind::Value,
-        dag: 0,
-        place: 0,
-        job: 0,
-        release_ns: 0,
-        at_ns: 0,
-        value: &value,
-    };
+    let right = entry(EntryKind::Value, (0, 0), 0, &value);
     let of_no_dag = Entry { dag: 9, ..right };
     let of_no_channel = Entry { place: 1, ..right };
     let value = &value[..9];
@@ -235,9 +232,8 @@ fn foreign_and_newer_files_are_told() {
     let foreign = "at byte 0: expected the mark of a recording, 0x89 and `FASSREC`";
     assert_eq!(said(b""), foreign);
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
-    let newer = [&MAGIC[..], &(VERSION + 1).to_le_bytes()].concat();
     assert_eq!(
-        said(&newer),
+        said(&of_version(VERSION + 1, &recording())),
         "at byte 8: expected version 1 to 8 of recordings, which are those that are read"
     );
     let mut more = recording();
@@ -252,15 +248,7 @@ fn of_weightless_parts(parts: usize) -> Vec<u8> {
     header.channels[0].schema = Schema::Tuple(vec![Schema::Tuple(Vec::new()); parts]);
     let mut writer = Writer::new(&header);
     for job in 0..100 {
-        writer.write(&Entry {
-            what: EntryKind::Value,
-            dag: 0,
-            place: 0,
-            job,
-            release_ns: 0,
-            at_ns: 0,
-            value: &[],
-        });
+        writer.write(&entry(EntryKind::Value, (0, 0), job, &[]));
     }
     writer.end()
 }
@@ -296,13 +284,12 @@ fn of_version(version: u16, bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_recording_of_the_version_before_is_read_and_one_of_the_next_is_not() {
+fn a_recording_of_the_version_before_is_read() {
     let bytes = recording();
     assert_eq!(of_version(VERSION, &bytes), bytes);
     let before = of_version(1, &bytes);
     let before = Recording::read(&before).unwrap();
     assert_eq!((before.count(), before.lost()), (20, 1));
-    assert!(Recording::read(&of_version(VERSION + 1, &bytes)).is_err());
 }
 
 #[test]

@@ -325,16 +325,11 @@ fn a_recording_that_does_not_fit_is_refused() {
     assert_eq!((read.count(), read.lost()), (3, 2));
     let whole = recorded();
     let job = 1 << 40;
-    let far_value = altered(&whole, |entry, _| match entry.job {
-        0 => vec![Entry { job, ..entry }],
-        _ => vec![],
-    });
-    let far_signal = altered(&whole, |entry, _| match entry.job {
-        0 => vec![Entry {
-            job,
-            ..signal(entry)
-        }],
-        _ => vec![],
+    let [far_value, far_signal] = [|entry| entry, signal].map(|as_what| {
+        altered(&whole, |entry, _| match entry.job {
+            0 => vec![as_what(Entry { job, ..entry })],
+            _ => vec![],
+        })
     });
     let other_name = "the recording's dag 0 is `demo`, and here it is `other`";
     let other_graph = "the recording is of another graph of dag `demo`";
