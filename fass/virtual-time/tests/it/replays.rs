@@ -98,28 +98,18 @@ fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &
     state.reset_to(move || first);
     let state = state.update();
     let other = (number + 1) % set.dags.len();
-    let latest = || set.dags[other].latest::<u64>(&format!("s{other}"));
-    match random.index(8) {
-        0 | 1 => using(
-            dag,
-            (latest().sample(), state),
-            names,
-            move |used, value| {
-                let (sample, state) = used;
-                work(state, &[value, of_sample(sample)], longest)
-            },
-        ),
-        2 => using(
-            dag,
-            (latest().sample(), state),
-            names,
-            move |used, value| {
+    let what = random.index(8);
+    match what {
+        0..=2 => {
+            let latest = set.dags[other].latest::<u64>(&format!("s{other}"));
+            using(dag, (latest.sample(), state), names, move |used, value| {
                 let (sample, state) = used;
                 let sampled = of_sample(sample);
-                assert!(!sampled.is_multiple_of(40), "for good");
+                let is_last = what == 2 && sampled.is_multiple_of(40);
+                assert!(!is_last, "for good");
                 work(state, &[value, sampled], longest)
-            },
-        ),
+            });
+        }
         3 if !set.signals.is_empty() => {
             let raising = set.signals[random.index(set.signals.len())].raising();
             using(dag, (raising, state), names, move |used, value| {

@@ -15,6 +15,15 @@ fn number(packet: &[u8]) -> Option<u32> {
     str::from_utf8(packet).ok()?.parse().ok()
 }
 
+fn with_room(name: &str, room_bytes: usize) -> Wire {
+    let options = WireOptions {
+        longest_bytes: 4,
+        room_bytes,
+        ..WireOptions::default()
+    };
+    Wire::with(name, options)
+}
+
 /// Each job's packets, as numbers and the time of each in ms.
 type Seen = crate::support::Seen<Vec<(u32, u64)>>;
 
@@ -88,12 +97,7 @@ fn a_packet_raises_the_sporadic_dag_that_receives_it() {
 
 #[test]
 fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
-    let options = WireOptions {
-        longest_bytes: 4,
-        room_bytes: 64,
-        ..WireOptions::default()
-    };
-    let (wire, seen) = (Wire::with("numbers", options), Seen::default());
+    let (wire, seen) = (with_room("numbers", 64), Seen::default());
     let machine = VirtualTime::new();
     commit(&[periodic(&wire, 3, look(&seen))]);
     // 14 bytes each, so there is room for four; and one that is too long.
@@ -109,11 +113,7 @@ fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
 
 #[test]
 fn r3_bytes_go_when_their_instance_is_complete_and_not_if_it_fails_or_sends_too_much() {
-    let options = WireOptions {
-        room_bytes: 16,
-        ..WireOptions::default()
-    };
-    let wire = Wire::with("out", options);
+    let wire = with_room("out", 16);
     let machine = VirtualTime::new().connect(&wire).contain_panics();
     let dag = every(10, "sending");
     let count = dag.jobs(4).source(job_numbers(0)).writes(&["job"]);
@@ -263,11 +263,7 @@ fn a_read_ends_with_the_next_packet_or_at_its_limit() {
 fn a_write_ends_when_all_has_gone_and_what_finds_no_room_never_goes() {
     for is_connected in [true, false] {
         let (seen, keep) = crate::support::Seen::shared();
-        let options = WireOptions {
-            room_bytes: 16,
-            ..WireOptions::default()
-        };
-        let (wire, dag) = (Wire::with("out", options), every(20, "writing"));
+        let (wire, dag) = (with_room("out", 16), every(20, "writing"));
         let mut bytes = [7, 9, 17].into_iter();
         let write = move |wire: WireWriter| {
             let (keep, count) = (keep.clone(), bytes.next().unwrap_or(1));
