@@ -92,6 +92,7 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
         | DagFault::ZeroPeriod { dag }
         | DagFault::ZeroDeadline { dag }
         | DagFault::ZeroInFlight { dag }
+        | DagFault::ZeroJobs { dag }
         | DagFault::TimeOverflow { dag, .. }
         | DagFault::NoCluster { dag, .. }
         | DagFault::UnknownCluster { dag, .. }
@@ -149,6 +150,8 @@ period 9ms affinity 0,2\nsubtask a wcet 1ms\nsubtask b wcet 1ms core 2
   line 3: subtask `b` of dag `x` is pinned to core 2, and
 period 9ms affinity 0\nsubtask a wcet 1ms\ndag y period 9ms\nsubtask a wcet 1ms
   line 3: dag `x` and dag `y` share core 0 and not all others
+period 9ms\nsubtask a wcet 1ms\ndag y period 9ms jobs 0\nsubtask a wcet 1ms
+  line 3: dag `y` has a limit of 0 jobs; give at least 1
 period 584000s\nsubtask a wcet 1ms
   line 1:";
 
