@@ -265,8 +265,14 @@ impl<B: SubtaskBody> VirtualTime<B> {
     /// Goes through one instant. That the run cannot go on is the error.
     fn step(&mut self, now: &mut VirtualInstant<'_, impl Workload<B>>) -> Result<(), RunOutcome> {
         self.now_ns = now.now_ns;
+        // A mode that waits comes after all completions and faults of the instant (M3).
+        let mut waiting = None;
+        for (place, cluster) in self.clusters.iter_mut().enumerate() {
+            let is_mode = |request| request == Request::GoOn && waiting.replace(place).is_none();
+            cluster.engine.requests.give_away(is_mode);
+        }
         // The short way was all of the instant.
-        if self.finish(now)? {
+        if self.finish(waiting.is_none(), now)? {
             return Ok(());
         }
         let mut failing = core::mem::take(&mut self.failing);
@@ -279,6 +285,9 @@ impl<B: SubtaskBody> VirtualTime<B> {
         }
         // The list goes back for its memory.
         self.failing = failing;
+        if let Some(place) = waiting {
+            self.clusters[place].engine.requests.keep(Request::GoOn);
+        }
         let asked =
             (self.clusters.iter_mut()).filter(|cluster| !cluster.engine.requests.are_none());
         asked.for_each(|cluster| cluster.tell(now, |_| ()));
@@ -290,20 +299,20 @@ impl<B: SubtaskBody> VirtualTime<B> {
     }
 
     /// Completes what finishes now, and notes what fails instead.
-    /// If it is one instance and nothing else happens, that may be the whole
-    /// instant, which is the result.
+    /// If it is one instance and nothing else happens, that `may_be_all` of the
+    /// instant; whether it is is the result.
     fn finish(
         &mut self,
+        mut may_be_all: bool,
         now: &mut VirtualInstant<'_, impl Workload<B>>,
     ) -> Result<bool, RunOutcome> {
-        let mut is_first = true;
         for place in 0..self.clusters.len() {
             while let Some((core, body)) = self.clusters[place].take_finished(now.now_ns) {
                 let mut others_ns =
                     [self.next_finish_ns(), now.workload.next_request_ns()].into_iter();
                 let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now.now_ns));
                 // The short way is right only if this finish is all that happens at this instant.
-                let is_alone = core::mem::take(&mut is_first) && is_last;
+                let is_alone = core::mem::take(&mut may_be_all) && is_last;
                 let (cluster, instance) = (&mut self.clusters[place], body.subject().instance());
                 if now.workload.fails(instance) {
                     self.failing.push((instance, core, body));

@@ -106,10 +106,11 @@ fn compare(run: &Run, requests: &[(u64, Request)], mut rules: Rules) {
     rules.ask(enter(0, ModeEntry::AtOnce), &mut expected);
     for now_ns in times_ns {
         let here = run.events.iter().filter(|event| event.time_ns == now_ns);
-        let completed = here
-            .clone()
-            .filter(|event| event.what == EventKind::Completed);
+        let is_end = |event: &&Event| event.what == EventKind::Completed;
+        let completed = here.clone().filter(is_end);
         completed.for_each(|event| rules.in_flight[event.dag.index()] -= 1);
+        let mut from_change = here.clone().skip_while(|event| !is_change(event.what));
+        assert!(!from_change.any(|event| is_end(&event)), "at {now_ns}");
         rules.look(false, &mut expected);
         for (_, request) in requests.iter().filter(|(at_ns, _)| *at_ns == now_ns) {
             rules.ask(*request, &mut expected);
