@@ -146,3 +146,52 @@ fn register(
     };
     dag.register_untyped_async_subtask(execute_and_wait, attributes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+    use fass_dag_file::parse;
+    use virtual_time::VirtualTime;
+
+    /// A fork and a join, and a pair without any edge.
+    const TEXT: &str = "
+        dag fork period 20ms deadline 10ms
+        subtask a wcet 1ms
+        subtask b wcet 4ms
+        subtask c wcet 2ms
+        subtask d wcet 1ms
+        edge a -> b
+        edge a -> c
+        edge b -> d
+        edge c -> d
+        dag pair period 10ms offset 5ms
+        subtask one wcet 1ms samples 10us,20us
+        subtask other wcet 1ms
+        end";
+
+    #[test]
+    fn a_set_runs_as_its_file_says() {
+        // On a grid, what has begun late ends in time.
+        for grid_ns in [0, 1_000_000] {
+            let settings = Settings {
+                execution: Execution::Wcet,
+                seed: 1,
+                occupation: Occupation::Hold,
+                length: Length::Jobs(3),
+                grid_ns,
+            };
+            let late = Duration::from_nanos(grid_ns / 10);
+            let machine = VirtualTime::new().cores(2).late(late, 1);
+            let dags = build(&parse(TEXT).unwrap().sets[0], &settings);
+            finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+            let report = machine.run();
+            assert_eq!(report.violations(), []);
+            let responses = report.jobs.iter().map(|job| job.response_time_ns());
+            let responses: Vec<_> = responses.flatten().collect();
+            assert_eq!(responses.len(), 6);
+            assert!(responses.contains(&6_000_000), "{responses:?}");
+            assert!(responses.iter().all(|ns| ns % 1_000_000 == 0));
+        }
+    }
+}

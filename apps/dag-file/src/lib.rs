@@ -6,7 +6,7 @@
 //!
 //! - [`build()`]: the DAGs as the app commits them.
 //!
-//! The code here knows no kernel: the tests against reference schedules run it in virtual time.
+//! The code here knows no kernel: the tests run it in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
