@@ -231,7 +231,8 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     if memory_mib > MOST_MEMORY_MIB && !options.is_given(name::MEMORY) {
         return Err(refuse(format!(
             "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
-             guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
+             guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs, in the file or by \
+             --jobs",
             files::shown_path(path),
             file.most_subtasks()
         )));
@@ -242,7 +243,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     if limit_s > MOST_S && !has_limit {
         return Err(refuse(format!(
             "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
-             fewer jobs by --jobs, or a limit by --timeout",
+             fewer jobs, in the file or by --jobs, or a limit by --timeout",
             files::shown_path(path),
             limit_s / 3600,
             MOST_S / 3600
@@ -544,8 +545,9 @@ mod tests {
         std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
         let prepared = |line: &str| prepare(&right(&RUN, line).with(name::DAG, path.clone()));
         let said = prepared("--jobs 2").unwrap_err().join("\n");
-        let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long";
-        assert!(said.contains(words), "{said}");
+        let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long; \
+                     give fewer jobs, in the file or by --jobs, or a limit by --timeout";
+        assert!(said.ends_with(words), "{said}");
         assert_eq!(prepared("--jobs 1").unwrap().unwrap().limit_s, 120);
         assert!(prepared("--jobs 2 --timeout 60").is_ok());
         assert!(prepared("--jobs 2 --print-dag").is_ok());
