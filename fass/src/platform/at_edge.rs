@@ -1,4 +1,4 @@
-//! What platforms tell their [edges](super::Platform::at_edge), the same on each.
+//! The reports of platforms to their [edges](super::Platform::at_edge), the same on each.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
