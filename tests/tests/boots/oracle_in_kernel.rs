@@ -71,7 +71,7 @@ fn events_apart_need_no_window() {
     }
     let settings = Settings {
         window_us: 0,
-        ..Settings::for_unit(UNIT_US)
+        ..Settings::for_unit(1000)
     };
     are_reproduced(&cases, &settings);
 }
