@@ -1,6 +1,6 @@
 //! Changes that functions make to a run besides outputs: switches, signals; and those they may not.
 
-use crate::support::{every, job_numbers, named, run, ticking, work};
+use crate::support::{every, job_numbers, ms, named, run, ticking, work};
 use fass::shared::Switch;
 use fass::{Dag, create_dag};
 use virtual_time::{EventKind, VirtualTime};
@@ -95,14 +95,10 @@ fn a_release_of_a_dag_that_is_off_is_a_breach() {
                 what => what,
             };
         }
-        let found: Vec<_> = report
-            .violations()
-            .iter()
-            .map(ToString::to_string)
-            .collect();
+        let found = report.violations();
         let text = "at 10000000 ns, R1 release: dag 0 job 1 is released although its DAG is paused \
                     or closed";
-        assert!(found.iter().any(|it| it == text), "{found:?}");
+        assert!(found.iter().any(|it| it.to_string() == text), "{found:?}");
     }
 }
 
@@ -117,9 +113,7 @@ fn a_state_stays_in_its_dag() {
 fn a_subtask_cannot_raise_a_signal_behind_the_models_back() {
     let machine = VirtualTime::new().contain_panics();
     let answers = create_dag();
-    let event = answers
-        .relative_deadline(crate::support::ms(5))
-        .sporadic(crate::support::ms(15));
+    let event = answers.relative_deadline(ms(5)).sporadic(ms(15));
     answers.source(|| ()).register(named("answer"));
     let asks = every(10, "asks");
     let ask = asks.jobs(1).source(move || event.raise());

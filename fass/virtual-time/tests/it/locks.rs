@@ -2,18 +2,15 @@
 
 use std::time::Duration;
 
-use crate::support::{ms, named, taking, work};
+use crate::support::{every, job_numbers, ms, named, taking, work};
 use fass::shared::Lock;
-use fass::{Dag, FaultLimit, Preemption, create_dag, finish_create_dags};
+use fass::{Dag, FaultLimit, Preemption, finish_create_dags};
 use virtual_time::{Report, VirtualTime};
 
 /// A DAG of one subtask that takes 2 ms, in the cluster if one is given.
 fn one(name: &str, uses: Option<(&Lock<u32>, u32)>, cluster: Option<u32>) -> Dag {
-    let dag = create_dag();
-    dag.name(name)
-        .jobs(1)
-        .period(ms(50))
-        .relative_deadline(ms(50));
+    let dag = every(50, name);
+    dag.jobs(1);
     if let Some(cluster) = cluster {
         dag.cluster(cluster);
     }
@@ -85,18 +82,13 @@ fn a_lock_without_a_longest_section_bars_the_proof_of_its_cluster_by_name() {
 /// Runs a DAG that survives faults, whose subtask states two sections of the first lock.
 fn faults(stated: &'static Lock<u32>, work: impl FnMut(u64) + Send + 'static) -> Report {
     let machine = VirtualTime::new().contain_panics();
-    let (dag, mut work) = (create_dag(), work);
-    dag.name("user")
-        .jobs(4)
-        .period(ms(10))
-        .relative_deadline(ms(10));
-    dag.survive_faults(FaultLimit {
+    let (dag, mut work) = (every(10, "user"), work);
+    dag.jobs(4).survive_faults(FaultLimit {
         faults: 1,
         window: 1,
         in_all: 8,
     });
-    let mut jobs = 0_u64..;
-    let source = dag.source(move || (jobs.next().expect("it has no end"),));
+    let source = dag.source(job_numbers(0));
     source.writes(&["job"]).register(named("source"));
     let call = move |(), (job,): (u64,)| work(job);
     let enter = dag.using(stated.entering(2)).falling_back(call, |(), _| ());
@@ -177,11 +169,8 @@ fn what_an_earlier_run_has_stated_lets_nobody_enter() {
     earlier.run();
     // That machine keeps its functions, with what they may enter, as a fault does.
     let later = VirtualTime::new().contain_panics();
-    let dag = create_dag();
-    dag.name("user")
-        .jobs(1)
-        .period(ms(9))
-        .relative_deadline(ms(9));
+    let dag = every(9, "user");
+    dag.jobs(1);
     dag.register_untyped_subtask(|_| STATED.with(|_| ()), named("enters"));
     finish_create_dags(&[dag]).expect("nothing is wrong");
     let said = "lock `stated`: the subtask enters a section and has not stated that, by \
