@@ -415,10 +415,8 @@ impl Building<'_> {
             (2, true) => self.register::<(One, One), (One,)>(subtask, true),
             (3, false) => self.register::<(One, One, One), ()>(subtask, false),
             (3, true) => self.register::<(One, One, One), (One,)>(subtask, true),
-            (4, writes) => match writes {
-                false => self.register::<(One, One, One, One), ()>(subtask, false),
-                true => self.register::<(One, One, One, One), (One,)>(subtask, true),
-            },
+            (4, false) => self.register::<(One, One, One, One), ()>(subtask, false),
+            (4, true) => self.register::<(One, One, One, One), (One,)>(subtask, true),
             (more, _) => panic!(
                 "subtask `{}` has {more} inputs; 4 are the most",
                 subtask.name

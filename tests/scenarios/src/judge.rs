@@ -1,6 +1,6 @@
 //! Whether a run was as its scenario says.
 
-use alloc::string::{String, ToString};
+use alloc::string::String;
 use alloc::vec::Vec;
 use alloc::{format, vec};
 
@@ -21,7 +21,7 @@ impl Scenario {
     pub fn judge_counts<'a>(
         &self,
         task_set: &TaskSet,
-        statistics: impl Fn(sched_dag::DagId) -> &'a DagStatistics,
+        statistics: impl Fn(DagId) -> &'a DagStatistics,
         is_exact: bool,
     ) -> Vec<String> {
         let exactly = self.exactly.iter().filter(|_| is_exact);
@@ -32,7 +32,7 @@ impl Scenario {
                 wrong.push(format!("`{line}`: there is no dag `{name}`"));
                 continue;
             };
-            let dag = sched_dag::DagId(u32::try_from(dag).unwrap_or(u32::MAX));
+            let dag = DagId(u32::try_from(dag).unwrap_or(u32::MAX));
             let all = format!("{:?},", statistics(dag)).replace(" }", ",");
             for count in counts.split_whitespace() {
                 let (counter, expected) = count.split_once('=').unwrap_or((count, ""));
@@ -188,13 +188,11 @@ impl Scenario {
                 expected.iter().any(same) || self.never.iter().any(|never| never == kind(line));
             is_told && !line.contains(BYSTANDER)
         };
-        let happened: Vec<String> = lines.iter().map(|line| in_units(line)).collect();
-        let happened: Vec<&String> = happened.iter().filter(|line| is_meant(line)).collect();
-        let is_same = |(told, of): (&&String, &String)| {
-            *told == of
-                || told
-                    .split_once(" core ")
-                    .is_some_and(|(told, _)| told == of)
+        let mut happened: Vec<String> = lines.iter().map(|line| in_units(line)).collect();
+        happened.retain(|line| is_meant(line));
+        let is_same = |(told, of): (&String, &String)| {
+            let without_core = told.split_once(" core ").map(|(told, _)| told);
+            told == of || without_core == Some(of)
         };
         let is_right =
             happened.len() == expected.len() && happened.iter().zip(&expected).all(is_same);
@@ -202,14 +200,7 @@ impl Scenario {
             true => vec![],
             false => vec![
                 format!("expected:\n  {}", expected.join("\n  ")),
-                format!(
-                    "happened:\n  {}",
-                    happened
-                        .iter()
-                        .map(ToString::to_string)
-                        .collect::<Vec<_>>()
-                        .join("\n  ")
-                ),
+                format!("happened:\n  {}", happened.join("\n  ")),
             ],
         }
     }
