@@ -9,10 +9,11 @@ use fass::platform::{Platform, RunConfig};
 use fass::shared::{Signal, Wire};
 
 use super::calibration;
-use crate::options::{CommandLine, UsageError};
+use crate::options::CommandLine;
 use crate::report::{self, Ns};
 use crate::watch::background::KernelRun;
-use crate::watch::background::{Background, BackgroundOptions, LINE, wire};
+use crate::watch::background::endpoint::{self, CONNECTED, EndpointWords};
+use crate::watch::background::{Background, BackgroundOptions};
 use executive::machine::{self, interrupts_off, this_core};
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
@@ -97,8 +98,8 @@ impl System for BareMachine {
         });
         record::end_run(&run);
         report::tell_left(&run);
-        if let Some(line) = LINE.get() {
-            line.report();
+        if let Some(endpoint) = CONNECTED.get() {
+            front::report::tell_wire(endpoint.end().wire());
         }
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
@@ -117,16 +118,7 @@ impl System for BareMachine {
         options: &CommandLine<'static>,
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError> {
-        let bytes = options.number("input", 0..=1 << 32, 0)?;
-        let file = module.get().unwrap_or_default();
-        let own = usize::try_from(bytes)
-            .ok()
-            .and_then(|bytes| file.len().checked_sub(bytes));
-        let own = own.ok_or_else(|| UsageError::new("`input`: the module is shorter"))?;
-        let [own, script] = <[_; 2]>::from(file.split_at(own))
-            .map(|part| Some(part).filter(|part| !part.is_empty()));
-        module.set(own);
-        wire::connect(wire, script)
+        endpoint::connect(wire, &EndpointWords { options, module })
     }
 
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError> {

@@ -28,18 +28,18 @@
 //!
 //! [`PERIOD_NS`]: front::shell::PERIOD_NS
 
+pub(crate) mod endpoint;
 pub(crate) mod stall;
 mod status;
-pub(crate) mod wire;
 
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use endpoint::CONNECTED;
 use executive::machine::spinlock::SpinLock;
 use executive::machine::{clock, serial};
 use executive::run::{containment, execution, heartbeat};
 use executive::text::console;
-use fass::platform::SetOnce;
 use front::report::tell_log;
 use front::shell::{self, END, LiveRun, ShellSession, shut_down};
 use sched_dag::lifecycle::Request;
@@ -65,28 +65,6 @@ pub(crate) enum ConsoleEcho {
     /// Nothing is sent back: the terminal shows what is typed.
     Off,
 }
-
-/// A device that a run serves, besides people. It is reached through this only, so that an
-/// image whose app connects none has no code for it.
-pub(crate) trait Line: Sync {
-    /// Begins a run.
-    fn begin_run(&self, now_ns: u64);
-
-    /// Takes what has arrived. In core 0's heartbeat.
-    fn beat(&self, now_ns: u64);
-
-    /// Sends some of what is to go, and reports whether there may be more. In the background.
-    fn step(&self) -> bool;
-
-    /// Ends the run: sends the rest.
-    fn end_run(&self);
-
-    /// Prints what has come and gone.
-    fn report(&self);
-}
-
-/// The device, if the app has connected one.
-pub(crate) static LINE: SetOnce<&'static dyn Line> = SetOnce::new();
 
 /// For how long the background may not run before the heartbeat helps out.
 const STARVED_NS: u64 = 200_000_000;
@@ -122,8 +100,8 @@ impl SlicedWork {
 /// Does in core 0's heartbeat what is its own, and a slice if the background does not
 /// come to it.
 pub(crate) fn beat(now_ns: u64) {
-    if let Some(line) = LINE.get() {
-        line.beat(now_ns);
+    if let Some(endpoint) = CONNECTED.get() {
+        endpoint.beat(now_ns);
     }
     stall::beat(now_ns);
     look_for_end();
@@ -162,7 +140,7 @@ impl Background {
         let periods = [
             (wishes.console.is_some() || input.is_some()).then_some(shell::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
-            LINE.get().map(|_| wire::PERIOD_NS),
+            CONNECTED.get().map(|_| endpoint::PERIOD_NS),
         ];
         let periods = periods.into_iter().flatten();
         heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
@@ -183,8 +161,8 @@ impl Background {
         let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| ByteListener::new(input, wishes.stops));
         watch_for_end(wishes.stops && wishes.console.is_none() && listener.is_none());
-        if let Some(line) = LINE.get() {
-            line.begin_run(clock::now_ns());
+        if let Some(endpoint) = CONNECTED.get() {
+            endpoint.begin_run(clock::now_ns());
         }
         Self {
             heartbeat_before_ns: before_ns,
@@ -203,7 +181,7 @@ impl Background {
         if let Some(listener) = &self.listener {
             listener.step();
         }
-        let has_more = LINE.get().is_some_and(|line| line.step());
+        let has_more = CONNECTED.get().is_some_and(|endpoint| endpoint.step());
         if !self.is_sliced {
             return has_more;
         }
@@ -214,8 +192,8 @@ impl Background {
     pub(crate) fn end(self) -> bool {
         heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
         stall::stop();
-        if let Some(line) = LINE.get() {
-            line.end_run();
+        if let Some(endpoint) = CONNECTED.get() {
+            endpoint.end_run();
         }
         tell_log(execution::task_set);
         containment::take_last_faults(containment::tell_fault);
