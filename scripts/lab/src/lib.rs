@@ -21,5 +21,21 @@ pub mod oracle;
 pub mod soak;
 pub mod test;
 
+use tool::options::{Menu, choices};
+
+/// The subcommands.
+pub static LAB: Menu = Menu {
+    invocation: "fass-lab",
+    word: "SUBCOMMAND",
+    about: "Measures, judges and tests the project itself.",
+    choices: choices! {
+        "test": "run every test, on the host and in QEMU", test::test;
+        "oracle": "compare reference cases with the scheduler and its analysis", oracle::oracle;
+        "bench": "measure parts of the project on this host", bench::bench;
+        "soak": "run random DAG sets for a long time and check everything", soak::soak;
+    },
+    notes: "Exit codes: 0 all is well, 1 a failure, 2 a refused command line.\n",
+};
+
 #[cfg(test)]
 mod tests;

@@ -62,6 +62,28 @@ pub mod wire_script;
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
 
+use options::Menu;
+
+/// The subcommands.
+pub static TOOL: Menu = Menu {
+    invocation: "fass-tool",
+    word: "SUBCOMMAND",
+    about: "Does what the scripts in scripts/ are there for.",
+    choices: choices! {
+        "run": "boot an app in QEMU and judge the run", run::run;
+        "debug": "boot an app in QEMU, under gdb", run::debug;
+        "boot": "boot an image, and run any other program as it is: for cargo", run::boot;
+        "image": "make a file that boots an app on a PC", medium::image;
+        "new-app": "make an app of your own, in a repository of its own or under apps/",
+            new_app::new_app;
+        "check-trace": "replay the traces of runs against the model's rules", trace::check_trace;
+        "trace": "convert the traces of runs for Perfetto's viewer", trace::trace;
+        "recording": "show a recording, and convert it from and to other formats",
+            recordings::recording;
+    },
+    notes: "Exit codes: 0 all is well, 1 a failure, 2 a refused command line.\n",
+};
+
 #[cfg(test)]
 extern crate self as tool;
 

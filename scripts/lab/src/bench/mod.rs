@@ -24,7 +24,6 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use tool::options::{Menu, choices};
-use tool::progress::Lasting;
 
 static BENCH: Menu = Menu {
     invocation: "./scripts/bench",
@@ -43,8 +42,5 @@ static BENCH: Menu = Menu {
 
 /// Runs the subcommand.
 pub fn bench(words: &[OsString]) -> ExitCode {
-    // The others report their progress themselves; it prints nothing before it has a result.
-    let is_silent = words.first().is_some_and(|word| word == "sizes");
-    let _lasting = is_silent.then(|| Lasting::new("measuring"));
     BENCH.run(words)
 }

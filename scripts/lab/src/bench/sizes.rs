@@ -14,6 +14,7 @@ use super::code::{self, Frames};
 use super::frame::by_plan;
 use tool::json::Object;
 use tool::options::{Command, Parsed, Takes, options};
+use tool::progress::Lasting;
 use tool::{elf, files, image};
 
 static TABLE: Command = Command {
@@ -50,6 +51,8 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 /// Prints the sizes of the parts of an app's image, and returns whether the sum is within its
 /// limit.
 fn weigh(app: &str) -> Result<bool, String> {
+    // Nothing is printed before there is a result.
+    let _lasting = Lasting::new("measuring");
     let image = image::build(app)?;
     let stripped = elf::stripped_bytes(&files::read_at(&image)?)?;
     let addresses: Vec<u64> = code::instructions(&image)?.into_keys().collect();

@@ -19,7 +19,19 @@
 use sched_dag::analysis::{CoreOwner, LendingAnswer, LendingPlan, Task, lend};
 use text::{Line, Lines, Malformed, cases};
 
+use super::FileOracle;
 use super::bounds::{list, parse_task};
+
+/// The kind `assignment`.
+pub(super) static ORACLE: FileOracle<AssignmentCase> = FileOracle {
+    invocation: "./scripts/oracle assignment",
+    about: "Compares how cores are divided among DAGs that own and DAGs that share them, with \
+            orders, busy times and bounds, with the division by lent cores.",
+    parse,
+    check,
+    name: |case| &case.name,
+    schedules: None,
+};
 
 /// One set of DAGs with the division expected of it.
 #[derive(Debug)]

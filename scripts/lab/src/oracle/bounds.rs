@@ -54,7 +54,19 @@ use sched_dag::analysis::{
 
 use text::{Line, Lines, Malformed, cases, quoted};
 
+use super::FileOracle;
 use super::older_bounds as older;
+
+/// The kind `bounds`.
+pub(super) static ORACLE: FileOracle<BoundsCase> = FileOracle {
+    invocation: "./scripts/oracle bounds",
+    about: "Compares lengths, widths, response-time bounds and verdicts with those of the analysis \
+            at commit.",
+    parse,
+    check,
+    name: |case| &case.name,
+    schedules: None,
+};
 
 /// One task set with the values expected of it.
 #[derive(Debug)]

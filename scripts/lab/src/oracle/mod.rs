@@ -32,7 +32,7 @@ use std::process::ExitCode;
 use text::Malformed;
 
 use tool::files;
-use tool::options::{Command, Menu, Opt, Refusal, Takes, choices, options};
+use tool::options::{Command, Menu, Refusal, Takes, choices, options};
 use tool::progress::Progress;
 
 /// A reader of the cases of one kind.
@@ -43,24 +43,17 @@ static ORACLE: Menu = Menu {
     word: "KIND",
     about: "Compares reference cases with what this project computes.",
     choices: choices! {
-        "assignment": "attempts, owners, orders, busy times, groups and bounds of lent cores", |words| {
-            run_files(words, &ASSIGNMENT, assignment::parse, assignment::check, |case| &case.name)
-        };
-        "bounds": "lengths, widths, response-time bounds and verdicts", |words| {
-            run_files(words, &BOUNDS, bounds::parse, bounds::check, |case| &case.name)
-        };
+        "assignment": "attempts, owners, orders, busy times, groups and bounds of lent cores",
+            |words| assignment::ORACLE.run(words);
+        "bounds": "lengths, widths, response-time bounds and verdicts",
+            |words| bounds::ORACLE.run(words);
         "responses": "random accepted sets in virtual time, with overheads, against their bounds",
             responses::command;
-        "schedules": "starts, finishes, preemptions, response times and misses", |words| {
-            if words.iter().any(|word| word == "--in-kernel") {
-                return in_kernel::command(words, schedules::parse);
-            }
-            run_files(words, &SCHEDULES, schedules::parse, schedules::check, |case| &case.name)
-        };
-        "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop", |words| {
-            run_files(words, &SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
-        };
-        "waiting": "schedules and bounds of subtasks that wait", waiting::command;
+        "schedules": "starts, finishes, preemptions, response times and misses",
+            |words| schedules::ORACLE.run(words);
+        "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop",
+            |words| synchronizer::ORACLE.run(words);
+        "waiting": "schedules and bounds of subtasks that wait", |words| waiting::ORACLE.run(words);
     },
     notes: NOTES,
 };
@@ -72,89 +65,64 @@ Prints the first difference of each failing case, then `N passed, M failed`.
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
 ";
 
-/// Describes a kind whose reference files are read.
-const fn of_files(
-    invocation: &'static str,
-    about: &'static str,
-    options: &'static [Opt],
-) -> Command {
-    Command {
-        invocation,
-        about,
-        positional: Some((
-            Takes::File("FILE..."),
-            "Reference files, as in tests/oracle.",
-        )),
-        options,
-        notes: NOTES,
-    }
-}
-
-static ASSIGNMENT: Command = of_files(
-    "./scripts/oracle assignment",
-    "Compares how cores are divided among DAGs that own and DAGs that share them, with orders, busy \
-     times and bounds, with the division by lent cores.",
-    &[],
-);
-
-static BOUNDS: Command = of_files(
-    "./scripts/oracle bounds",
-    "Compares lengths, widths, response-time bounds and verdicts with those of the analysis at \
-     commit.",
-    &[],
-);
-
-static SCHEDULES: Command = of_files(
-    "./scripts/oracle schedules",
-    "Compares starts, finishes, preemptions, response times and misses with those of the scheduler \
-     in virtual time.",
-    OPTIONS,
-);
-
 options! {
     /// Schedules alone, on the bare machine; with options of its own, see schedules --in-kernel
     /// --help.
     IN_KERNEL: Takes::Nothing;
 }
 
-static SYNCHRONIZER: Command = of_files(
-    "./scripts/oracle synchronizer",
-    "Compares the sets that ExactTime and ApproximateTime emit, and what they drop, with those of \
-     the publish/subscribe baseline.",
-    &[],
-);
-
 /// Runs the subcommand.
 pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }
 
-/// Reads the cases of one kind, checks each, and prints the differences by case.
-fn run_files<Case>(
-    words: &[OsString],
-    table: &Command,
+/// A kind whose cases stand in reference files.
+struct FileOracle<Case: 'static> {
+    /// The command as a person types it.
+    invocation: &'static str,
+    about: &'static str,
     parse: Parse<Case>,
+    /// Compares a case, and returns the first difference.
     check: fn(&Case) -> Result<(), String>,
     name: fn(&Case) -> &str,
-) -> ExitCode {
-    table.carry_out(words, |options| {
-        let cases = read(options.files(), parse).map_err(Refusal::Usage)?;
-        let mut failed = 0_usize;
-        let mut progress = Progress::new(cases.len() as u64, "cases");
-        for (over, case) in (1..).zip(&cases) {
-            let checked = check(case);
-            progress.show(over);
-            if let Err(difference) = checked {
-                failed += 1;
-                progress.wipe();
-                // The progress line is gone by now, so the difference has its own line.
-                println!("{}: {difference}", name(case));
-            }
+    /// Reads the schedules alone, which may run on the bare machine; `None` if there are none.
+    schedules: Option<Parse<schedules::Case>>,
+}
+
+impl<Case> FileOracle<Case> {
+    /// Reads the cases, checks each, and prints the differences by case.
+    fn run(&self, words: &[OsString]) -> ExitCode {
+        let in_kernel = words.iter().any(|word| word == "--in-kernel");
+        if let Some(parse) = self.schedules.filter(|_| in_kernel) {
+            return in_kernel::command(words, parse);
         }
-        progress.wipe();
-        println!("{} passed, {failed} failed", cases.len() - failed);
-        Ok(ExitCode::from(u8::from(failed > 0)))
-    })
+        let files = "Reference files, as in tests/oracle.";
+        let table = Command {
+            invocation: self.invocation,
+            about: self.about,
+            positional: Some((Takes::File("FILE..."), files)),
+            options: self.schedules.map_or(&[], |_| OPTIONS),
+            notes: NOTES,
+        };
+        table.carry_out(words, |options| {
+            let cases = read(options.files(), self.parse).map_err(Refusal::Usage)?;
+            let mut failed = 0_usize;
+            let mut progress = Progress::new(cases.len() as u64, "cases");
+            for (over, case) in (1..).zip(&cases) {
+                let checked = (self.check)(case);
+                progress.show(over);
+                if let Err(difference) = checked {
+                    failed += 1;
+                    progress.wipe();
+                    // The progress line is gone by now, so the difference has its own line.
+                    println!("{}: {difference}", (self.name)(case));
+                }
+            }
+            progress.wipe();
+            println!("{} passed, {failed} failed", cases.len() - failed);
+            Ok(ExitCode::from(u8::from(failed > 0)))
+        })
+    }
 }
 
 /// Reads the cases of all files, at least one.

@@ -19,11 +19,22 @@ use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, SubtaskId, TaskSe
 
 pub use super::case::{Case, Scale, parse};
 
-use crate::oracle::equal;
+use super::{FileOracle, equal};
 
 /// More cores than this are only simulated if there are as many subtasks: of each subtask at most
 /// one instance runs at a time.
 const ALWAYS_SIMULATED: usize = 1024;
+
+/// The kind `schedules`.
+pub(super) static ORACLE: FileOracle<Case> = FileOracle {
+    invocation: "./scripts/oracle schedules",
+    about: "Compares starts, finishes, preemptions, response times and misses with those of the \
+            scheduler in virtual time.",
+    parse,
+    check,
+    name: |case| &case.name,
+    schedules: Some(parse),
+};
 
 /// The deviation of starts and finishes from the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

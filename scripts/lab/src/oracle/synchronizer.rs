@@ -22,10 +22,22 @@
 use std::collections::{BTreeSet, HashSet};
 use std::num::NonZeroUsize;
 
+use super::FileOracle;
 use pub_sub::{
     AgePenalty, ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer,
 };
 use text::{Line, Lines, Malformed, cases, quoted};
+
+/// The kind `synchronizer`.
+pub(super) static ORACLE: FileOracle<SynchronizerCase> = FileOracle {
+    invocation: "./scripts/oracle synchronizer",
+    about: "Compares the sets that ExactTime and ApproximateTime emit, and what they drop, with \
+            those of the publish/subscribe baseline.",
+    parse,
+    check,
+    name: |case| &case.name,
+    schedules: None,
+};
 
 /// One synchronizer with its arrivals and the expected output.
 #[derive(Debug)]

@@ -3,22 +3,25 @@
 //! A file has blocks that begin with `case`, which are [schedules], and blocks that begin with
 //! `bounds`, which [`bounds`] reads; each ends with `end`.
 
-use std::ffi::OsString;
-use std::process::ExitCode;
-
 use text::{Malformed, blocks};
 
 use super::bounds::{self, BoundsCase};
 use super::schedules::{self, Case};
-use super::{OPTIONS, case, in_kernel, of_files, run_files};
-use tool::options::Command;
+use super::{FileOracle, case};
 
-static WAITING: Command = of_files(
-    "./scripts/oracle waiting",
-    "Compares schedules of subtasks that wait with those of the scheduler in virtual time, and \
-     bounds with those of the analysis at commit.",
-    OPTIONS,
-);
+/// The kind `waiting`.
+pub(super) static ORACLE: FileOracle<WaitingCase> = FileOracle {
+    invocation: "./scripts/oracle waiting",
+    about: "Compares schedules of subtasks that wait with those of the scheduler in virtual time, \
+            and bounds with those of the analysis at commit.",
+    parse,
+    check,
+    name: |case| match case {
+        WaitingCase::Schedule(case) => &case.name,
+        WaitingCase::Bounds(case) => &case.name,
+    },
+    schedules: Some(parse_schedules),
+};
 
 /// One block of a file.
 #[derive(Debug)]
@@ -62,21 +65,6 @@ pub fn check(case: &WaitingCase) -> Result<(), String> {
         WaitingCase::Schedule(case) => schedules::check(case),
         WaitingCase::Bounds(case) => bounds::check(case),
     }
-}
-
-fn name(case: &WaitingCase) -> &str {
-    match case {
-        WaitingCase::Schedule(case) => &case.name,
-        WaitingCase::Bounds(case) => &case.name,
-    }
-}
-
-/// Runs `oracle waiting`.
-pub(super) fn command(words: &[OsString]) -> ExitCode {
-    if words.iter().any(|word| word == "--in-kernel") {
-        return in_kernel::command(words, parse_schedules);
-    }
-    run_files(words, &WAITING, parse, check, name)
 }
 
 #[cfg(test)]
