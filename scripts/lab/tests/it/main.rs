@@ -5,6 +5,7 @@ mod files;
 mod lines;
 mod on_linux;
 mod oracle_schedules;
+mod seams;
 #[path = "../../../tool/tests/support/mod.rs"]
 mod support;
 
