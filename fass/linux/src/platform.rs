@@ -142,7 +142,11 @@ impl Platform for Host {
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
         }
-        at_edge::launch(self, &mut plan, unpoisoned(&FILE).as_mut())?;
+        // Values that are restored are decoded by code of the app, which runs under no lock.
+        let mut file = unpoisoned(&FILE).take();
+        let is_launched = at_edge::launch(self, &mut plan, file.as_mut());
+        *unpoisoned(&FILE) = file;
+        is_launched?;
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
         let office = Office::new(plan.number, &plan.task_set, letters, threads.levels);

@@ -2,10 +2,10 @@
 //! devices, signals and modes.
 //!
 //! A part finds its own faults, and ties itself to the plan. The file in `api` by which an app states
-//! it has both, and the commit finds them here. So an image whose app does not state a part has no
-//! code of it.
+//! it has both, and the commit finds them here, so the commit names few of them.
 //!
-//! A new part is a file in `api` that [adds](DagDraft::add) it, and a row of [`PartKind`].
+//! A new part is a file in `api` that [adds](DagDraft::add) it, and a row of [`PartKind`]; what apps
+//! name of it is exported by `api/mod.rs`, and a fault of it has a row in `docs/errors.md`.
 
 use alloc::boxed::Box;
 use alloc::format;

@@ -81,7 +81,7 @@ use crate::run::log::{Field, Level, LogLine};
 
 pub use clock::Clock;
 pub use run_config::RunConfig;
-pub use sched_dag::lifecycle::Request;
+pub use sched_dag::lifecycle::{Request, WaitLimit};
 
 pub use crate::run::cell::SetOnce;
 pub use crate::run::gate::call_app;
