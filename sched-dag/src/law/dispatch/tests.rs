@@ -109,7 +109,7 @@ fn passed_over(at_ns: u64, waiting: u32, length_ns: u64, why: &str) -> String {
     )
 }
 
-/// What a DAG's subtask does from 0 to so long where it must not.
+/// Returns the complaint about a DAG's subtask that executes from 0 on where it must not.
 fn misplaced(dag: u32, end_ns: u64, why: &str) -> String {
     let does = |at_ns, what| {
         format!("at {at_ns} ns, R5 dispatch: subtask 0 of dag {dag} job 0 {what} on core {why}")
