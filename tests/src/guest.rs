@@ -30,7 +30,8 @@ use tool::qemu::{Loader, Machine, Mode, Qemu, Second};
 use tool::{system, wire_script};
 
 use crate::Said;
-use crate::altered::Altered;
+use crate::altered::altered;
+use crate::file::File;
 
 /// How long a guest may take in wall time if the test does not say: many times what
 /// any takes, so that it ends what hangs and nothing that a busy host makes slow.
@@ -44,7 +45,7 @@ pub struct Guest {
     image: Option<PathBuf>,
     qemu: Qemu,
     /// The program in QEMU's place, if there is one.
-    altered: Option<Arc<Altered>>,
+    altered: Option<Arc<File>>,
     words: Vec<String>,
     limit: Duration,
     /// The words to type at the console, each once a line with such a text has come.
@@ -136,7 +137,7 @@ impl Guest {
     /// these added.
     #[must_use]
     pub fn altered(mut self, changes: &[(&str, &str)], more: &str) -> Guest {
-        let program = Altered::new(changes, more);
+        let program = altered(changes, more);
         self.qemu.program.clone_from(&program.0);
         self.altered = Some(Arc::new(program));
         self

@@ -10,6 +10,7 @@
 mod altered;
 pub mod bochs;
 pub mod fault_page;
+pub mod file;
 pub mod guest;
 pub mod guide;
 pub mod markdown;

@@ -1,10 +1,8 @@
 //! Checks of every boot from a stick, whatever loads the image.
 
-use std::fs;
-
 use tool::qemu::Loader;
-use tool::system;
 
+use crate::file::File;
 use crate::{Guest, Members, Said};
 
 /// Boots the demo and checks that words, processors and memory came through the loader.
@@ -32,12 +30,10 @@ pub fn boots(loader: Loader, cores: u64, memory_mib: u64) {
 ///
 /// Panics if it is another file.
 pub fn hands_over_a_file(loader: Loader) {
-    let file = system::new_log("module").expect("a folder for logs");
     let mut content = vec![b'z'; 100_001];
     content[..2].copy_from_slice(b"xy");
-    fs::write(&file, content).expect("a file in it");
-    let guest = Guest::new("dag-file").from_stick(loader).module(&file);
+    let file = File::of("module", "file", content);
+    let guest = Guest::new("dag-file").from_stick(loader).module(&file.0);
     let reason = guest.refusal();
     assert!(reason.contains("found `xyz"), "{reason}");
-    fs::remove_file(&file).expect("it is ours");
 }

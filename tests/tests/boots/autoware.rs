@@ -27,6 +27,8 @@ fn the_hot_path_keeps_its_bounds_and_the_trace_tells_the_ages_that_its_values_te
 fn tells_its_ages(outcome: &Outcome, line: &MachineLine) {
     let mut runs = tool::trace::read(&outcome.serial).expect("a trace");
     let run = runs.remove(0);
+    // `dot` draws an arrow for each.
+    assert_eq!(run.samplings.len(), 10);
     let place = |name| Chain::find(&run.task_set, name).expect(name);
     let ends = (
         place("lidar/FrontLidarDriver"),

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use camera::{Conduct, Detection, build};
 use fass::finish_create_dags;
-use tool::system;
+use harness::file::File;
 use virtual_time::VirtualTime;
 
 const FRAMES: u64 = 20;
@@ -30,9 +30,8 @@ fn run(words: &str, app: &str) -> ([u64; 2], Option<u64>) {
 #[test]
 fn answers_that_the_machine_or_linux_recorded_are_replayed_on_both_and_on_the_host() {
     for place in ["--cores 2", "--on linux --cores 1"] {
-        let log = system::new_log("camera").expect("a folder for logs");
-        let file = log.with_extension("rec");
-        let name = file.to_string_lossy();
+        let file = File::new("camera", "rec");
+        let name = file.0.display();
         let (frames, _) = run(&format!("{place} --keep {name}"), "");
         assert_eq!(frames.iter().sum::<u64>(), FRAMES);
         // Another seed, or one that is silent: the accelerator would do something else.
@@ -40,8 +39,7 @@ fn answers_that_the_machine_or_linux_recorded_are_replayed_on_both_and_on_the_ho
             let replayed = run(&format!("{place} --replay {name}"), "accelerator=silent");
             assert_eq!(replayed, (frames, Some(FRAMES)), "{place}");
         }
-        let bytes = fs::read(&file).expect("the recording");
-        let _ = fs::remove_file(&file);
+        let bytes = fs::read(&file.0).expect("the recording");
         let machine = VirtualTime::new().replay(&bytes).expect("it is whole");
         let (dags, counts) = build(FRAMES, 1, Conduct::Silent, Detection::Asks);
         finish_create_dags(&dags).expect("they are the DAGs that were recorded");

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use fass_dag_file::Length;
+use harness::file::File;
 use harness::markdown::{blocks, page};
 use harness::{Guest, Members, Said};
 use lab::golden::Golden;
@@ -17,13 +18,9 @@ const GOOD: &str = "dag x period 10ms\nsubtask a wcet 2ms\nsubtask b wcet 3ms\ne
 
 /// Boots the app with a file of `content`, which must end in `status`.
 fn boot(content: &[u8], words: &str, status: Status) -> Outcome {
-    let file = system::new_log("dag-file").expect("a folder for logs");
-    let module = file.with_extension("dag");
-    fs::write(&module, content).expect("a file in it");
-    let guest = Guest::new("dag-file").cores(4).module(&module);
-    let outcome = guest.word(words).end_in(status);
-    let _ = fs::remove_file(&module);
-    outcome
+    let file = File::of("dag-file", "dag", content);
+    let guest = Guest::new("dag-file").cores(4).module(&file.0);
+    guest.word(words).end_in(status)
 }
 
 fn run(text: &str, words: &str) -> Outcome {
@@ -270,18 +267,15 @@ fn script(words: &[&str]) -> Output {
 
 #[test]
 fn what_only_the_guest_finds_has_the_line_of_the_persons_file() {
-    let file = system::new_log("dag-file").expect("a folder for logs");
-    let file = file.with_extension("yaml");
     let text = "# a period of six days\nnodes:\n- id: 0\n  execution_time: 1\n  period: 584000\n";
-    fs::write(&file, text).expect("a file in it");
-    let path = file.to_str().expect("UTF-8");
+    let file = File::of("dag-file", "yaml", text);
+    let path = file.0.to_str().expect("UTF-8");
     let words = ["--timeout", "100", "--dag", path, "--unit", "1s"];
     let output = script(&[&words[..], &["--append", "jobs=1000000"]].concat());
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     let reason = format!("run: {path}:3: the deadline of the last job of dag");
     assert!(said.starts_with(&reason), "{said}");
-    let _ = fs::remove_file(&file);
 }
 
 #[test]
@@ -336,8 +330,7 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
 
 /// Draws a page's pictures by the commands that stand there, of which a run comes before each.
 fn assert_drawn(document: &str, pictures: usize) {
-    let trace = system::new_log("picture").expect("a folder for logs");
-    let trace = trace.with_extension("trace");
+    let trace = File::new("picture", "trace");
     let shown = blocks(&page(document)).into_iter();
     let shown = shown.filter(|block| block.text.contains("--svg"));
     let commands: Vec<String> = shown
@@ -352,7 +345,7 @@ fn assert_drawn(document: &str, pictures: usize) {
         let mut words = command.trim_start_matches("$ ").split_whitespace();
         let program = words.next().expect("a command");
         let words = words.map(|word| match word {
-            "run.trace" => trace.as_os_str(),
+            "run.trace" => trace.0.as_os_str(),
             word => word.as_ref(),
         });
         let mut command = Command::new(system::workspace().join(program));
@@ -378,7 +371,6 @@ fn assert_drawn(document: &str, pictures: usize) {
         };
         golden.assert_is(&drawn["<svg".len()..]);
     }
-    let _ = fs::remove_file(&trace);
 }
 
 #[test]

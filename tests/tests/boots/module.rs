@@ -1,10 +1,9 @@
 //! A file that the loader leaves in memory reaches the app, whatever its size.
 
-use std::fs;
-
+use harness::file::File;
 use harness::{Guest, Members, Said};
 use tool::protocol::Status;
-use tool::{Machine, Outcome, system};
+use tool::{Machine, Outcome};
 
 const MIB: usize = 1 << 20;
 
@@ -13,10 +12,8 @@ const MIB: usize = 1 << 20;
 fn refused(guest: Guest, bytes: usize) -> Outcome {
     let mut content = vec![b'z'; bytes];
     content[..2].copy_from_slice(b"xy");
-    let file = system::new_log("module").expect("a folder for logs");
-    fs::write(&file, content).expect("a file in it");
-    let outcome = guest.module(&file).end_in(Status::Usage);
-    let _ = fs::remove_file(&file);
+    let file = File::of("module", "file", content);
+    let outcome = guest.module(&file.0).end_in(Status::Usage);
     let reason = outcome.reason();
     assert!(reason.contains("found `xyz"), "{reason}");
     outcome
@@ -47,13 +44,11 @@ fn a_file_reaches_the_app_on_both_boards() {
 
 #[test]
 fn an_app_that_takes_no_file_is_warned_of() {
-    let file = system::new_log("module").expect("a folder for logs");
-    fs::write(&file, "a recording").expect("a file in it");
+    let file = File::of("module", "file", "a recording");
     let few = Guest::new("fork-join").word("jobs=1");
-    for (guest, is_warned) in [(few.clone().module(&file), true), (few, false)] {
+    for (guest, is_warned) in [(few.clone().module(&file.0), true), (few, false)] {
         let said = guest.succeed().serial;
         let warning = "warning: the app takes no file";
         assert_eq!(said.contains(warning), is_warned, "{said}");
     }
-    let _ = fs::remove_file(&file);
 }

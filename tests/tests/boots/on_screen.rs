@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use boot::screen::font::{HEIGHT, WIDTH, is_lit};
 use harness::Guest;
+use harness::file::File;
 use tool::qemu::{Ending, Loader};
 use tool::system;
 
@@ -70,14 +71,14 @@ fn ask(monitor: &Path, command: &str) -> String {
 /// Looks at the screen until a verdict is there and all cores halt, ends QEMU and returns the
 /// rows, and how pages are mapped.
 fn watch(monitor: &Path, cores: u64) -> (Vec<String>, String) {
-    let picture = monitor.with_extension("ppm");
+    let picture = File::new("screen", "ppm");
     let begun = Instant::now();
     let mut rows = Vec::new();
     let has_verdict = |rows: &[String]| rows.iter().any(|row| row.starts_with(VERDICT));
     while begun.elapsed() < Duration::from_secs(300) {
         thread::sleep(Duration::from_secs(1));
-        ask(monitor, &format!("screendump {}", picture.display()));
-        rows = self::rows(&fs::read(&picture).unwrap_or_default());
+        ask(monitor, &format!("screendump {}", picture.0.display()));
+        rows = self::rows(&fs::read(&picture.0).unwrap_or_default());
         let halted = || ask(monitor, "info registers -a").matches("HLT=1").count() as u64;
         if has_verdict(&rows) && halted() == cores {
             break;
@@ -85,7 +86,6 @@ fn watch(monitor: &Path, cores: u64) -> (Vec<String>, String) {
     }
     let pages = ask(monitor, "info tlb");
     ask(monitor, "quit");
-    let _ = fs::remove_file(&picture);
     (rows, pages)
 }
 

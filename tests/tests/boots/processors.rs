@@ -3,10 +3,11 @@
 use std::fs;
 use std::time::Duration;
 
+use harness::file::File;
 use harness::{Guest, Members, Said};
 use tool::protocol::{MachineLine, Status, Transcript};
 use tool::qemu::Ending;
-use tool::{Machine, Mode, Outcome, system};
+use tool::{Machine, Mode, Outcome};
 
 /// Describes the demo, short.
 fn demo(cores: u64) -> Guest {
@@ -131,20 +132,19 @@ fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
 /// devices in its place show what is sent all the same: in counted time, without a wait.
 #[test]
 fn a_machine_without_a_serial_port_runs() {
-    let bytes = system::new_log("bytes").expect("a file");
+    let bytes = File::new("bytes", "out");
     let never_ready =
         "-chardev null,id=none -device isa-debugcon,iobase=0x3fd,readback=0,chardev=none";
     let more = format!(
         "{never_ready} -chardev file,id=bytes,path={} \
          -device isa-debugcon,iobase=0x3f8,readback=0,chardev=bytes",
-        bytes.display()
+        bytes.0.display()
     );
     let mute = demo(2).altered(&[("#microvm", "microvm,isa-serial=off")], &more);
     let outcome = mute.boot();
     assert_eq!(outcome.ending, Ending::Guest(Status::Success));
     assert_eq!(outcome.serial, "");
-    let sent = fs::read_to_string(&bytes).expect("what was sent");
-    fs::remove_file(&bytes).expect("it is ours");
+    let sent = fs::read_to_string(&bytes.0).expect("what was sent");
     // The port's divisor comes first.
     let sent = Transcript::read(sent.trim_start_matches('\u{1}'));
     let ready_ns = sent.line("boot").number("ready_ns");

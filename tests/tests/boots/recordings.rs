@@ -2,31 +2,16 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::PathBuf;
 
+use harness::file::File;
 use harness::{Guest, Members, Said, lawful_runs};
 use recording::{Entry, EntryKind, Recordable, Recording};
 use tool::protocol::Status;
-use tool::{Machine, recordings, system};
+use tool::{Machine, recordings};
 
-/// A file for a recording, removed with this value.
-struct File(PathBuf);
-
-impl File {
-    fn new(name: &str) -> File {
-        let log = system::new_log(name).expect("a folder for logs");
-        File(log.with_extension("rec"))
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        recordings::received(&self.0).expect("the guest has sent it")
-    }
-}
-
-impl Drop for File {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.0);
-    }
+/// Returns what the guest has sent to a file.
+fn bytes(file: &File) -> Vec<u8> {
+    recordings::received(&file.0).expect("the guest has sent it")
 }
 
 fn guest(words: &str) -> Guest {
@@ -37,7 +22,7 @@ fn guest(words: &str) -> Guest {
 fn record(guest: Guest, file: &File) -> u64 {
     let outcome = guest.records(&file.0, 64).succeed();
     // A PC's firmware has said something there, too.
-    fs::write(&file.0, file.bytes()).expect("it is our file");
+    fs::write(&file.0, bytes(file)).expect("it is our file");
     let line = outcome.line("recorded");
     line.has([("lost", 0)]);
     line.number("entries")
@@ -57,11 +42,11 @@ const OTHERS: [(u64, &str); 3] = [(1, "policy=static"), (2, "policy=edf"), (4, "
 
 #[test]
 fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
-    let file = File::new("recorded");
+    let file = File::new("recorded", "rec");
     for machine in [Machine::Microvm, Machine::Q35] {
         assert_eq!(record(guest("").cores(2).machine(machine), &file), 250);
     }
-    let bytes = file.bytes();
+    let bytes = bytes(&file);
     let recording = Recording::read(&bytes).expect("it is whole");
     assert_eq!(recording.header().app, "guest-tests");
     let inputs = recording
@@ -91,7 +76,7 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
 
 #[test]
 fn what_shares_behind_the_schedulers_back_is_found_by_a_replay() {
-    let file = File::new("cheats");
+    let file = File::new("cheats", "rec");
     record(guest("cheats=yes").cores(2), &file);
     let guest = guest("cheats=yes").replays(&file.0);
     let outcome = guest.end_in(Status::Failure);
@@ -104,10 +89,10 @@ fn what_shares_behind_the_schedulers_back_is_found_by_a_replay() {
 
 #[test]
 fn what_does_not_fit_is_named_job_by_job() {
-    let file = File::new("long");
+    let file = File::new("long", "rec");
     let guest = Guest::test("recorded_long").records(&file.0, 16);
     let outcome = guest.succeed();
-    let bytes = file.bytes();
+    let bytes = bytes(&file);
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(!recording.is_cut() && recording.lost() > 0);
     let of = |wanted: EntryKind| {
@@ -129,7 +114,7 @@ fn what_does_not_fit_is_named_job_by_job() {
 
 #[test]
 fn a_recording_that_does_not_fit_is_refused() {
-    let file = File::new("other");
+    let file = File::new("other", "rec");
     record(guest(""), &file);
     for (test, reason) in [
         (

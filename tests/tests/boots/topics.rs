@@ -1,10 +1,9 @@
 //! Topics at the console of the machine: values as they are completed, and how often.
 
-use std::fs;
-
+use harness::file::File;
 use harness::{Guest, Members, Said};
 use recording::Recording;
-use tool::{Outcome, recordings, system};
+use tool::{Outcome, recordings};
 
 #[test]
 fn values_are_echoed_and_what_is_left_out_is_counted() {
@@ -62,18 +61,16 @@ fn is_echoed(outcome: &Outcome) {
 
 #[test]
 fn what_is_echoed_while_a_run_is_recorded_is_in_the_recording() {
-    let log = system::new_log("echoed").expect("a folder for logs");
-    let file = log.with_extension("rec");
+    let file = File::new("echoed", "rec");
     let conversation = [
         ("\"kind\":\"tuned\"", "echo gain"),
         ("\"kind\":\"echo\"", "set gain 1.5"),
         ("\"kind\":\"echo\",\"topic\":\"gain\"", "echo off"),
         ("\"command\":\"echo off\"", "shutdown"),
     ];
-    let guest = Guest::test("endless").cores(2).records(&file, 64);
+    let guest = Guest::test("endless").cores(2).records(&file.0, 64);
     let outcome = guest.conversation(&conversation).succeed();
-    let bytes = recordings::received(&file).expect("the guest has sent it");
-    let _ = fs::remove_file(&file);
+    let bytes = recordings::received(&file.0).expect("the guest has sent it");
 
     let recording = Recording::read(&bytes).expect("it is whole");
     assert_eq!(recording.lost(), 0);

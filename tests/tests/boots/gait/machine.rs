@@ -4,21 +4,21 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
-use super::{File, walk};
+use super::{Walked, walk};
 use fass::{Policy, finish_create_dags};
 use gait::build;
 use harness::Guest;
+use harness::file::File;
 use tool::{Outcome, recordings, system};
 use virtual_time::VirtualTime;
 
 #[test]
 fn the_machine_computes_the_bits_of_the_host_and_both_replay_what_it_recorded() {
-    let file = File::new();
+    let file = Walked::new();
     let wanted = walk(&file.read(), 1, Policy::Edf).digest();
-    let log = system::new_log("walk").expect("a folder for logs");
-    let run = log.with_extension("rec");
-    let guest = Guest::new("gait").cores(2).module(&file.0);
-    let outcome = guest.clone().records(&run, 1024).succeed();
+    let run = File::new("walk", "rec");
+    let guest = Guest::new("gait").cores(2).module(&file.0.0);
+    let outcome = guest.clone().records(&run.0, 1024).succeed();
     let number = |outcome: &Outcome, kind: &str, name: &str| {
         let line = outcome.transcript.of_kind(kind).next();
         line.and_then(|line| line.number_at(name)).expect(name)
@@ -36,12 +36,11 @@ fn the_machine_computes_the_bits_of_the_host_and_both_replay_what_it_recorded() 
     );
 
     // The recording stands before the app's own file.
-    let bytes = recordings::received(&run).expect("the guest has sent it");
-    let both = [&bytes[..], &fs::read(&file.0).expect("the walk")].concat();
-    fs::write(&run, &both).expect("it is our file");
-    let guest = (guest.cores(4).module(&run)).word(&format!("replay={}", bytes.len()));
+    let bytes = recordings::received(&run.0).expect("the guest has sent it");
+    let both = [&bytes[..], &fs::read(&file.0.0).expect("the walk")].concat();
+    fs::write(&run.0, &both).expect("it is our file");
+    let guest = (guest.cores(4).module(&run.0)).word(&format!("replay={}", bytes.len()));
     let outcome = guest.word("policy=edf").succeed();
-    let _ = fs::remove_file(&run);
     assert_eq!(number(&outcome, "gait", "digest"), wanted);
     assert_eq!(number(&outcome, "replayed", "compared"), 7_132);
     assert_eq!(number(&outcome, "replayed", "uncompared"), 0);
@@ -57,12 +56,12 @@ fn the_machine_computes_the_bits_of_the_host_and_both_replay_what_it_recorded() 
 #[test]
 fn a_console_on_linux_shows_topics() {
     for mechanism in ["fifo", "poll"] {
-        let file = File::new();
+        let file = Walked::new();
         let mut command = Command::new(system::workspace().join("scripts/run"));
         let words = "--app gait --on linux --console --append budget_factor=0 --mechanism";
         command.args(words.split(' ')).args([mechanism, "--module"]);
         let child = command
-            .arg(&file.0)
+            .arg(&file.0.0)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped());
         let mut child = child.spawn().expect("the command can be run");

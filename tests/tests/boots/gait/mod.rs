@@ -5,10 +5,10 @@ mod walk;
 
 use std::ffi::OsString;
 use std::fs;
-use std::path::PathBuf;
 
 use fass::{Policy, finish_create_dags};
 use gait::{DAG, Sample, TOPIC, Walk, build};
+use harness::file::File;
 use recording::{Recordable, Recording};
 use tool::system::workspace;
 use virtual_time::VirtualTime;
@@ -16,16 +16,15 @@ use virtual_time::VirtualTime;
 /// The table of both sensors.
 const TABLE: &str = "apps/gait/data/walking.csv";
 
-/// The recording that `./scripts/recording` makes of the data, removed with this value.
-struct File(PathBuf);
+/// The recording that `./scripts/recording` makes of the data.
+struct Walked(File);
 
-impl File {
+impl Walked {
     /// Makes it.
-    fn new() -> File {
+    fn new() -> Walked {
         let table = workspace().join(TABLE);
         let table = table.to_string_lossy();
-        let name = format!("walking-{:?}.rec", std::thread::current().id());
-        let out = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
+        let out = File::new("walking", "rec");
         let schema = Sample::schema().to_string();
         let words = [
             "--from-csv",
@@ -39,21 +38,15 @@ impl File {
         ];
         let more = ["--period", "8333333ns", "--type", &schema, "--out"];
         let words = words.into_iter().chain(more).map(OsString::from);
-        let words: Vec<OsString> = words.chain([out.clone().into()]).collect();
+        let words: Vec<OsString> = words.chain([out.0.clone().into()]).collect();
         let _ = tool::recordings::recording(&words);
-        File(out)
+        Walked(out)
     }
 
     /// Reads it.
     fn read(&self) -> Recording<'static> {
-        let bytes = fs::read(&self.0).expect("the recording");
+        let bytes = fs::read(&self.0.0).expect("the recording");
         Recording::read(bytes.leak()).expect("it is whole")
-    }
-}
-
-impl Drop for File {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.0);
     }
 }
 

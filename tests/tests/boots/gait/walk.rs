@@ -1,6 +1,6 @@
 //! The recorded walk, in virtual time, against an independent implementation.
 
-use super::{File, walk};
+use super::{Walked, walk};
 use fass::Policy;
 use gait::{DAG, Sample, TOPIC};
 
@@ -8,7 +8,7 @@ const REFERENCE: &str = include_str!("../../../../apps/gait/data/madgwick.csv");
 
 #[test]
 fn every_value_is_that_of_the_reference_on_all_cores_and_by_all_policies() {
-    let recording = File::new().read();
+    let recording = Walked::new().read();
     let digest = |cores, policy| walk(&recording, cores, policy).digest();
     let walk = walk(&recording, 2, Policy::Edf);
     for cores in [1, 4, 8] {
@@ -37,7 +37,7 @@ fn every_value_is_that_of_the_reference_on_all_cores_and_by_all_policies() {
 
 #[test]
 fn a_recording_of_something_else_is_refused_in_words() {
-    let recording = File::new().read();
+    let recording = Walked::new().read();
     let other = recording.values::<[f64; 18]>(DAG, TOPIC);
     let said = other.expect_err("another type").to_string();
     let begin = "topic `sample` of dag `gait` has values of type Sample { upper: Sensor {";
