@@ -135,7 +135,7 @@ pub mod shared {
     //! A subtask that uses one is registered by [`Dag::using`](crate::Dag::using).
 
     pub use crate::api::device::{
-        Asker, Device, DeviceDriver, DeviceUse, PendingAnswer, Ticket, TimedOut, create_device,
+        Asker, Device, DeviceDriver, DeviceUse, PendingAnswer, Ticket, create_device,
     };
     pub use crate::api::latest::{Latest, LatestUse, Sample};
     pub use crate::api::lifecycle::{
@@ -148,6 +148,7 @@ pub mod shared {
     pub use crate::api::signal::{Raiser, Signal, SignalUse};
     pub use crate::api::state::{State, StateRead, StateUpdate, StateValue};
     pub use crate::api::uses::{ResettableUses, SubtaskBuilder, Uses};
+    pub use crate::api::waiting::TimedOut;
     pub use crate::api::wire::{
         DeviceEnd, Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions,
     };

@@ -46,6 +46,7 @@ use super::dag::Dag;
 use super::record::EDGE;
 use super::signal::{Signal, unknown_signal};
 use super::uses::{Uses, sealed};
+use super::waiting::TimedOut;
 use crate::draft::fault::Fault;
 use crate::draft::part::{CheckedDag, DraftPart, PartKind};
 use crate::platform;
@@ -159,22 +160,6 @@ pub struct PendingAnswer<'a, Q, A> {
     /// The answer of the recorded run, if this is a replay.
     recorded: Option<A>,
 }
-
-/// A device has not answered within the limit of the wait.
-///
-/// ```
-/// assert_eq!(fass::shared::TimedOut.to_string(), "the device has not answered in time");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimedOut;
-
-impl fmt::Display for TimedOut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the device has not answered in time")
-    }
-}
-
-impl core::error::Error for TimedOut {}
 
 /// The driver's end of a device. Made by [`create_device`].
 ///

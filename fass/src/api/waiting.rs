@@ -24,6 +24,7 @@
 //! - A [`State`](crate::shared::State) is for the time of a call, so an async function has none.
 
 use alloc::rc::Rc;
+use core::fmt;
 use core::time::Duration;
 
 use super::dag::Dag;
@@ -33,6 +34,22 @@ use super::uses::{SubtaskBuilder, Uses};
 use crate::draft::{NamedTopics, SubtaskAttributes};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 use crate::run::waiting::{defer, defer_untyped};
+
+/// A device has not answered within the limit of the wait.
+///
+/// ```
+/// assert_eq!(fass::shared::TimedOut.to_string(), "the device has not answered in time");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimedOut;
+
+impl fmt::Display for TimedOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the device has not answered in time")
+    }
+}
+
+impl core::error::Error for TimedOut {}
 
 impl Dag {
     /// Registers a source as [`register_periodic_subtask`](Self::register_periodic_subtask) does,

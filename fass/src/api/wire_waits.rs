@@ -24,9 +24,10 @@ use recording::Recordable;
 
 use super::dag::Dag;
 use super::device::{
-    AnswerSource, Asker, Device, DeviceDriver, DeviceUse, PendingAnswer, TimedOut, create_device,
+    AnswerSource, Asker, Device, DeviceDriver, DeviceUse, PendingAnswer, create_device,
 };
 use super::uses::{Uses, sealed};
+use super::waiting::TimedOut;
 use super::wire::Wire;
 use crate::run::cell::SharedCell;
 use crate::run::wire::{SendCompletion, WireInput, WireOutput};

@@ -14,6 +14,8 @@ static IS_ON: AtomicBool = AtomicBool::new(false);
 /// Sets recording or replay of a plan up on a platform, if it was asked for, restores its states, and
 /// adds it to the record, if one is kept.
 ///
+/// See [`Platform`].
+///
 /// # Errors
 ///
 /// If nothing of the plan is recorded, it does not fit a replay, or it is a second one; or its states
@@ -39,6 +41,8 @@ pub fn launch<S: Sink + Send + 'static>(
 }
 
 /// Takes note that an instance has failed, and when on the clock. The scheduler's lock is held.
+///
+/// See [`Platform`].
 pub fn failed(instance: Instance, clock_ns: u64) {
     if IS_ON.load(Ordering::Relaxed) {
         with_edge(|edge| edge.failed(instance, clock_ns));
@@ -46,6 +50,8 @@ pub fn failed(instance: Instance, clock_ns: u64) {
 }
 
 /// Takes what became of a job or an instance, if it is of interest. The scheduler's lock is held.
+///
+/// See [`Platform`].
 pub fn happened(notice: &DriverNotice) {
     if IS_ON.load(Ordering::Relaxed) {
         with_edge(|edge| edge.happened(notice));
