@@ -64,13 +64,17 @@ pub(super) const PERIOD_NS: u64 = 1_000_000;
 
 /// Connects a wire to the endpoint that the words name.
 pub(crate) fn connect(wire: &Wire, words: &EndpointWords<'_>) -> Result<(), AppError> {
+    let second = || failure(wire, "is a second one; connect one wire, once");
+    // Not even opened: the script would take its bytes off the app's file once more.
+    if CONNECTED.get().is_some() {
+        return Err(second());
+    }
     let mut opened = ENDPOINTS
         .iter()
         .filter_map(|open| open(wire, words).transpose());
     let endpoint = opened.next().transpose()?;
     let is_connected = endpoint.is_some_and(|endpoint| CONNECTED.set(Box::leak(endpoint)));
-    let taken = || failure(wire, "finds the second serial port taken; connect one wire");
-    is_connected.then_some(()).ok_or_else(taken)
+    is_connected.then_some(()).ok_or_else(second)
 }
 
 /// Returns the other end of a wire, for an endpoint.
@@ -87,5 +91,36 @@ fn failure(wire: &Wire, why: &str) -> AppError {
 fn arrive(wire: &DeviceEnd, bytes: &[u8], now_ns: u64) {
     if let Some((plan, dag)) = wire.arrive(bytes, now_ns) {
         execution::raise_in_interrupt(plan, dag);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Box, CONNECTED, Cell, CommandLine, DeviceEnd, Endpoint, EndpointWords, Wire};
+
+    struct DeadEnd(DeviceEnd);
+
+    impl Endpoint for DeadEnd {
+        fn beat(&self, _now_ns: u64) {}
+
+        fn end(&self) -> &DeviceEnd {
+            &self.0
+        }
+    }
+
+    #[test]
+    fn a_second_wire_is_refused_as_that_whatever_the_words_say() {
+        let [first, second] = ["first", "second"].map(Wire::new);
+        let end = DeadEnd(DeviceEnd::of(&first).unwrap());
+        assert!(CONNECTED.set(Box::leak(Box::new(end))));
+        let options = CommandLine::parse("input=3").unwrap();
+        let module = Cell::new(Some(&b"own"[..]));
+        let words = EndpointWords {
+            options: &options,
+            module: &module,
+        };
+        let why = super::connect(&second, &words).unwrap_err().to_string();
+        assert_eq!(why, "wire `second` is a second one; connect one wire, once");
+        assert_eq!(module.get(), Some(&b"own"[..]));
     }
 }
