@@ -35,12 +35,25 @@ pub struct Choice {
     pub work: fn(&[OsString]) -> ExitCode,
 }
 
-/// Makes the choices of a [`Menu`]: each word with its help text and its function.
+/// Makes the choices of a [`Menu`]: each word with its help text and its function. A word that
+/// stands twice does not compile:
+///
+/// ```compile_fail
+/// use std::process::ExitCode;
+/// use tool::options::{Choice, choices};
+///
+/// static DISHES: &[Choice] = choices! {
+///     "soup": "hot", |_| ExitCode::SUCCESS;
+///     "soup": "cold", |_| ExitCode::SUCCESS;
+/// };
+/// ```
 #[macro_export]
 macro_rules! choices {
-    ($($name:literal: $about:literal, $work:expr;)*) => {
+    ($($name:literal: $about:literal, $work:expr;)*) => {{
+        #[deny(unreachable_patterns)]
+        const _: fn(&str) -> bool = |word| matches!(word, $($name)|*);
         &[$($crate::options::Choice { name: $name, about: $about, work: $work }),*]
-    };
+    }};
 }
 pub use choices;
 
