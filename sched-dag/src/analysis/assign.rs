@@ -496,4 +496,23 @@ mod tests {
         let six = federated(&tasks, 6).unwrap();
         assert_eq!((six.heavy, six.light.len()), (vec![(0, 4)], 2));
     }
+
+    #[test]
+    fn charges_of_centuries_are_refused_and_overflow_nowhere() {
+        let dags = [parallel(&[1], 20), parallel(&[1], 20)];
+        let options = CommitOptions::new(Policy::Edf, 2);
+        let mut divided = crate::verify(&dags, &options)
+            .expect("they are right")
+            .task_set;
+        let settings = AnalysisSettings {
+            policy: Policy::Edf,
+            preemption: Preemption::Enabled,
+            cores: 2,
+            overheads: Overheads {
+                dispatch_ns: u64::MAX / 4,
+                ..Overheads::NONE
+            },
+        };
+        assert!(assign(&mut divided, &settings).is_err());
+    }
 }

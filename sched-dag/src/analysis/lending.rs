@@ -191,7 +191,8 @@ impl LendingPlan {
             let members = group.members.iter().map(|&(dag, _)| tasks[dag]);
             let load = members.map(|task| parts_per_million(task.volume_ns(), task.period_ns()));
             // Members take from their cores alike.
-            taken += (load.sum::<u64>() * shared).div_ceil(group.cores.len() as u64);
+            let load = load.fold(0, u64::saturating_add).saturating_mul(shared);
+            taken = taken.saturating_add(load.div_ceil(group.cores.len() as u64));
         }
         let all = 1_000_000 * cores.len() as u64;
         let left = all.saturating_sub(taken) / (10_000 * cores.len() as u64);
