@@ -4,6 +4,7 @@
 //! proof of the same bounds, say by another chain of the same length. The statement may be
 //! altered, too: then the bounds are of other DAGs, and they must hold for these.
 
+use std::collections::BTreeSet;
 use std::fs;
 
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer};
@@ -127,11 +128,21 @@ fn unsound(text: &str, lines: &[String]) -> Option<String> {
 fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let mut dags: Vec<DagSpec> = Vec::new();
     let (mut machine, mut ready_ns, mut move_ns) = ((0, Policy::Edf, 0), 0, 0);
+    // The numbers of a policy may be larger than priorities are, so these have their order.
+    let numbers = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("subtask ")?.split(' ').nth(1));
+    let numbers = numbers.map(|word| word.parse::<u128>().expect("a number"));
+    let numbers: BTreeSet<u128> = numbers.collect();
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
         let index = |at: usize| usize::try_from(number(at)).expect("an index");
         let small = |at: usize| u32::try_from(number(at)).expect("a small number");
+        let rank = |word: &str| {
+            let number: u128 = word.parse().expect("a number");
+            u32::try_from(numbers.range(..number).count()).expect("a small number")
+        };
         match (words[0], dags.last_mut()) {
             ("machine", _) => {
                 // `any` is the word of no policy, but the order of most.
@@ -148,7 +159,7 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
             }),
             ("subtask", Some(dag)) => dag.subtasks.push(SubtaskSpec {
                 wcet_ns: Some(number(1)).filter(|&ns| ns > 0),
-                priority: Some(Priority(small(2))),
+                priority: Some(Priority(rank(words[2]))),
                 non_preemptive: number(3) > 0,
                 ..SubtaskSpec::default()
             }),
