@@ -33,6 +33,10 @@ macro_rules! overheads {
         $(#[doc = $doc:literal])+
         $term:ident = $word:literal, segment $always:literal + $preemptive:literal, move $moved:literal;
     )+) => {
+        // Of a recording, which has the sums of a segment and of a move, the latter is read as a
+        // part of the former.
+        $(const _: () = assert!($moved <= $always + $preemptive, $word);)+
+
         /// Measured costs, each a worst case; all 0 by default.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
         pub struct Overheads {
