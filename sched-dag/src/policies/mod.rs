@@ -19,7 +19,8 @@ use crate::task_set::Dag;
 struct PolicyRule {
     /// Its word in options, scenarios and traces.
     word: &'static str,
-    /// Returns the number of each subtask of a DAG.
+    /// Returns the number of each subtask of a DAG. Where the release is added, a number above the
+    /// relative deadline counts as that.
     numbers: fn(&Dag) -> Vec<u64>,
     /// Whether the job's nominal release is added.
     adds_release: bool,
@@ -111,4 +112,25 @@ policies! {
     Fifo = fifo;
     /// By the latest start at which the deadline can still be met at WCETs, the earliest first.
     LeastSlack = least_slack;
+}
+
+#[test]
+fn each_policy_is_that_of_its_word_and_numbers_each_subtask() {
+    use crate::{CommitOptions, DagSpec, SubtaskSpec, verify};
+    let spec = DagSpec {
+        period_ns: Some(9),
+        relative_deadline_ns: Some(9),
+        subtasks: alloc::vec![SubtaskSpec::default(); 3],
+        edges: alloc::vec![(0, 1), (1, 2)],
+        ..DagSpec::default()
+    };
+    for policy in Policy::ALL {
+        let word = policy.word();
+        assert_eq!(Policy::of_word(word), Some(policy), "{word} is of two");
+        let options = CommitOptions::new(policy, 1);
+        let task_set = verify(core::slice::from_ref(&spec), &options)
+            .unwrap()
+            .task_set;
+        assert_eq!(policy.numbers(&task_set.dags()[0]).len(), 3, "{word}");
+    }
 }
