@@ -81,7 +81,8 @@ macro_rules! tests {
     };
 }
 
-// Those on whose bounds others rest stand before these.
+// Those on whose bounds others rest stand before these. A DAG with a bound has none by `multiple_paths`,
+// so none before that may be longer than its own.
 tests!(response priorities pinned multiple_paths demand sink_paths);
 
 /// The bounds of jobs, as far as tests have found them.
