@@ -114,23 +114,28 @@ policies! {
     LeastSlack = least_slack;
 }
 
-#[test]
-fn each_policy_is_that_of_its_word_and_numbers_each_subtask() {
+#[cfg(test)]
+mod tests {
+    use super::Policy;
     use crate::{CommitOptions, DagSpec, SubtaskSpec, verify};
-    let spec = DagSpec {
-        period_ns: Some(9),
-        relative_deadline_ns: Some(9),
-        subtasks: alloc::vec![SubtaskSpec::default(); 3],
-        edges: alloc::vec![(0, 1), (1, 2)],
-        ..DagSpec::default()
-    };
-    for policy in Policy::ALL {
-        let word = policy.word();
-        assert_eq!(Policy::of_word(word), Some(policy), "{word} is of two");
-        let options = CommitOptions::new(policy, 1);
-        let task_set = verify(core::slice::from_ref(&spec), &options)
-            .unwrap()
-            .task_set;
-        assert_eq!(policy.numbers(&task_set.dags()[0]).len(), 3, "{word}");
+
+    #[test]
+    fn each_policy_is_that_of_its_word_and_numbers_each_subtask() {
+        let spec = DagSpec {
+            period_ns: Some(9),
+            relative_deadline_ns: Some(9),
+            subtasks: alloc::vec![SubtaskSpec::default(); 3],
+            edges: alloc::vec![(0, 1), (1, 2)],
+            ..DagSpec::default()
+        };
+        for policy in Policy::ALL {
+            let word = policy.word();
+            assert_eq!(Policy::of_word(word), Some(policy), "{word} is of two");
+            let options = CommitOptions::new(policy, 1);
+            let task_set = verify(core::slice::from_ref(&spec), &options)
+                .unwrap()
+                .task_set;
+            assert_eq!(policy.numbers(&task_set.dags()[0]).len(), 3, "{word}");
+        }
     }
 }

@@ -124,25 +124,30 @@ fn unsound(text: &str, lines: &[String]) -> Option<String> {
     None
 }
 
+/// Returns the priority for a number of a witness's policy: these may be larger than priorities
+/// are, and their order is all that counts.
+fn ranks(text: &str) -> impl Fn(&str) -> u32 {
+    let number = |word: &str| word.parse::<u128>().expect("a number");
+    let subtasks = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("subtask "));
+    let numbers = subtasks.filter_map(|line| line.split(' ').nth(1));
+    let numbers: BTreeSet<u128> = numbers.map(number).collect();
+    move |word| {
+        let below = numbers.range(..number(word)).count();
+        u32::try_from(below).expect("a small number")
+    }
+}
+
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
 fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
-    let mut dags: Vec<DagSpec> = Vec::new();
+    let (rank, mut dags) = (ranks(text), Vec::<DagSpec>::new());
     let (mut machine, mut ready_ns, mut move_ns) = ((0, Policy::Edf, 0), 0, 0);
-    // The numbers of a policy may be larger than priorities are, so these have their order.
-    let numbers = text
-        .lines()
-        .filter_map(|line| line.strip_prefix("subtask ")?.split(' ').nth(1));
-    let numbers = numbers.map(|word| word.parse::<u128>().expect("a number"));
-    let numbers: BTreeSet<u128> = numbers.collect();
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
         let index = |at: usize| usize::try_from(number(at)).expect("an index");
         let small = |at: usize| u32::try_from(number(at)).expect("a small number");
-        let rank = |word: &str| {
-            let number: u128 = word.parse().expect("a number");
-            u32::try_from(numbers.range(..number).count()).expect("a small number")
-        };
         match (words[0], dags.last_mut()) {
             ("machine", _) => {
                 // `any` is the word of no policy, but the order of most.
