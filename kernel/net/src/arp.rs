@@ -1,0 +1,127 @@
+//! Neighbours: the Ethernet addresses of the IPv4 addresses next to us (RFC 826).
+
+use core::net::Ipv4Addr;
+
+use crate::Mac;
+use crate::bytes::{array, ip_at, mac_at, u16_at};
+
+/// The number of neighbours that are known at a time.
+const NEIGHBOURS: usize = 8;
+
+/// The bytes of an ARP packet, behind the Ethernet header.
+pub(crate) const LENGTH: usize = 28;
+
+/// Ethernet and IPv4, with addresses of 6 and 4 bytes.
+const KINDS: [u8; 6] = [0, 1, 8, 0, 6, 4];
+
+/// A question for an Ethernet address, or the answer.
+#[derive(Clone, Copy)]
+pub(crate) struct Packet {
+    pub(crate) is_question: bool,
+    pub(crate) from: (Mac, Ipv4Addr),
+    pub(crate) to: (Mac, Ipv4Addr),
+}
+
+impl Packet {
+    pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
+        (array(bytes, 0)? == KINDS).then_some(())?;
+        Some(Self {
+            is_question: match u16_at(bytes, 6)? {
+                1 => true,
+                2 => false,
+                _ => return None,
+            },
+            from: (mac_at(bytes, 8)?, ip_at(bytes, 14)?),
+            to: (mac_at(bytes, 18)?, ip_at(bytes, 24)?),
+        })
+    }
+
+    pub(crate) fn bytes(self) -> [u8; LENGTH] {
+        let mut bytes = [0; LENGTH];
+        bytes[..6].copy_from_slice(&KINDS);
+        bytes[7] = if self.is_question { 1 } else { 2 };
+        for (at, (mac, ip)) in [(8, self.from), (18, self.to)] {
+            bytes[at..at + 6].copy_from_slice(&mac.0);
+            bytes[at + 6..at + 10].copy_from_slice(&ip.octets());
+        }
+        bytes
+    }
+}
+
+struct Neighbour<B> {
+    ip: Ipv4Addr,
+    /// None while the question for it has no answer.
+    mac: Option<Mac>,
+    /// The latest frame that waits for the answer.
+    waiting: Option<B>,
+    /// Counts the uses of the table; 0 if nothing was ever sent to this neighbour.
+    last_use: u64,
+}
+
+/// The neighbours that are known or asked for.
+pub(crate) struct Neighbours<B> {
+    table: [Option<Neighbour<B>>; NEIGHBOURS],
+    uses: u64,
+}
+
+impl<B> Neighbours<B> {
+    pub(crate) const fn new() -> Self {
+        Self {
+            table: [const { None }; NEIGHBOURS],
+            uses: 0,
+        }
+    }
+
+    fn find(&mut self, ip: Ipv4Addr) -> Option<&mut Neighbour<B>> {
+        self.table.iter_mut().flatten().find(|known| known.ip == ip)
+    }
+
+    /// Returns the neighbour of an address. The one that was not sent to for the longest time
+    /// makes room for a new one, so strangers who ask displace each other only.
+    fn entry(&mut self, ip: Ipv4Addr) -> &mut Neighbour<B> {
+        let place = (0..NEIGHBOURS).min_by_key(|place| match &self.table[*place] {
+            Some(known) if known.ip == ip => (0, 0),
+            None => (1, 0),
+            Some(known) => (2, known.last_use),
+        });
+        let place = &mut self.table[place.unwrap_or(0)];
+        if place.as_ref().is_none_or(|known| known.ip != ip) {
+            *place = None;
+        }
+        place.get_or_insert(Neighbour {
+            ip,
+            mac: None,
+            waiting: None,
+            last_use: 0,
+        })
+    }
+
+    /// Returns the Ethernet address of a neighbour that a frame is to be sent to, if it is known.
+    pub(crate) fn resolve(&mut self, ip: Ipv4Addr) -> Option<Mac> {
+        self.uses += 1;
+        let uses = self.uses;
+        let known = self.find(ip)?;
+        known.last_use = uses;
+        known.mac
+    }
+
+    /// Keeps a frame until its neighbour has answered, and drops the one that was kept before.
+    pub(crate) fn keep(&mut self, ip: Ipv4Addr, frame: B) {
+        let uses = self.uses;
+        let neighbour = self.entry(ip);
+        neighbour.last_use = uses;
+        neighbour.waiting = Some(frame);
+    }
+
+    /// Learns from a packet, and returns the frame that has waited for it.
+    ///
+    /// Only those are added that ask for us; those known, or asked for, are renewed.
+    pub(crate) fn learn(&mut self, (mac, ip): (Mac, Ipv4Addr), asks_us: bool) -> Option<B> {
+        let neighbour = match asks_us {
+            true => self.entry(ip),
+            false => self.find(ip)?,
+        };
+        neighbour.mac = Some(mac);
+        neighbour.waiting.take()
+    }
+}

@@ -1,0 +1,333 @@
+//! The interface: what each frame that came means, and the headers of what is sent.
+
+use core::net::Ipv4Addr;
+use core::ops::Range;
+
+use crate::arp::{self, Neighbours};
+use crate::bytes::{check_sum, mac_at, put, sum, u16_at};
+use crate::ipv4::{self, Packet};
+use crate::{Mac, Peer, udp};
+
+/// The bytes of all headers before a datagram's payload: Ethernet, IPv4, UDP.
+pub const HEADERS: usize = ipv4::START + ipv4::LENGTH + udp::LENGTH;
+
+/// The most bytes of a datagram's payload, which make a frame of 1514 bytes.
+pub const MOST_PAYLOAD: usize = 1500 - ipv4::LENGTH - udp::LENGTH;
+
+const TYPE_IPV4: u16 = 0x0800;
+const TYPE_ARP: u16 = 0x0806;
+
+/// The address of an interface, and the network around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// The address; unspecified (0.0.0.0) while there is none.
+    pub ip: Ipv4Addr,
+    /// The number of leading bits that all addresses of the network share, 0 to 32.
+    pub prefix: u8,
+    /// The router to all other networks.
+    pub gateway: Option<Ipv4Addr>,
+}
+
+impl Address {
+    /// No address, as before an answer of DHCP.
+    pub const NONE: Self = Self {
+        ip: Ipv4Addr::UNSPECIFIED,
+        prefix: 32,
+        gateway: None,
+    };
+
+    fn host_bits(&self) -> u32 {
+        u32::MAX.checked_shr(self.prefix.into()).unwrap_or(0)
+    }
+
+    fn broadcast(&self) -> Ipv4Addr {
+        (self.ip | Ipv4Addr::from(self.host_bits())) & Ipv4Addr::BROADCAST
+    }
+
+    fn is_for_all(&self, ip: Ipv4Addr) -> bool {
+        // Networks of two addresses and of one have no address of all.
+        ip == Ipv4Addr::BROADCAST || self.prefix < 31 && ip == self.broadcast()
+    }
+
+    /// Returns the neighbour by which an address is reached.
+    fn next_hop(&self, ip: Ipv4Addr) -> Option<Ipv4Addr> {
+        let is_near = (self.ip.to_bits() ^ ip.to_bits()) & !self.host_bits() == 0;
+        if is_near { Some(ip) } else { self.gateway }
+    }
+}
+
+/// Returns whether an address may be that of one host.
+pub(crate) fn is_host(ip: Ipv4Addr) -> bool {
+    !(ip.is_unspecified() || ip.is_multicast() || ip.is_broadcast())
+}
+
+/// The numbers of frames that came, by what they were.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// All frames.
+    pub frames: u64,
+    /// Those with a wrong length, check sum or header.
+    pub malformed: u64,
+    /// Those of other addresses, other protocols, and fragments.
+    pub foreign: u64,
+    /// ARP packets.
+    pub arps: u64,
+    /// ICMP echo requests to this address.
+    pub echoes: u64,
+    /// Datagrams to this address or to all.
+    pub datagrams: u64,
+}
+
+/// A datagram in the frame that was heard.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Datagram {
+    /// The sender.
+    pub from: Peer,
+    /// The port to which it was sent.
+    pub port: u16,
+    /// The place of its payload in the frame.
+    pub payload: Range<usize>,
+}
+
+/// A frame's meaning.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Heard<B> {
+    /// Nothing is to be done.
+    Nothing,
+    /// The frame's first bytes have become the answer to it, which is to be sent.
+    Answer {
+        /// The number of these bytes.
+        length: usize,
+        /// A kept frame whose neighbour has become known by the question.
+        resolved: Option<B>,
+    },
+    /// The neighbour of a kept frame has answered: the frame is whole, and is to be sent.
+    Resolved(B),
+    /// A datagram.
+    Datagram(Datagram),
+}
+
+/// The way of a frame whose headers have been written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Route {
+    /// The frame is whole, and is to be sent.
+    Ready,
+    /// This neighbour is to be [asked](Interface::question), and the frame to be
+    /// [kept](Interface::keep) until it answers.
+    Unresolved(Ipv4Addr),
+    /// No neighbour leads to the address, as there is no gateway or no address yet.
+    None,
+}
+
+/// An interface with one address, for frames in buffers of kind `B`.
+pub struct Interface<B> {
+    mac: Mac,
+    address: Address,
+    neighbours: Neighbours<B>,
+    identification: u16,
+    counts: Counts,
+}
+
+impl<B: AsMut<[u8]>> Interface<B> {
+    /// Returns the interface of a card.
+    #[must_use]
+    pub const fn new(mac: Mac, address: Address) -> Self {
+        Self {
+            mac,
+            address,
+            neighbours: Neighbours::new(),
+            identification: 0,
+            counts: Counts {
+                frames: 0,
+                malformed: 0,
+                foreign: 0,
+                arps: 0,
+                echoes: 0,
+                datagrams: 0,
+            },
+        }
+    }
+
+    /// Returns the address.
+    #[must_use]
+    pub const fn address(&self) -> Address {
+        self.address
+    }
+
+    /// Takes another address, as DHCP gives and withdraws it.
+    pub fn set_address(&mut self, address: Address) {
+        self.address = address;
+    }
+
+    /// Returns the numbers of frames that came.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Returns the meaning of a frame that came. An answer is made in place.
+    pub fn hear(&mut self, frame: &mut [u8]) -> Heard<B> {
+        self.counts.frames += 1;
+        let (Some(to), Some(kind)) = (mac_at(frame, 0), u16_at(frame, 12)) else {
+            self.counts.malformed += 1;
+            return Heard::Nothing;
+        };
+        let is_ours = to == self.mac || to == Mac::BROADCAST;
+        let heard = match kind {
+            TYPE_ARP if is_ours => self.hear_arp(frame),
+            TYPE_IPV4 if is_ours => self.hear_ipv4(frame),
+            _ => {
+                self.counts.foreign += 1;
+                Some(Heard::Nothing)
+            }
+        };
+        heard.unwrap_or_else(|| {
+            self.counts.malformed += 1;
+            Heard::Nothing
+        })
+    }
+
+    /// Takes an ARP packet; none if it is malformed.
+    fn hear_arp(&mut self, frame: &mut [u8]) -> Option<Heard<B>> {
+        let packet = arp::Packet::read(&frame[ipv4::START..])?;
+        self.counts.arps += 1;
+        let (mac, ip) = packet.from;
+        if mac.is_group() || !is_host(ip) {
+            return Some(Heard::Nothing);
+        }
+        let asks_us = packet.is_question && packet.to.1 == self.address.ip;
+        let mut resolved = self.neighbours.learn(packet.from, asks_us);
+        if let Some(frame) = &mut resolved {
+            put(frame.as_mut(), 0, &mac.0);
+        }
+        if asks_us {
+            let answer = arp::Packet {
+                is_question: false,
+                from: (self.mac, self.address.ip),
+                to: packet.from,
+            };
+            let length = self.write_arp(frame, mac, answer);
+            return Some(Heard::Answer { length, resolved });
+        }
+        Some(resolved.map_or(Heard::Nothing, Heard::Resolved))
+    }
+
+    /// Takes an IPv4 packet; none if it is malformed.
+    fn hear_ipv4(&mut self, frame: &mut [u8]) -> Option<Heard<B>> {
+        let packet = Packet::read(frame)?;
+        let is_ours = packet.to == self.address.ip && !packet.to.is_unspecified();
+        let is_for_all = self.address.is_for_all(packet.to);
+        match packet.protocol {
+            _ if packet.is_fragment => {}
+            ipv4::UDP if is_ours || is_for_all => {
+                let (from, port, payload) = udp::read(frame, &packet)?;
+                self.counts.datagrams += 1;
+                let from = Peer {
+                    ip: packet.from,
+                    port: from,
+                };
+                return Some(Heard::Datagram(Datagram {
+                    from,
+                    port,
+                    payload,
+                }));
+            }
+            ipv4::ICMP if is_ours => return self.hear_icmp(frame, &packet),
+            _ => {}
+        }
+        self.counts.foreign += 1;
+        Some(Heard::Nothing)
+    }
+
+    /// Takes an ICMP message, and answers an echo request; none if it is malformed.
+    fn hear_icmp(&mut self, frame: &mut [u8], packet: &Packet) -> Option<Heard<B>> {
+        let message = &frame[packet.payload.clone()];
+        if message.len() < 8 || check_sum(sum(message, 0)) != 0 {
+            return None;
+        }
+        let to = mac_at(frame, 6)?;
+        // A question in the name of a group would have the whole group answered.
+        if message[..2] != [8, 0] || to.is_group() || !is_host(packet.from) {
+            self.counts.foreign += 1;
+            return Some(Heard::Nothing);
+        }
+        self.counts.echoes += 1;
+        // The answer has no options, so its message may move to the front.
+        let start = ipv4::START + ipv4::LENGTH;
+        let end = start + packet.payload.len();
+        frame.copy_within(packet.payload.clone(), start);
+        let message = &mut frame[start..end];
+        put(message, 0, &[0; 4]);
+        let check = check_sum(sum(message, 0));
+        put(message, 2, &check.to_be_bytes());
+        self.write_ipv4(&mut frame[..end], ipv4::ICMP, packet.from);
+        self.write_ethernet(frame, to, TYPE_IPV4);
+        let resolved = None;
+        Some(Heard::Answer {
+            length: end,
+            resolved,
+        })
+    }
+
+    /// Writes the headers of a datagram, whose payload begins at [`HEADERS`] of the frame and ends
+    /// with it.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the frame is shorter than its headers.
+    pub fn address_datagram(&mut self, frame: &mut [u8], port: u16, to: Peer) -> Route {
+        let addresses = (self.address.ip, to.ip);
+        let header = HEADERS - udp::LENGTH;
+        udp::write(&mut frame[header..], (port, to.port), addresses);
+        self.write_ipv4(frame, ipv4::UDP, to.ip);
+        if self.address.is_for_all(to.ip) {
+            self.write_ethernet(frame, Mac::BROADCAST, TYPE_IPV4);
+            return Route::Ready;
+        }
+        let hop = self.address.next_hop(to.ip);
+        let Some(hop) = hop.filter(|_| !self.address.ip.is_unspecified()) else {
+            return Route::None;
+        };
+        let mac = self.neighbours.resolve(hop);
+        self.write_ethernet(frame, mac.unwrap_or_default(), TYPE_IPV4);
+        mac.map_or(Route::Unresolved(hop), |_| Route::Ready)
+    }
+
+    /// Keeps a frame until its neighbour has answered. One is kept for each neighbour: the frame
+    /// that was kept before is dropped.
+    pub fn keep(&mut self, neighbour: Ipv4Addr, frame: B) {
+        self.neighbours.keep(neighbour, frame);
+    }
+
+    /// Writes the question for a neighbour, and returns its length.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the frame is shorter than [`HEADERS`].
+    pub fn question(&self, frame: &mut [u8], neighbour: Ipv4Addr) -> usize {
+        let question = arp::Packet {
+            is_question: true,
+            from: (self.mac, self.address.ip),
+            to: (Mac::default(), neighbour),
+        };
+        self.write_arp(frame, Mac::BROADCAST, question)
+    }
+
+    fn write_arp(&self, frame: &mut [u8], to: Mac, packet: arp::Packet) -> usize {
+        self.write_ethernet(frame, to, TYPE_ARP);
+        put(frame, ipv4::START, &packet.bytes());
+        ipv4::START + arp::LENGTH
+    }
+
+    fn write_ipv4(&mut self, frame: &mut [u8], protocol: u8, to: Ipv4Addr) {
+        self.identification = self.identification.wrapping_add(1);
+        let addresses = (self.address.ip, to);
+        ipv4::write(frame, self.identification, protocol, addresses);
+    }
+
+    fn write_ethernet(&self, frame: &mut [u8], to: Mac, kind: u16) {
+        put(frame, 0, &to.0);
+        put(frame, 6, &self.mac.0);
+        put(frame, 12, &kind.to_be_bytes());
+    }
+}
