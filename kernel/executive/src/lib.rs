@@ -19,6 +19,7 @@
 
 extern crate alloc;
 
+pub mod devices;
 pub mod interrupts;
 #[allow(unsafe_code, reason = "registers, ports, interrupts, page tables")]
 pub mod machine;
