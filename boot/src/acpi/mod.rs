@@ -26,6 +26,8 @@ pub struct Platform {
     pub hpet: Option<u64>,
     /// The physical addresses of the I/O APICs' registers.
     pub io_apics: List<u64, MAX_IO_APICS>,
+    /// The physical address of PCI's configuration space, that of bus 0, if it is in memory.
+    pub ecam: Option<u64>,
     /// How it is powered off and reset.
     pub power: Power,
     /// The fault of a table that could be done without, if there is any.
@@ -120,7 +122,14 @@ pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, 
     };
     let fadt = find(*b"FACP");
     let hpet = find(*b"HPET").and_then(|hpet| hpet_registers(memory, hpet));
+    // Behind the header and 8 bytes of nothing: the base of the first segment, its number, and its
+    // first bus (PCI Firmware Specification 3.2, 4.1.2).
+    let ecam = find(*b"MCFG").and_then(|mcfg| {
+        let first = memory.u32(mcfg + HEADER + 16)? & 0xff_ffff;
+        memory.u64(mcfg + HEADER + 8).filter(|_| first == 0)
+    });
     let mut platform = Platform {
+        ecam,
         apic_ids: List::new(0),
         processors: 0,
         local_apic: 0,

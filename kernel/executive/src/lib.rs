@@ -19,6 +19,7 @@
 
 extern crate alloc;
 
+#[allow(unsafe_code, reason = "registers, and memory that devices reach")]
 pub mod devices;
 pub mod interrupts;
 #[allow(unsafe_code, reason = "registers, ports, interrupts, page tables")]

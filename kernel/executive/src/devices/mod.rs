@@ -5,7 +5,11 @@
 //! the device has, and releases a DAG or ends a wait; it never runs an app's code. An app without
 //! a driver has none of this in its image.
 //!
-//! To tell a device an address of memory is the one step that the compiler cannot judge: a device
-//! writes where it is told. So that is the one unsafe call of a driver.
+//! To let a device reach memory is the one step that the compiler cannot judge, as it writes where
+//! it is told. So [`enable_reach`](pci::Function::enable_reach) is the one unsafe call of a driver.
 
+pub mod dma;
+pub mod ecam;
+pub mod lines;
 pub mod pci;
+pub mod registers;

@@ -59,7 +59,7 @@ pub enum PciError {
     NoRange(u8),
     /// A range's size or place cannot be.
     MalformedRange(u8),
-    /// It sends no messages (MSI-X).
+    /// It sends no messages, neither by MSI-X nor by MSI, or not so many.
     NoMessages,
     /// Its table of messages is not within its range, or is too short.
     MalformedTable,
@@ -73,7 +73,9 @@ impl core::fmt::Display for PciError {
                 "has no registers in memory at BAR {bar}; boot it by a firmware that places them"
             ),
             Self::MalformedRange(bar) => write!(f, "states a range that cannot be at BAR {bar}"),
-            Self::NoMessages => f.write_str("has no MSI-X; use a device that has"),
+            Self::NoMessages => {
+                f.write_str("has no MSI-X or MSI of that number; use a device that has")
+            }
             Self::MalformedTable => f.write_str("states a table of messages that cannot be"),
         }
     }
@@ -91,9 +93,18 @@ pub struct Function<'c> {
     pub class: u32,
 }
 
-/// The entry of a message in a table: where it is, and its length.
+/// An interrupt as a device sends it: a store to an address (Intel SDM volume 3, 11.11).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MessageEntry {
+pub struct Message {
+    /// The address: the core.
+    pub address: u32,
+    /// The word that is stored there: the vector.
+    pub data: u16,
+}
+
+/// The place of a message in a table in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TableEntry {
     /// The BAR of the table.
     pub bar: u8,
     /// The entry's place in that range.
@@ -173,14 +184,19 @@ impl<'c> Function<'c> {
             .map(u16::from)
     }
 
-    /// Lets it answer at its ranges and reach memory, and turns its interrupt line off.
+    /// Lets it answer at its ranges, and turns its interrupt line off.
     pub fn enable(&self) {
-        self.command(command::MEMORY | command::MASTER | command::NO_LINE);
+        self.command(command::MEMORY | command::NO_LINE);
     }
 
-    /// Ends its reach of memory.
-    pub fn disable(&self) {
-        self.command(command::MEMORY | command::NO_LINE);
+    /// Lets it reach memory, too, and send messages.
+    ///
+    /// # Safety
+    ///
+    /// The device is told no address but those of [`DmaMemory`](super::dma::DmaMemory), each with
+    /// a length within it: it writes wherever it is told.
+    pub unsafe fn enable_reach(&self) {
+        self.command(command::MEMORY | command::MASTER | command::NO_LINE);
     }
 
     fn command(&self, bits: u32) {
@@ -237,29 +253,48 @@ impl<'c> Function<'c> {
             .ok_or(PciError::MalformedRange(bar))
     }
 
-    /// Returns the entry of a message, whose sending is turned on. Each entry is masked until it
-    /// is written.
+    /// Has it send `message` as the one with a number, and turns sending on. Where the messages
+    /// are in memory (MSI-X), the caller writes it to the place that is returned.
     ///
     /// # Errors
     ///
     /// [`PciError`].
-    pub fn message(&self, entry: u16) -> Result<MessageEntry, PciError> {
+    pub fn send(&self, number: u16, message: Message) -> Result<Option<TableEntry>, PciError> {
         const MSI_X: u8 = 0x11;
+        const MSI: u8 = 5;
+        if let Some(at) = self.capabilities(MSI_X).next() {
+            return self.table_entry(at, number).map(Some);
+        }
+        let at = self.capabilities(MSI).next();
+        let at = at.filter(|_| number == 0).ok_or(PciError::NoMessages)?;
+        let control = self.read(at);
+        let is_wide = control & 1 << 23 != 0;
+        self.write(at + 4, message.address);
+        if is_wide {
+            self.write(at + 8, 0);
+        }
+        let data = if is_wide { at + 12 } else { at + 8 };
+        self.write(data, self.read(data) & !0xffff | u32::from(message.data));
+        // On, and one message of those that it could send.
+        self.write(at, control & !(7 << 20) | 1 << 16);
+        Ok(None)
+    }
+
+    fn table_entry(&self, at: u16, number: u16) -> Result<TableEntry, PciError> {
         const ON: u32 = 1 << 31;
         const MASKED: u32 = 1 << 30;
-        let at = self.capabilities(MSI_X).next();
-        let at = at.ok_or(PciError::NoMessages)?;
         let control = self.read(at);
         let count = (control >> 16 & 0x7ff) + 1;
         let table = self.read(at + 4);
         let bar = table.to_le_bytes()[0] & 7;
-        let offset = u64::from(table & !7) + 16 * u64::from(entry);
+        let offset = u64::from(table & !7) + 16 * u64::from(number);
         let range = self.range(bar)?;
-        if u32::from(entry) >= count || offset + 16 > range.end - range.start {
+        if u32::from(number) >= count || offset + 16 > range.end - range.start {
             return Err(PciError::MalformedTable);
         }
+        // Each entry is masked by itself until it is written.
         self.write(at, control & !MASKED | ON);
-        Ok(MessageEntry { bar, offset })
+        Ok(TableEntry { bar, offset })
     }
 }
 
@@ -405,23 +440,23 @@ mod tests {
         );
     }
 
+    const MESSAGE: Message = Message {
+        address: 0xfee0_0000,
+        data: 0x50,
+    };
+
     #[test]
     fn a_message_lies_in_its_table_and_range() {
-        let message = |entry, control: u32, table: u32| {
-            let words = [
-                (1, 1 << 20),
-                (13, 0x40),
-                (16, control << 16 | 0x11),
-                (17, table),
-                (5, 0xfebf_1000),
-            ];
+        let message = |number, control: u32, table: u32| {
+            let chain = [(1, 1 << 20), (13, 0x40), (16, control << 16 | 0x11)];
+            let words = [&chain[..], &[(17, table), (5, 0xfebf_1000)]].concat();
             let fake = Fake::default().with(8, &words, [4096; 6]);
-            let message = fake.first().message(entry);
+            let message = fake.first().send(number, MESSAGE);
             let is_on = fake.first().read(0x40) >> 31 == 1;
             assert_eq!(is_on, message.is_ok());
             message
         };
-        let at = |offset| Ok(MessageEntry { bar: 1, offset });
+        let at = |offset| Ok(Some(TableEntry { bar: 1, offset }));
         assert_eq!(message(0, 0, 1), at(0));
         assert_eq!(message(2, 0x4002, 0x801), at(0x820));
         assert_eq!(message(255, 0x7ff, 1), at(4080));
@@ -438,7 +473,26 @@ mod tests {
             );
         }
         assert_eq!(message(0, 0, 7), Err(PciError::NoRange(7)));
+    }
+
+    #[test]
+    fn a_message_without_a_table_is_the_only_one() {
+        for (wide, data) in [(0, 0x48), (1 << 23, 0x4c)] {
+            let words = [
+                (1, 1 << 20),
+                (13, 0x40),
+                (16, 0x70_0005 | wide),
+                (18, u32::MAX),
+            ];
+            let fake = Fake::default().with(8, &words, [0; 6]);
+            let device = fake.first();
+            assert_eq!(device.send(1, MESSAGE), Err(PciError::NoMessages));
+            assert_eq!(device.send(0, MESSAGE), Ok(None));
+            assert_eq!(device.read(0x40), 0x1_0005 | wide);
+            assert_eq!(device.read(0x44), MESSAGE.address);
+            assert_eq!(device.read(data) & 0xffff, 0x50);
+        }
         let none = Fake::default().with(8, &[], [0; 6]);
-        assert_eq!(none.first().message(0), Err(PciError::NoMessages));
+        assert_eq!(none.first().send(0, MESSAGE), Err(PciError::NoMessages));
     }
 }

@@ -88,6 +88,16 @@ impl Interrupted {
 
 static HANDLERS: SetOnce<Handlers> = SetOnce::new();
 
+/// The handler of devices' messages, which is told the line. Apart from the others, so that an
+/// image without drivers has none.
+static DEVICES: SetOnce<fn(u8, &mut Interrupted)> = SetOnce::new();
+
+/// Names the handler of devices' messages. The first call counts.
+pub fn install_devices(handler: fn(u8, &mut Interrupted)) {
+    // Each driver names the same one.
+    DEVICES.set(handler);
+}
+
 /// Names the functions that handle interrupts. The first call counts.
 pub fn install(handlers: Handlers) {
     // A second call would come from a second boot, which there is not.
@@ -118,6 +128,12 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
         }
         (Ok(vector::END), Some(handlers)) => (handlers.end)(&mut Interrupted(())),
         (Ok(vector::SPURIOUS), _) => {}
+        (Ok(line @ vector::DEVICE..vector::OTHER), _) => {
+            local_apic::acknowledge();
+            if let Some(handler) = DEVICES.get() {
+                handler(line - vector::DEVICE, &mut Interrupted(()));
+            }
+        }
         _ => local_apic::acknowledge(),
     }
     interrupts_off::note_enabled();

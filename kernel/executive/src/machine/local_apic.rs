@@ -165,7 +165,9 @@ pub fn enable() {
 /// Reports whether an interrupt waits for this core to enable interrupts.
 pub fn is_interrupt_pending() -> bool {
     // Each such register has the bits of 32 vectors.
-    const OURS: u32 = 1 << (vector::TIMER % 32) | 1 << (vector::WAKE % 32);
+    const LINES: u32 = (1 << vector::DEVICES) - 1;
+    const OURS: u32 =
+        1 << (vector::TIMER % 32) | 1 << (vector::WAKE % 32) | LINES << (vector::DEVICE % 32);
     read(ApicRegister::Requests) & OURS != 0
 }
 

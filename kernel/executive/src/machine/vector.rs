@@ -9,5 +9,9 @@ pub const END: u8 = 0x4e;
 /// The local APIC withdrew an interrupt; needs no acknowledgement. The low four bits of its
 /// number are ones, as early processors have no others (Intel SDM 3, 11.9).
 pub const SPURIOUS: u8 = 0x4f;
+/// The first of the devices' lines.
+pub const DEVICE: u8 = 0x50;
+/// How many lines there are.
+pub const DEVICES: u8 = 8;
 /// Stands for any other interrupt; nobody asked for one.
-pub const OTHER: u8 = 0x50;
+pub const OTHER: u8 = DEVICE + DEVICES;

@@ -28,6 +28,8 @@ struct PhysicalMemory {
     frames: FreeFrames,
     table: PageTable,
     next_stack: u64,
+    /// The ranges of registers that were mapped since.
+    registers: [Range<u64>; 16],
 }
 
 static MEMORY: SpinLock<Option<PhysicalMemory>> = SpinLock::new(None);
@@ -81,6 +83,7 @@ pub unsafe fn initialize(
         frames,
         table,
         next_stack: STACK_WINDOW,
+        registers: [const { 0..0 }; 16],
     });
     Ok(MemoryLayout {
         root_table,
@@ -195,6 +198,41 @@ fn take_zeroed(frames: &mut FreeFrames) -> Option<u64> {
     // identity-mapped and writable under the boot table and under ours.
     unsafe { core::ptr::write_bytes(frame as *mut u8, 0, bytes) };
     Some(frame)
+}
+
+/// Maps the whole pages of a device's registers, once.
+///
+/// # Errors
+///
+/// [`MapError::AlreadyMapped`] where memory or something else is.
+pub fn map_registers(range: Range<u64>) -> Result<(), MapError> {
+    let pages = range.start / PAGE * PAGE..range.end.next_multiple_of(PAGE);
+    if pages.start == 0 || pages.end > STACK_WINDOW {
+        return Err(MapError::AlreadyMapped);
+    }
+    let mut memory = MEMORY.lock();
+    let memory = memory.as_mut().ok_or(MapError::OutOfFrames)?;
+    let PhysicalMemory {
+        frames,
+        table,
+        registers,
+        ..
+    } = memory;
+    let covers = |known: &Range<u64>| known.start <= pages.start && pages.end <= known.end;
+    if registers.iter().any(covers) {
+        return Ok(());
+    }
+    let place = registers.iter_mut().find(|known| known.is_empty());
+    let place = place.ok_or(MapError::OutOfFrames)?;
+    let mut new_frame = || take_zeroed(frames);
+    table.map(
+        pages.clone(),
+        pages.start,
+        PageAccess::Device,
+        &mut new_frame,
+    )?;
+    *place = pages;
+    Ok(())
 }
 
 /// Creates a stack of `bytes`, whole pages, with a guard page below it, and returns its top.

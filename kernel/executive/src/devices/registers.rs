@@ -1,0 +1,115 @@
+//! Registers of a device in memory, uncached.
+//!
+//! **Register invariant**: a [`Registers`] covers pages that are mapped as a device's for good,
+//! and no memory.
+
+use core::ops::Range;
+
+use super::pci::{Function, PciError};
+use crate::memory;
+
+/// A range of registers. Each access is within it.
+#[derive(Clone, Copy, Debug)]
+pub struct Registers {
+    start: u64,
+    length: u64,
+}
+
+/// Why a range cannot be had.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RangeError {
+    /// The function has none such.
+    Function(PciError),
+    /// There is memory, or something else, at its addresses.
+    Taken(u8),
+}
+
+impl core::fmt::Display for RangeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Function(error) => error.fmt(f),
+            Self::Taken(bar) => write!(
+                f,
+                "has BAR {bar} where memory or another device is; update the firmware"
+            ),
+        }
+    }
+}
+
+macro_rules! access {
+    ($read:ident, $write:ident, $kind:ty) => {
+        /// Reads a register.
+        ///
+        /// # Panics
+        ///
+        /// Panics if the register is not within the range, or not aligned.
+        #[inline]
+        #[track_caller]
+        #[must_use]
+        pub fn $read(&self, offset: u64) -> $kind {
+            let address = self.address(offset, size_of::<$kind>() as u64) as *const $kind;
+            // SAFETY: it is aligned and within mapped registers (register invariant).
+            unsafe { address.read_volatile() }
+        }
+
+        /// Writes a register.
+        ///
+        /// # Panics
+        ///
+        /// Panics if the register is not within the range, or not aligned.
+        #[inline]
+        #[track_caller]
+        pub fn $write(&self, offset: u64, value: $kind) {
+            let address = self.address(offset, size_of::<$kind>() as u64) as *mut $kind;
+            // SAFETY: it is aligned and within mapped registers (register invariant); what it has
+            // the device do to memory is the promise of `Function::enable_reach`.
+            unsafe { address.write_volatile(value) };
+        }
+    };
+}
+
+impl Registers {
+    /// Maps a range of a function.
+    ///
+    /// # Errors
+    ///
+    /// [`RangeError`].
+    pub fn of(function: &Function<'_>, bar: u8) -> Result<Self, RangeError> {
+        let range = function.range(bar).map_err(RangeError::Function)?;
+        Self::map(range).ok_or(RangeError::Taken(bar))
+    }
+
+    /// Maps a range, unless there is something else.
+    pub(super) fn map(range: Range<u64>) -> Option<Self> {
+        memory::map_registers(range.clone()).ok()?;
+        Some(Self {
+            start: range.start,
+            length: range.end - range.start,
+        })
+    }
+
+    /// Returns a part of the range, if it is within.
+    #[must_use]
+    pub fn part(&self, offset: u64, length: u64) -> Option<Self> {
+        (offset.checked_add(length)? <= self.length).then_some(Self {
+            start: self.start + offset,
+            length,
+        })
+    }
+
+    #[inline]
+    #[track_caller]
+    fn address(&self, offset: u64, size: u64) -> u64 {
+        let is_within = offset < self.length && size <= self.length - offset;
+        assert!(
+            is_within && (self.start + offset).is_multiple_of(size),
+            "a driver names a register beyond its device's"
+        );
+        self.start + offset
+    }
+
+    access!(read8, write8, u8);
+    access!(read16, write16, u16);
+    access!(read32, write32, u32);
+    access!(read64, write64, u64);
+}
