@@ -34,6 +34,8 @@ use sched_dag::lifecycle::Request;
 use super::cell::SharedCell;
 use super::effect::Effect;
 
+pub(crate) mod buffer;
+
 #[cfg(test)]
 mod tests;
 

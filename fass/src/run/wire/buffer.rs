@@ -1,0 +1,82 @@
+//! Buffers: the memory of packets on their way between a device and an instance.
+//!
+//! A buffer is owned: by a place of a wire's ring, or by a device. A device fills or empties the
+//! buffers that it has, and *swaps* one for a buffer of the wire, so that no byte is copied, and
+//! each side has as many as before.
+
+use alloc::boxed::Box;
+use core::ops::Range;
+
+/// The memory of one packet, and where in it the packet's bytes are.
+///
+/// ```
+/// use fass::platform::Buffer;
+///
+/// let mut buffer = Buffer::new(Buffer::LEAST_BYTES);
+/// buffer.whole()[..5].copy_from_slice(b"frame");
+/// buffer.set_range(2..5);
+/// assert_eq!(buffer.content(), b"ame");
+/// ```
+#[derive(Debug, Default)]
+pub struct Buffer {
+    bytes: Box<[u8]>,
+    range: Range<usize>,
+}
+
+impl Buffer {
+    /// The length of the shortest buffer: a frame of Ethernet and what cards put before it.
+    pub const LEAST_BYTES: usize = 2048;
+
+    /// How many bytes before the packet are left to the headers of a device.
+    pub const HEADROOM: usize = 64;
+
+    /// Makes a buffer of so many bytes at least, with nothing in it. It allocates.
+    #[must_use]
+    pub fn new(bytes: usize) -> Self {
+        Self {
+            bytes: alloc::vec![0; bytes.max(Self::LEAST_BYTES)].into(),
+            range: 0..0,
+        }
+    }
+
+    /// Returns the whole memory.
+    #[must_use]
+    pub fn whole(&mut self) -> &mut [u8] {
+        &mut self.bytes
+    }
+
+    /// Returns where the packet's bytes are.
+    #[must_use]
+    pub fn range(&self) -> Range<usize> {
+        self.range.clone()
+    }
+
+    /// Says where the packet's bytes are.
+    ///
+    /// # Panics
+    ///
+    /// Panics if that is not within the memory.
+    pub fn set_range(&mut self, range: Range<usize>) {
+        assert!(range.start <= range.end && range.end <= self.bytes.len());
+        self.range = range;
+    }
+
+    /// Returns the packet's bytes.
+    #[must_use]
+    pub fn content(&self) -> &[u8] {
+        &self.bytes[self.range()]
+    }
+
+    /// Returns the packet's bytes, to change them.
+    #[must_use]
+    pub fn content_mut(&mut self) -> &mut [u8] {
+        &mut self.bytes[self.range.clone()]
+    }
+}
+
+impl AsMut<[u8]> for Buffer {
+    /// Returns the packet's bytes, to change them.
+    fn as_mut(&mut self) -> &mut [u8] {
+        self.content_mut()
+    }
+}
