@@ -307,6 +307,15 @@ impl<Q, A> DeviceCell<Q, A> {
         }
     }
 
+    /// Panics where this is no turn of the subtask that asks: a question of another one, which was
+    /// passed the handle, would go out with a wait of this one's.
+    fn check_turn(&self, context: &Context<'_>) {
+        let turn = turn_of(context.waker()).map_or(0, TurnState::address);
+        if turn != self.turn.load(Ordering::Relaxed) {
+            WaitFault::Outside.raise()
+        }
+    }
+
     /// Decides on a question that waits for its answer, and reports whether it did.
     fn decide(&self, number: u64) -> bool {
         let posted = &self.posted;
@@ -554,6 +563,15 @@ impl<Q, A> Asker<Q, A> {
         self.ask_if(Some(question))
     }
 
+    /// Panics where this is no turn of the subtask that asks.
+    pub(super) async fn check_turn(&self) {
+        core::future::poll_fn(|context| {
+            self.0.check_turn(context);
+            Poll::Ready(())
+        })
+        .await;
+    }
+
     /// Asks, or waits until the limit for nothing.
     pub(super) fn ask_if(&self, question: Option<Q>) -> PendingAnswer<'_, Q, A> {
         PendingAnswer {
@@ -591,12 +609,7 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let this = self.get_mut();
-        // A question of another subtask, which was passed the handle, would go out with a wait of
-        // this one's.
-        let turn = turn_of(context.waker()).map_or(0, TurnState::address);
-        if turn != this.cell.turn.load(Ordering::Relaxed) {
-            WaitFault::Outside.raise()
-        }
+        this.cell.check_turn(context);
         let answers = this.cell.answers.get();
         // No question leaves in a replay: what it may set off happened in the recorded run.
         if let Some(answers) = answers.filter(|answers| answers.replays()) {

@@ -1,7 +1,7 @@
 //! Wires: how bytes come in and go out while DAGs run.
 //!
-//! For our purposes a *wire* is a way for bytes between a device, such as a serial port, and
-//! the functions of an app; a *packet* is those of them that belong together. One source
+//! For our purposes a *wire* is a way for packets between a device, such as a serial port or a
+//! network card, and the functions of an app; a *packet* is bytes that belong together. One source
 //! receives on a wire, and one subtask sends on it. Which device it is the platform is told, not the
 //! DAG: so the same functions run on the machine and, with bytes that a test gives, in virtual
 //! time.
@@ -12,10 +12,10 @@
 //!   earlier one has taken: those since the last job, with the time at which each was whole. If
 //!   the receiver is the source of a sporadic DAG, each packet raises its signal.
 //! - What an instance sends goes when it is complete (R3), all of it or nothing, in the order
-//!   of jobs. Of an instance that fails nothing goes.
+//!   of jobs: as one packet, unless it ends [more](Sender::end_packet). Of an instance that fails
+//!   nothing goes.
 //! - Nobody waits, but an async function that [reads or writes](super::wire_waits): not the device
-//!   for the receiver, nor the sender for the device. Bytes that find no room are lost, as a whole
-//!   packet, or all that an instance has sent, and the newest: those that were there stay. Losses
+//!   for the receiver, nor the sender for the device. What finds no room is lost, as a whole packet, or all that an instance has sent, and the newest: those that were there stay. Losses
 //!   are counted ([`Wire::counts`]).
 //! - The decoder runs in the receiver's instance. If it panics, that is contained as if
 //!   the function had.
@@ -31,6 +31,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
 use core::fmt;
+use core::net::SocketAddrV4;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use sched_dag::DagId;
@@ -40,7 +41,8 @@ use super::uses::{OutsideInput, Uses, sealed};
 use crate::draft::part::PartKind;
 use crate::run::cell::SetOnce;
 use crate::run::effect::RequestTarget;
-use crate::run::wire::{Framing, SendCompletion, WireInput, WireOutput};
+use crate::run::wire::buffer::Buffer;
+use crate::run::wire::{Framing, PacketTaker, SendCompletion, WireInput, WireOutput};
 
 /// A way for bytes in and out of a run. Clones are handles of the same wire.
 ///
@@ -118,13 +120,13 @@ pub(super) struct WireState {
 pub struct WireOptions {
     /// Where packets end: lines, unless stated.
     pub framing: Framing,
-    /// How many bytes a packet has at most, a carriage return before a line feed included: 256
-    /// unless stated. (Those of [`Framing::Fixed`] have what that says.)
+    /// How many bytes a packet that comes has at most, a carriage return before a line feed
+    /// included: 256 unless stated. (Those of [`Framing::Fixed`] have what that says.) One that is
+    /// sent may have 1,984 at least, or what the device takes if that is less.
     pub longest_bytes: usize,
-    /// For how many bytes there is room on the way in, and for as many on the way out: 4096
-    /// unless stated, and rounded up to a power of two. On the way in each packet takes 12 bytes
-    /// besides its own.
-    pub room_bytes: usize,
+    /// For how many packets there is room on the way in, and for as many on the way out: 16 unless
+    /// stated, and rounded up to a power of two. Each takes its bytes, and 2 KiB at least.
+    pub room: usize,
 }
 
 impl Default for WireOptions {
@@ -132,7 +134,7 @@ impl Default for WireOptions {
         Self {
             framing: Framing::Lines,
             longest_bytes: 256,
-            room_bytes: 4096,
+            room: 16,
         }
     }
 }
@@ -177,9 +179,9 @@ impl Wire {
                 incoming: Arc::new(WireInput::new(
                     options.framing,
                     options.longest_bytes,
-                    options.room_bytes,
+                    options.room,
                 )),
-                outgoing: Arc::new(WireOutput::new(options.room_bytes)),
+                outgoing: Arc::new(WireOutput::new(options.longest_bytes, options.room)),
                 on_packet: SetOnce::new(),
                 on_gone: SetOnce::new(),
                 is_received: AtomicBool::new(false),
@@ -300,28 +302,71 @@ impl DeviceEnd {
     /// It may be called in an interrupt handler.
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.0.shared.incoming.arrive(bytes, now_ns);
-        if let Some(tell) = self.0.shared.on_packet.get().filter(|_| is_whole) {
-            tell();
-        }
-        let signal = self.0.shared.signal.get().filter(|_| is_whole)?;
-        signal.get()
+        is_whole.then(|| self.announce()).flatten()
     }
 
-    /// Reports whether there is a byte that is to go.
+    /// Takes a packet that has arrived in a buffer, from a peer, by swapping that for a buffer of the
+    /// wire's. Reports whether it did: then the packet is to be [announced](Self::announce). A line
+    /// feed at its end is no part of it if the wire's packets are lines.
+    ///
+    /// See [`arrive`](Self::arrive).
+    #[must_use]
+    pub fn swap_in(&self, packet: &mut Buffer, from: SocketAddrV4, now_ns: u64) -> bool {
+        let incoming = &self.0.shared.incoming;
+        incoming.swap(packet, Some(from), now_ns)
+    }
+
+    /// Ends the wait for a packet, if there is one, and returns what
+    /// [`Platform::raise`](crate::platform::Platform::raise) is to be told, as
+    /// [`arrive`](Self::arrive) does. Under no lock of the device's: the wait may be ended at once.
+    ///
+    /// See [`swap_in`](Self::swap_in).
+    pub fn announce(&self) -> Option<(u64, DagId)> {
+        if let Some(tell) = self.0.shared.on_packet.get() {
+            tell();
+        }
+        self.0.shared.signal.get()?.get()
+    }
+
+    /// Reports whether there is a packet that is to go, or the rest of one.
     #[must_use]
     pub fn has_bytes_to_go(&self) -> bool {
         !self.0.shared.outgoing.is_empty()
     }
 
-    /// Takes the next byte that is to go, if there is one.
-    #[must_use]
-    pub fn depart(&self) -> Option<u8> {
+    /// Lets no packet that is sent have more bytes than the device takes.
+    ///
+    /// See [`swap_out`](Self::swap_out).
+    pub fn limit_packets(&self, most_bytes: usize) {
+        self.0.shared.outgoing.limit(most_bytes);
+    }
+
+    /// Hands over the oldest packet that is to go, and whom it is to. `send` may swap its buffer for
+    /// another one; the packet has gone if `send` says so. Reports whether it did. Behind it the end
+    /// of the wait for that is [told](Self::tell_gone).
+    ///
+    /// See [`depart`](Self::depart).
+    pub fn swap_out(&self, send: impl FnOnce(&mut Buffer, Option<SocketAddrV4>) -> bool) -> bool {
         let outgoing = &self.0.shared.outgoing;
-        let byte = outgoing.take_byte()?;
-        let is_last = outgoing.is_empty();
+        outgoing.take_packet(|packet| send(&mut packet.buffer, packet.peer))
+    }
+
+    /// Ends the wait until all has gone, if there is one and nothing is left to go. Under no lock of
+    /// the device's.
+    ///
+    /// See [`swap_out`](Self::swap_out).
+    pub fn tell_gone(&self) {
+        let is_last = !self.has_bytes_to_go();
         if let Some(tell) = self.0.shared.on_gone.get().filter(|_| is_last) {
             tell();
         }
+    }
+
+    /// Takes the next byte that is to go, if there is one.
+    #[must_use]
+    pub fn depart(&self) -> Option<u8> {
+        let byte = self.0.shared.outgoing.take_byte()?;
+        self.tell_gone();
         Some(byte)
     }
 }
@@ -373,6 +418,8 @@ pub struct Packet<T> {
     pub value: T,
     /// When its last byte came, on the clock of [`crate::now_ns`].
     pub received_ns: u64,
+    /// Whom it is from; `None` where the device knows of no peers.
+    pub from: Option<SocketAddrV4>,
 }
 
 /// The handle by which a function sends: bytes, or text by [`core::fmt::Write`].
@@ -385,15 +432,24 @@ impl<T> Iterator for Received<'_, T> {
     type Item = Packet<T>;
 
     fn next(&mut self) -> Option<Packet<T>> {
-        let PacketReceiver { wire, decode, room } = &mut *self.held;
-        let incoming = &wire.shared.incoming;
+        let PacketReceiver {
+            wire,
+            decode,
+            taker,
+        } = &mut *self.held;
         // Each turn takes a packet, and there are no more than up to the mark.
         loop {
-            let (bytes, received_ns) = incoming.take_packet(self.mark, room)?;
-            if let Some(value) = decode(bytes) {
-                return Some(Packet { value, received_ns });
+            let packet = taker.take(self.mark, |packet| {
+                decode(packet.buffer.content()).map(|value| Packet {
+                    value,
+                    received_ns: packet.time_ns,
+                    from: packet.peer,
+                })
+            });
+            match packet? {
+                Some(packet) => return Some(packet),
+                None => wire.shared.incoming.refuse(),
             }
-            incoming.refuse();
         }
     }
 }
@@ -404,6 +460,33 @@ impl Sender<'_> {
     /// See [`Wire`].
     pub fn send(&mut self, bytes: &[u8]) {
         self.0.shared.outgoing.stage(bytes);
+    }
+
+    /// Ends the packet: what is sent from now on is another one. Without that all that an instance
+    /// sends is one packet. To a device of bytes it makes no difference.
+    ///
+    /// See [`Sender::to`].
+    pub fn end_packet(&mut self) {
+        self.0.shared.outgoing.end_packet();
+    }
+
+    /// Says whom this packet is to, and those after it. Without that it is up to the device: to the
+    /// peer that is stated, or else to the one that has sent last.
+    ///
+    /// ```
+    /// use fass::shared::{Packet, Sender};
+    ///
+    /// /// Answers each question, to the one who has asked.
+    /// fn answer(mut wire: Sender<'_>, (questions,): (Vec<Packet<u8>>,)) {
+    ///     for question in questions {
+    ///         wire.to(question.from);
+    ///         wire.send(&[question.value * 2]);
+    ///         wire.end_packet();
+    ///     }
+    /// }
+    /// ```
+    pub fn to(&mut self, peer: Option<SocketAddrV4>) {
+        self.0.shared.outgoing.address(peer);
     }
 }
 
@@ -421,8 +504,7 @@ impl fmt::Write for Sender<'_> {
 pub struct PacketReceiver<T> {
     wire: Wire,
     decode: fn(&[u8]) -> Option<T>,
-    /// Room for the longest packet.
-    room: Box<[u8]>,
+    taker: PacketTaker,
 }
 
 impl<T> sealed::Sealed for ReceiveUse<T> {}
@@ -443,20 +525,23 @@ impl<T: 'static> Uses for ReceiveUse<T> {
             }
         });
         drop(draft);
+        let taker = self.wire.shared.incoming.taker();
         PacketReceiver {
-            room: self.wire.shared.incoming.buffer(),
+            taker: taker.expect("the way in is claimed once"),
             wire: self.wire,
             decode: self.decode,
         }
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+        // That of an instance that a fault has ended.
+        held.taker.give_back();
         held
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
         Received {
-            mark: guard.wire.shared.incoming.mark(),
+            mark: guard.taker.mark(),
             held: guard,
         }
     }
@@ -476,7 +561,7 @@ impl Uses for SendUse {
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held.shared.outgoing.discard_staged();
+        held.shared.outgoing.begin_instance();
         held
     }
 

@@ -30,7 +30,7 @@ use super::uses::{Uses, sealed};
 use super::waiting::TimedOut;
 use super::wire::Wire;
 use crate::run::cell::SharedCell;
-use crate::run::wire::{SendCompletion, WireInput, WireOutput};
+use crate::run::wire::{SendCompletion, SharedTaker, WireInput, WireOutput};
 
 impl Wire {
     /// Returns the use of the async subtask that reads: `decode` says what a packet means.
@@ -79,14 +79,16 @@ impl Wire {
         self.claim_in();
         // Packets stay where they arrive; the device only says when there is one.
         let (device, driver) = create_device(self.name());
-        let input = &self.shared.incoming;
+        let input = Arc::clone(&self.shared.incoming);
+        let taker = input.taker().map(SharedTaker::new);
+        let taker = Arc::new(taker.expect("the way in is claimed once"));
         driver.answer_from(Packets {
-            input: Arc::clone(input),
-            room: SharedCell::new(input.buffer()),
+            input,
+            taker: Arc::clone(&taker),
             decode,
         });
         self.shared.on_packet.set(telling(driver));
-        ReadUse(device)
+        ReadUse(device, taker)
     }
 
     /// Returns the use of the async subtask that writes.
@@ -121,8 +123,7 @@ fn telling<A: Send + Sync + 'static>(driver: DeviceDriver<(), A>) -> Box<dyn Fn(
 /// The packets of a wire.
 struct Packets<T> {
     input: Arc<WireInput>,
-    /// Room for the longest one.
-    room: SharedCell<Box<[u8]>>,
+    taker: Arc<SharedTaker>,
     decode: fn(&[u8]) -> T,
 }
 
@@ -132,9 +133,8 @@ impl<T: Send + Sync> AnswerSource<T> for Packets<T> {
     }
 
     fn take(&self) -> Option<T> {
-        let mut room = self.room.change()?;
-        let (bytes, _) = self.input.take_packet(self.input.mark(), &mut room)?;
-        Some((self.decode)(bytes))
+        self.taker
+            .take(|packet| (self.decode)(packet.buffer.content()))
     }
 }
 
@@ -154,8 +154,7 @@ impl AnswerSource<()> for AllGone {
 /// The use of a wire by the async subtask that reads. Made by [`Wire::reading`].
 ///
 /// See [`Wire::reading`].
-#[derive(Debug)]
-pub struct ReadUse<T>(Device<(), T>);
+pub struct ReadUse<T>(Device<(), T>, Arc<SharedTaker>);
 
 /// The use of a wire by the async subtask that writes. Made by [`Wire::writing`].
 ///
@@ -229,25 +228,29 @@ impl WireWriter {
     ///
     /// With a [`WaitFault`](crate::WaitFault), if the wait is not as stated.
     pub async fn write(&self, bytes: &[u8]) -> Result<(), TimedOut> {
+        self.0.check_turn().await;
         let has_room = self.1.shared.outgoing.stage(bytes);
         // What is lost nobody takes.
         self.0.ask_if(has_room.then_some(())).await
     }
 }
 
+shown_as!(ReadUse<T>, |of| of.0);
+
 impl<T> sealed::Sealed for ReadUse<T> {}
 
 impl<T: Send + Sync + 'static> Uses for ReadUse<T> {
     type Borrowed<'a> = WireReader<T>;
-    type Held = Asker<(), T>;
+    type Held = (Asker<(), T>, Arc<SharedTaker>);
     type Guard<'a> = &'a Asker<(), T>;
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        self.0.asking().hold(dag, subtask)
+        (self.0.asking().hold(dag, subtask), self.1)
     }
 
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held
+    fn enter((asker, taker): &mut Self::Held) -> Self::Guard<'_> {
+        taker.begin_instance();
+        asker
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
@@ -270,7 +273,7 @@ impl Uses for WriteUse {
     }
 
     fn enter(held: &mut WireWriter) -> &WireWriter {
-        held.1.shared.outgoing.discard_staged();
+        held.1.shared.outgoing.begin_instance();
         held
     }
 

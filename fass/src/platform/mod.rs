@@ -84,10 +84,10 @@ pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::{Request, WaitLimit};
 
 pub use crate::run::cell::SetOnce;
-pub use crate::run::wire::buffer::Buffer;
 pub use crate::run::gate::call_app;
 pub use crate::run::lock_words::LockWords;
 pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
+pub use crate::run::wire::buffer::Buffer;
 
 /// A machine that schedules committed DAGs.
 ///

@@ -26,4 +26,8 @@ pub(crate) mod topic;
 pub(crate) mod tuple;
 pub(crate) mod turn;
 pub(crate) mod waiting;
+#[allow(
+    unsafe_code,
+    reason = "the claim of an instance that a fault has ended"
+)]
 pub(crate) mod wire;

@@ -56,7 +56,7 @@ pub use command::replay_command;
 pub use edge::Divergence;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
 use machine::Machine;
-pub use machine::RunError;
+pub use machine::{RunError, SentPacket};
 pub use report::{DagReport, InstanceRecord, JobRecord, PanicRecord, Report};
 pub use sched_dag::journal::{Event, EventKind};
 use settings::Settings;

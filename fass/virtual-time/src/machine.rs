@@ -18,6 +18,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt;
+use std::net::SocketAddrV4;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -25,7 +26,7 @@ use std::time::Duration;
 
 use fass::edge::Replay;
 use fass::log::LogLine;
-use fass::platform::{Plan, SubtaskRunner};
+use fass::platform::{Buffer, Plan, SubtaskRunner};
 use fass::shared::{DeviceEnd, Wire};
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
@@ -78,13 +79,17 @@ impl fmt::Debug for Machine {
 /// Something that comes from outside of the scheduler at an instant.
 pub(crate) enum Arrival {
     Request(Request),
-    Bytes(Rc<DeviceEnd>, Vec<u8>),
+    /// Bytes, or a packet of a peer's.
+    Bytes(Rc<DeviceEnd>, Vec<u8>, Option<SocketAddrV4>),
     /// A device gives an answer.
     Answer(Box<dyn FnOnce()>),
 }
 
 /// The device's end of a wire, and what has been sent if the wire is connected.
-pub(crate) type WireEnd = (Rc<DeviceEnd>, Option<Vec<u8>>);
+pub(crate) type WireEnd = (Rc<DeviceEnd>, Option<Vec<SentPacket>>);
+
+/// A packet that was sent, and whom it is to, if that is stated.
+pub type SentPacket = (Vec<u8>, Option<SocketAddrV4>);
 
 /// Looks for a question of a device, and notes the answers to it.
 type Answering = Box<dyn FnMut(&Machine, u64)>;
@@ -134,10 +139,17 @@ impl Machine {
             let ((at_ns, _), arrival) = self.arrivals.borrow_mut().pop_first()?;
             match arrival {
                 Arrival::Request(request) => return Some(request),
-                Arrival::Bytes(wire, bytes) => {
+                Arrival::Bytes(wire, bytes, from) => {
                     // An answer to a wait, if it is one, comes now.
                     self.now_ns.set(now_ns);
-                    if let Some((_, dag)) = wire.arrive(&bytes, at_ns) {
+                    let signal = match from {
+                        None => wire.arrive(&bytes, at_ns),
+                        Some(from) => {
+                            let is_whole = wire.swap_in(&mut Buffer::from(&*bytes), from, at_ns);
+                            is_whole.then(|| wire.announce()).flatten()
+                        }
+                    };
+                    if let Some((_, dag)) = signal {
                         // As an arrival of this instant, which a later round takes, behind those
                         // that are due already.
                         self.signal_at(now_ns, dag);
@@ -155,7 +167,12 @@ impl Machine {
     pub(crate) fn collect(&self) {
         for (end, sent) in self.wires.borrow_mut().iter_mut() {
             if let Some(sent) = sent {
-                sent.extend(std::iter::from_fn(|| end.depart()));
+                let mut keep = |packet: &mut Buffer, to: Option<_>| {
+                    sent.push((packet.content().to_vec(), to));
+                    true
+                };
+                while end.swap_out(&mut keep) {}
+                end.tell_gone();
             }
         }
     }

@@ -4,6 +4,7 @@
 //! thread's current machine.
 
 use std::cell::{Cell, RefCell};
+use std::net::SocketAddrV4;
 use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
@@ -20,7 +21,7 @@ use sched_dag::lifecycle::{Request, WaitId};
 use sched_dag::{DagId, Instance, JobOutcome};
 
 use crate::job::JobShown;
-use crate::machine::{Arrival, Machine, RunError, Session};
+use crate::machine::{Arrival, Machine, RunError, SentPacket, Session};
 use crate::report::Report;
 use crate::{VirtualTime, nanoseconds};
 
@@ -133,11 +134,52 @@ impl VirtualTime {
     ///
     /// See [`Wire`].
     pub fn arrive_at(&self, wire: &Wire, time: Duration, bytes: &[u8]) {
+        self.keep_bytes(wire, time, bytes, None);
+    }
+
+    /// Lets a packet arrive, as from a network, from a peer; else like [`arrive_at`](Self::arrive_at).
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::shared::{Framing, Packet, Received, Sender, Wire, WireOptions};
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let (ms, named) = (Duration::from_millis, SubtaskAttributes::named);
+    /// let wire = Wire::with("ping", WireOptions { framing: Framing::Chunks, ..WireOptions::default() });
+    /// let machine = VirtualTime::new().connect(&wire);
+    /// let dag = create_dag();
+    /// dag.relative_deadline(ms(5)).sporadic(ms(10));
+    /// dag.using(wire.receiving(|bytes| bytes.first().copied()))
+    ///     .source(|all: Received<'_, u8>| (all.collect::<Vec<_>>(),))
+    ///     .writes(&["numbers"])
+    ///     .register(named("hear"));
+    /// let answer = |mut wire: Sender<'_>, (numbers,): (Vec<Packet<u8>>,)| {
+    ///     for number in numbers {
+    ///         wire.to(number.from);
+    ///         wire.send(&[number.value + 1]);
+    ///         wire.end_packet();
+    ///     }
+    /// };
+    /// dag.using(wire.sending()).subtask(answer).reads(&["numbers"]).register(named("answer"));
+    /// finish_create_dags(&[dag]).unwrap();
+    ///
+    /// let [one, two] = ["10.0.0.1:7", "10.0.0.2:7"].map(|peer| peer.parse().unwrap());
+    /// machine.packet_at(&wire, ms(1), one, &[1]);
+    /// machine.packet_at(&wire, ms(1), two, &[2]);
+    /// machine.run();
+    /// assert_eq!(machine.sent_packets(&wire), [(vec![2], Some(one)), (vec![3], Some(two))]);
+    /// ```
+    pub fn packet_at(&self, wire: &Wire, time: Duration, from: SocketAddrV4, bytes: &[u8]) {
+        self.keep_bytes(wire, time, bytes, Some(from));
+    }
+
+    fn keep_bytes(&self, wire: &Wire, time: Duration, bytes: &[u8], from: Option<SocketAddrV4>) {
         let at_ns = nanoseconds(time).max(self.machine.now_ns.get());
         let place = self.machine.place_of(wire);
         let end = Rc::clone(&self.machine.wires.borrow()[place].0);
         self.machine
-            .keep(at_ns, Arrival::Bytes(end, bytes.to_vec()));
+            .keep(at_ns, Arrival::Bytes(end, bytes.to_vec(), from));
     }
 
     /// Lets a device answer its questions: `answer` is told the question and the job that asks, and
@@ -179,6 +221,19 @@ impl VirtualTime {
     /// If the wire is not connected.
     #[must_use]
     pub fn sent(&self, wire: &Wire) -> Vec<u8> {
+        let packets = self.sent_packets(wire).into_iter();
+        packets.flat_map(|(bytes, _)| bytes).collect()
+    }
+
+    /// Returns the same, packet by packet, with the peer that each is to if the sender has said so.
+    ///
+    /// See [`packet_at`](Self::packet_at).
+    ///
+    /// # Panics
+    ///
+    /// If the wire is not connected.
+    #[must_use]
+    pub fn sent_packets(&self, wire: &Wire) -> Vec<SentPacket> {
         let wires = self.machine.wires.borrow();
         let of_wire = wires.iter().find(|(end, _)| end.wire() == wire);
         of_wire

@@ -71,7 +71,7 @@ fn each_packet_is_answered_once_and_in_order() {
 fn what_is_sent_last_goes_when_the_connection_ends_and_losses_are_counted() {
     let alone = alone(1, Mechanism::Normal);
     let options = WireOptions {
-        room_bytes: 256,
+        room: 4,
         ..WireOptions::default()
     };
     let wire = Wire::with("squares", options);

@@ -57,6 +57,7 @@
 //! > conflicting one does.
 
 pub(crate) mod outbox;
+pub(crate) mod places;
 pub(crate) mod turn;
 
 use alloc::boxed::Box;
@@ -345,6 +346,15 @@ impl<T> ExclusiveCell<T> {
     /// Claims the value, unless somebody else has a claim.
     pub(crate) fn change(&self) -> Option<WriteClaim<'_, T>> {
         self.0.change()
+    }
+
+    /// Forgets a claim that a fault has left, when it has ended the instance that had it.
+    ///
+    /// # Safety
+    ///
+    /// No claim is in use, nor will one be that was made before.
+    pub(crate) unsafe fn forget_claim(&self) {
+        self.0.claims.store(0, Ordering::Release);
     }
 }
 

@@ -74,6 +74,16 @@ impl Buffer {
     }
 }
 
+impl From<&[u8]> for Buffer {
+    /// Makes a buffer with this packet in it. It allocates.
+    fn from(packet: &[u8]) -> Self {
+        let mut buffer = Self::new(Self::HEADROOM + packet.len());
+        buffer.set_range(Self::HEADROOM..Self::HEADROOM + packet.len());
+        buffer.content_mut().copy_from_slice(packet);
+        buffer
+    }
+}
+
 impl AsMut<[u8]> for Buffer {
     /// Returns the packet's bytes, to change them.
     fn as_mut(&mut self) -> &mut [u8] {

@@ -1,41 +1,37 @@
-//! The rings of a wire: one of packets on their way in, and one of bytes on their way out.
+//! The packets of a wire: places for them on their way in, and on their way out.
 //!
-//! A platform is the other side of each: it says what has arrived, and takes what is to go.
-//! Both rings are made before the commit, and nothing here allocates, waits or loops without
+//! A platform is the other side of each: it says what has arrived, and takes what is to go. All
+//! [buffers](buffer) are made before the commit, and nothing here allocates, waits or loops without
 //! a bound after that.
 //!
 //! # The way in
 //!
-//! Packets are put together where bytes arrive, and taken apart by the receiver. In the ring a
-//! packet is its length, its time, and its bytes. It is shown when it is whole,
-//! so the receiver finds whole packets only. One that finds no room is lost, however much room
-//! there is when its end comes: the packets before it stay.
+//! A device of packets swaps the buffer that it has filled for one of the wire's. From a device of
+//! bytes packets are put together in their place. A packet is shown when it is whole, so the
+//! receiver finds whole packets only. One that finds no place is lost, however many there are when
+//! its end comes: the packets before it stay.
+//!
+//! The receiver looks at a packet in its place. The receiver notes that, so that an instance that a
+//! fault ends there costs no place: it comes back at the next instance's start.
 //!
 //! # The way out
 //!
-//! The bytes that an instance sends go when it is complete, all or none. The function puts its
-//! bytes ahead in the ring; the completion shows them, which is one store
-//! however many they are. If one of them found no room, all that the instance sent is lost.
-//!
-//! # The ring
-//!
-//! Bytes go from one side that writes to one that reads, perhaps on another core. They are put
-//! *ahead* of what is written, in any number of steps, and are there for the
-//! reader when they are *shown*, all at once. Neither side ever waits. Each byte is an atomic
-//! word, so nothing here is `unsafe`; that the reader finds what was put follows from the
-//! `Release` store that shows it.
+//! The packets that an instance sends go when it is complete, all or none. The function puts its
+//! bytes into places ahead; the completion shows them, which is one store however many they are. If
+//! one of them finds no place, or is too long, all that the instance sent is lost.
 
-use alloc::boxed::Box;
 use alloc::sync::Arc;
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
+use core::net::SocketAddrV4;
+use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use sched_dag::lifecycle::Request;
 
-use super::cell::SharedCell;
+use super::cell::ExclusiveCell;
+use super::cell::places::{PlaceLevel, Putter, Taker, places};
 use super::effect::Effect;
+use buffer::Buffer;
 
 pub(crate) mod buffer;
-
 #[cfg(test)]
 mod tests;
 
@@ -77,15 +73,55 @@ pub enum Framing {
     Chunks,
 }
 
-/// The header before a packet's bytes in the ring: its length and its time.
-const HEADER_BYTES: usize = 4 + 8;
+/// A packet on its way.
+#[derive(Debug, Default)]
+pub(crate) struct PacketInPlace {
+    pub(crate) buffer: Buffer,
+    /// When it was whole.
+    pub(crate) time_ns: u64,
+    /// Whom it is from, or to, where the device knows of such.
+    pub(crate) peer: Option<SocketAddrV4>,
+}
+
+impl PacketInPlace {
+    fn new(longest: usize) -> Self {
+        Self {
+            buffer: Buffer::new(Buffer::HEADROOM + longest),
+            ..Self::default()
+        }
+    }
+
+    /// Takes a byte away from the packet's end, if it ends with that. Returns how many it took.
+    fn strip(&mut self, last: u8) -> usize {
+        let is_there = self.buffer.content().last() == Some(&last);
+        let range = self.buffer.range();
+        let count = usize::from(is_there);
+        self.buffer.set_range(range.start..range.end - count);
+        count
+    }
+
+    /// Appends bytes to the packet, which has so many. Reports whether there was room.
+    fn append(&mut self, after: usize, bytes: &[u8]) -> bool {
+        let start = Buffer::HEADROOM;
+        let (from, end) = (start + after, start + after + bytes.len());
+        let place = self.buffer.whole().get_mut(from..end);
+        let has_room = place.map(|place| place.copy_from_slice(bytes)).is_some();
+        if has_room {
+            self.buffer.set_range(start..end);
+        }
+        has_room
+    }
+}
 
 /// The way in of a wire.
 pub(crate) struct WireInput {
     framing: Framing,
     longest: usize,
-    ring: ByteRing,
-    open: SharedCell<OpenPacket>,
+    /// The device's end, and the packet that is arriving.
+    arrivals: ExclusiveCell<(Putter<PacketInPlace>, OpenPacket)>,
+    /// The receiver's end, until the receiver has it.
+    taker: ExclusiveCell<Option<PacketTaker>>,
+    level: PlaceLevel<PacketInPlace>,
     /// Packets that came, and their bytes.
     pub(crate) packets: EventCounter,
     pub(crate) bytes: EventCounter,
@@ -111,18 +147,24 @@ struct OpenPacket {
 }
 
 impl WireInput {
-    /// Makes one with room for the longest packet at least.
-    pub(crate) fn new(framing: Framing, longest: usize, room_bytes: usize) -> Self {
+    /// Makes one with places for so many packets.
+    pub(crate) fn new(framing: Framing, longest: usize, count: usize) -> Self {
         let longest = match framing {
             // A fixed length is the longest packet, whatever the options say.
             Framing::Fixed(bytes) => bytes,
             _ => longest,
         };
+        let (putter, taker, level) = places(count, || PacketInPlace::new(longest));
+        let taker = PacketTaker {
+            taker,
+            is_held: false,
+        };
         Self {
             framing,
             longest,
-            ring: ByteRing::new(room_bytes.max(HEADER_BYTES + longest)),
-            open: SharedCell::new(OpenPacket::default()),
+            arrivals: ExclusiveCell::new((putter, OpenPacket::default())),
+            taker: ExclusiveCell::new(Some(taker)),
+            level,
             packets: EventCounter::default(),
             bytes: EventCounter::default(),
             lost: EventCounter::default(),
@@ -132,28 +174,59 @@ impl WireInput {
         }
     }
 
-    /// Makes room for the longest packet.
-    pub(crate) fn buffer(&self) -> Box<[u8]> {
-        alloc::vec![0; self.longest].into()
+    /// Takes the receiver's end, once.
+    pub(crate) fn taker(&self) -> Option<PacketTaker> {
+        self.taker.change()?.take()
     }
 
     /// Takes bytes that have arrived. Reports whether a packet is whole now.
     pub(crate) fn arrive(&self, bytes: &[u8], now_ns: u64) -> bool {
         // One device has the wire, and so this succeeds.
-        let Some(mut open) = self.open.change() else {
+        let Some(mut arrivals) = self.arrivals.change() else {
             self.lost_bytes.add(bytes.len());
             return false;
         };
+        let (putter, open) = &mut *arrivals;
         let (mut is_whole, mut rest) = (false, bytes);
         while !rest.is_empty() {
-            let (part, after, ends) = self.divide(&mut open, rest);
-            self.put(&mut open, part);
+            let (part, after, ends) = self.divide(open, rest);
+            self.put(putter, open, part);
             rest = after;
             if ends {
-                is_whole |= self.close(&mut open, now_ns);
+                is_whole |= self.close(putter, core::mem::take(open), now_ns);
             }
         }
         is_whole
+    }
+
+    /// Takes a packet, which has arrived in a buffer, by swapping that for one of the wire's.
+    /// Reports whether it did.
+    pub(crate) fn swap(
+        &self,
+        packet: &mut Buffer,
+        peer: Option<SocketAddrV4>,
+        now_ns: u64,
+    ) -> bool {
+        let mut seen = packet.content().len();
+        let Some(mut arrivals) = self.arrivals.change() else {
+            return false;
+        };
+        let putter = &mut arrivals.0;
+        let place = putter.place(0).filter(|_| seen <= self.longest);
+        let is_lost = place.is_none();
+        if let Some(place) = place {
+            core::mem::swap(&mut place.buffer, packet);
+            place.peer = peer;
+            if self.framing == Framing::Lines {
+                seen -= place.strip(b'\n');
+            }
+        }
+        let open = OpenPacket {
+            seen,
+            is_lost,
+            ..OpenPacket::default()
+        };
+        self.close(putter, open, now_ns)
     }
 
     /// Divides bytes into those that belong to the packet and those after it, at least one in
@@ -186,29 +259,36 @@ impl WireInput {
         }
     }
 
-    /// Puts bytes of the packet into the ring, if it can still be shown.
-    fn put(&self, open: &mut OpenPacket, part: &[u8]) {
+    /// Puts bytes of the packet into its place, if it can still be shown.
+    fn put(&self, putter: &mut Putter<PacketInPlace>, open: &mut OpenPacket, part: &[u8]) {
         let seen = open.seen.saturating_add(part.len());
         // What is too long is counted to its end, and not stored: the next packet must begin at
         // the right byte.
         if seen <= self.longest && !part.is_empty() {
-            open.is_lost |= !self.ring.put(HEADER_BYTES + open.seen, part);
+            let place = putter.place(0);
+            open.is_lost |= !place.is_some_and(|place| place.append(open.seen, part));
         }
         open.seen = seen;
     }
 
     /// Ends the packet, and shows it. Reports whether there is one.
-    fn close(&self, open: &mut OpenPacket, now_ns: u64) -> bool {
-        let OpenPacket {
+    fn close(
+        &self,
+        putter: &mut Putter<PacketInPlace>,
+        OpenPacket {
             mut seen, is_lost, ..
-        } = core::mem::take(open);
+        }: OpenPacket,
+        now_ns: u64,
+    ) -> bool {
         if seen > self.longest {
             self.too_long.add(1);
             return false;
         }
-        let is_line = self.framing == Framing::Lines && seen > 0 && !is_lost;
-        if is_line && self.ring.ahead(HEADER_BYTES + seen - 1) == b'\r' {
-            seen -= 1;
+        if let Some(place) = putter.place(0).filter(|_| seen > 0 && !is_lost) {
+            place.time_ns = now_ns;
+            if self.framing == Framing::Lines {
+                seen -= place.strip(b'\r');
+            }
         }
         // An empty line is no packet.
         if seen == 0 {
@@ -219,12 +299,7 @@ impl WireInput {
             self.lost_bytes.add(seen);
             return false;
         }
-        // Its bytes lie beyond, so there is room for these.
-        let length = u32::try_from(seen).unwrap_or(u32::MAX).to_le_bytes();
-        // The header last, in front of bytes that are there: nothing is shown before all of it is.
-        self.ring.put(0, &length);
-        self.ring.put(length.len(), &now_ns.to_le_bytes());
-        self.ring.show(HEADER_BYTES + seen);
+        putter.show(1);
         self.packets.add(1);
         self.bytes.add(seen);
         true
@@ -232,33 +307,7 @@ impl WireInput {
 
     /// Reports whether no packet is there.
     pub(crate) fn is_empty(&self) -> bool {
-        self.ring.waiting(self.mark()) == 0
-    }
-
-    /// Returns a mark between the packets that are there and those that come later.
-    pub(crate) fn mark(&self) -> usize {
-        self.ring.written()
-    }
-
-    /// Takes the oldest packet before the mark: its bytes, in front of the buffer, and its time.
-    pub(crate) fn take_packet<'b>(
-        &self,
-        mark: usize,
-        buffer: &'b mut [u8],
-    ) -> Option<(&'b [u8], u64)> {
-        // Up to the mark only: what comes while the instance runs is for a later one.
-        if self.ring.waiting(mark) == 0 {
-            return None;
-        }
-        let (mut length, mut time_ns) = ([0; 4], [0; 8]);
-        self.ring.peek(0, &mut length);
-        self.ring.peek(length.len(), &mut time_ns);
-        let length = u32::from_le_bytes(length) as usize;
-        let bytes = buffer.get_mut(..length)?;
-        self.ring.peek(HEADER_BYTES, bytes);
-        // Copied out, so the device may use the room again.
-        self.ring.drop(HEADER_BYTES + length);
-        Some((bytes, u64::from_le_bytes(time_ns)))
+        self.level.is_empty()
     }
 
     /// Counts a packet that the decoder has refused.
@@ -267,76 +316,237 @@ impl WireInput {
     }
 }
 
+/// The receiver's end of the way in.
+pub(crate) struct PacketTaker {
+    taker: Taker<PacketInPlace>,
+    /// Whether an instance looks at the oldest packet, or a fault has ended it there.
+    is_held: bool,
+}
+
+impl PacketTaker {
+    /// Returns a mark between the packets that are there and those that come later.
+    pub(crate) fn mark(&self) -> usize {
+        self.taker.mark()
+    }
+
+    /// Looks at the oldest packet before the mark, which is given back then. Up to the mark only:
+    /// what comes while the instance runs is for a later one.
+    pub(crate) fn take<R>(
+        &mut self,
+        mark: usize,
+        look: impl FnOnce(&PacketInPlace) -> R,
+    ) -> Option<R> {
+        self.give_back();
+        let place = self.taker.front(mark)?;
+        self.is_held = true;
+        let seen = look(place);
+        self.give_back();
+        Some(seen)
+    }
+
+    /// Gives back the packet that an instance held.
+    pub(crate) fn give_back(&mut self) {
+        if core::mem::take(&mut self.is_held) {
+            self.taker.give_back();
+        }
+    }
+}
+
+/// The receiver's end, where handles that may outlive an instance use it in its turns.
+#[doc(hidden)]
+pub struct SharedTaker(ExclusiveCell<PacketTaker>);
+
+impl SharedTaker {
+    pub(crate) const fn new(taker: PacketTaker) -> Self {
+        Self(ExclusiveCell::new(taker))
+    }
+
+    /// Looks at the oldest packet.
+    pub(crate) fn take<R>(&self, look: impl FnOnce(&PacketInPlace) -> R) -> Option<R> {
+        let mut taker = self.0.change()?;
+        let mark = taker.mark();
+        taker.take(mark, look)
+    }
+
+    /// Begins an instance, which has no claim yet.
+    pub(crate) fn begin_instance(&self) {
+        forget_claim(&self.0);
+    }
+}
+
+/// Forgets what an instance that a fault has ended has left of a wire's end.
+fn forget_claim<T>(end: &ExclusiveCell<T>) {
+    // SAFETY: an end is claimed in turns of its subtask and by their completions only, which is
+    // checked where a handle may outlive an instance; the subtask begins an instance now, and so the
+    // claim is of one that has ended.
+    unsafe { end.forget_claim() };
+}
+
 /// The way out of a wire.
 pub(crate) struct WireOutput {
-    ring: ByteRing,
-    /// How many bytes the instance has sent that is not complete yet, and whether one of them
-    /// found no room.
-    staged: AtomicUsize,
-    is_lost: AtomicBool,
+    staging: ExclusiveCell<Staging>,
+    leaving: ExclusiveCell<Leaving>,
+    level: PlaceLevel<PacketInPlace>,
+    /// The most bytes of a packet.
+    most: AtomicUsize,
     /// Bytes that were shown.
     pub(crate) sent: EventCounter,
     /// Bytes for which there was no room.
     pub(crate) lost: EventCounter,
 }
 
+/// What the instance has sent that is not complete yet.
+struct Staging {
+    putter: Putter<PacketInPlace>,
+    /// How many packets are whole, how many bytes the one behind them has, and all of them.
+    packets: usize,
+    open: usize,
+    bytes: usize,
+    /// Whether one of these bytes found no room.
+    is_lost: bool,
+    peer: Option<SocketAddrV4>,
+}
+
+/// The device's end of the way out.
+struct Leaving {
+    taker: Taker<PacketInPlace>,
+    /// How many bytes of the oldest packet have gone.
+    gone: usize,
+}
+
+impl Staging {
+    /// Ends the packet that is open, if it has a byte.
+    fn end_packet(&mut self) {
+        if core::mem::take(&mut self.open) > 0 && !self.is_lost {
+            if let Some(place) = self.putter.place(self.packets) {
+                place.peer = self.peer;
+            }
+            self.packets += 1;
+        }
+    }
+}
+
 impl WireOutput {
-    pub(crate) fn new(room_bytes: usize) -> Self {
+    pub(crate) fn new(longest: usize, count: usize) -> Self {
+        let (putter, taker, level) = places(count, || PacketInPlace::new(longest));
         Self {
-            ring: ByteRing::new(room_bytes),
-            staged: AtomicUsize::new(0),
-            is_lost: AtomicBool::new(false),
+            staging: ExclusiveCell::new(Staging {
+                putter,
+                packets: 0,
+                open: 0,
+                bytes: 0,
+                is_lost: false,
+                peer: None,
+            }),
+            leaving: ExclusiveCell::new(Leaving { taker, gone: 0 }),
+            level,
+            most: AtomicUsize::new(usize::MAX),
             sent: EventCounter::default(),
             lost: EventCounter::default(),
         }
     }
 
-    /// Forgets what an instance has sent that never was complete.
-    pub(crate) fn discard_staged(&self) {
-        self.staged.store(0, Ordering::Relaxed);
-        self.is_lost.store(false, Ordering::Relaxed);
+    /// Lets no packet be longer.
+    pub(crate) fn limit(&self, most: usize) {
+        self.most.store(most, Ordering::Relaxed);
+    }
+
+    /// Begins an instance, which has sent nothing yet.
+    pub(crate) fn begin_instance(&self) {
+        forget_claim(&self.staging);
+        self.show(|_| false);
     }
 
     /// Puts bytes behind what the instance has sent already. Reports whether there was room for all.
     pub(crate) fn stage(&self, bytes: &[u8]) -> bool {
-        let staged = self.staged.load(Ordering::Relaxed);
+        let Some(mut staging) = self.staging.change() else {
+            return false;
+        };
+        let staging = &mut *staging;
+        let has_room = staging.open + bytes.len() <= self.most.load(Ordering::Relaxed)
+            && (staging.putter.place(staging.packets))
+                .is_some_and(|place| place.append(staging.open, bytes));
         // Once a byte has found no room, none is put any more: a packet with a hole is worse than
         // none.
-        if self.is_lost.load(Ordering::Relaxed) || !self.ring.put(staged, bytes) {
-            self.is_lost.store(true, Ordering::Relaxed);
-        }
-        let staged = staged.saturating_add(bytes.len());
-        self.staged.store(staged, Ordering::Relaxed);
-        !self.is_lost.load(Ordering::Relaxed)
+        staging.is_lost |= !has_room && !bytes.is_empty();
+        staging.open = staging.open.saturating_add(bytes.len());
+        staging.bytes = staging.bytes.saturating_add(bytes.len());
+        !staging.is_lost
     }
 
-    /// Shows what the instance has sent, or loses it.
-    fn show_staged(&self) {
-        let staged = self.staged.load(Ordering::Relaxed);
-        if self.is_lost.load(Ordering::Relaxed) {
-            self.lost.add(staged);
-        } else {
-            self.ring.show(staged);
-            self.sent.add(staged);
+    /// Ends the packet that the instance sends.
+    pub(crate) fn end_packet(&self) {
+        if let Some(mut staging) = self.staging.change() {
+            staging.end_packet();
+        }
+    }
+
+    /// Says whom the instance's packet, and those after it, are to.
+    pub(crate) fn address(&self, peer: Option<SocketAddrV4>) {
+        if let Some(mut staging) = self.staging.change() {
+            staging.peer = peer;
+        }
+    }
+
+    /// Shows what the instance has sent, if it `is_complete`, or loses it.
+    fn show(&self, is_complete: impl FnOnce(&Staging) -> bool) {
+        let Some(mut staging) = self.staging.change() else {
+            return;
+        };
+        staging.end_packet();
+        let packets = core::mem::take(&mut staging.packets);
+        if is_complete(&staging) {
+            staging.putter.show(packets);
         }
         // The next instance begins with nothing staged.
-        self.discard_staged();
+        (staging.bytes, staging.is_lost, staging.peer) = (0, false, None);
+    }
+
+    /// Shows what the complete instance has sent, or loses it where there was no room.
+    fn show_staged(&self) {
+        self.show(|staging| {
+            let count = if staging.is_lost {
+                &self.lost
+            } else {
+                &self.sent
+            };
+            count.add(staging.bytes);
+            !staging.is_lost
+        });
     }
 
     /// Takes the next byte that is to go.
     pub(crate) fn take_byte(&self) -> Option<u8> {
-        if self.is_empty() {
-            return None;
+        let mut leaving = self.leaving.change()?;
+        let Leaving { taker, gone } = &mut *leaving;
+        let packet = taker.front(taker.mark())?.buffer.content();
+        let byte = packet.get(*gone).copied();
+        *gone += 1;
+        if *gone >= packet.len() {
+            *gone = 0;
+            taker.give_back();
         }
-        let mut byte = [0];
-        self.ring.peek(0, &mut byte);
-        self.ring.drop(1);
-        Some(byte[0])
+        byte
+    }
+
+    /// Hands over the oldest packet that is to go, which `send` may swap for another buffer, and
+    /// takes it away if `send` says so. Reports whether it did.
+    pub(crate) fn take_packet(&self, send: impl FnOnce(&mut PacketInPlace) -> bool) -> bool {
+        let Some(mut leaving) = self.leaving.change() else {
+            return false;
+        };
+        let taker = &mut leaving.taker;
+        let mark = taker.mark();
+        let has_gone = taker.front(mark).is_some_and(send);
+        if has_gone {
+            taker.give_back();
+        }
+        has_gone
     }
 
     /// Reports whether nothing is to go.
     pub(crate) fn is_empty(&self) -> bool {
-        self.ring.waiting(self.ring.written()) == 0
+        self.level.is_empty()
     }
 }
 
@@ -351,82 +561,5 @@ impl Effect for SendCompletion {
     fn wait(&mut self, _: (u64, u64), _: &mut dyn FnMut(Request)) -> bool {
         self.0.show_staged();
         false
-    }
-}
-
-struct ByteRing {
-    /// A power of two.
-    bytes: Box<[AtomicU8]>,
-    /// How many bytes have ever been shown, and how many of them taken.
-    written: AtomicUsize,
-    read: AtomicUsize,
-}
-
-impl ByteRing {
-    /// Makes a ring with room for so many bytes at least.
-    fn new(room_bytes: usize) -> Self {
-        let room = room_bytes.max(16).next_power_of_two();
-        Self {
-            bytes: (0..room).map(|_| AtomicU8::new(0)).collect(),
-            written: AtomicUsize::new(0),
-            read: AtomicUsize::new(0),
-        }
-    }
-
-    #[inline(always)]
-    fn byte(&self, at: usize) -> &AtomicU8 {
-        &self.bytes[at & (self.bytes.len() - 1)]
-    }
-
-    /// Puts bytes so far ahead of what is written. Reports whether there was room for them.
-    fn put(&self, ahead: usize, bytes: &[u8]) -> bool {
-        let written = self.written.load(Ordering::Relaxed);
-        let used = written.wrapping_sub(self.read.load(Ordering::Acquire));
-        if bytes.len() > self.bytes.len().saturating_sub(used + ahead) {
-            return false;
-        }
-        let mut at = written.wrapping_add(ahead);
-        for byte in bytes {
-            self.byte(at).store(*byte, Ordering::Relaxed);
-            at = at.wrapping_add(1);
-        }
-        true
-    }
-
-    /// Returns the byte that was put so far ahead of what is written.
-    fn ahead(&self, ahead: usize) -> u8 {
-        let at = self.written.load(Ordering::Relaxed).wrapping_add(ahead);
-        self.byte(at).load(Ordering::Relaxed)
-    }
-
-    /// Shows so many bytes, which were put.
-    fn show(&self, count: usize) {
-        let written = self.written.load(Ordering::Relaxed);
-        self.written
-            .store(written.wrapping_add(count), Ordering::Release);
-    }
-
-    /// Returns how many bytes have ever been shown.
-    fn written(&self) -> usize {
-        self.written.load(Ordering::Acquire)
-    }
-
-    /// Returns how many of those shown by `until` are there.
-    fn waiting(&self, until: usize) -> usize {
-        until.wrapping_sub(self.read.load(Ordering::Relaxed))
-    }
-
-    /// Looks at bytes that are there, from so many after the first.
-    fn peek(&self, after: usize, bytes: &mut [u8]) {
-        let read = self.read.load(Ordering::Relaxed);
-        for (at, byte) in (read.wrapping_add(after)..).zip(bytes) {
-            *byte = self.byte(at).load(Ordering::Relaxed);
-        }
-    }
-
-    /// Takes so many bytes out.
-    fn drop(&self, count: usize) {
-        let read = self.read.load(Ordering::Relaxed);
-        self.read.store(read.wrapping_add(count), Ordering::Release);
     }
 }

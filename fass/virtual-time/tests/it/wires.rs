@@ -15,10 +15,10 @@ fn number(packet: &[u8]) -> Option<u32> {
     str::from_utf8(packet).ok()?.parse().ok()
 }
 
-fn with_room(name: &str, room_bytes: usize) -> Wire {
+fn with_room(name: &str, room: usize) -> Wire {
     let options = WireOptions {
         longest_bytes: 4,
-        room_bytes,
+        room,
         ..WireOptions::default()
     };
     Wire::with(name, options)
@@ -97,10 +97,10 @@ fn a_packet_raises_the_sporadic_dag_that_receives_it() {
 
 #[test]
 fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
-    let (wire, seen) = (with_room("numbers", 64), Seen::default());
+    let (wire, seen) = (with_room("numbers", 4), Seen::default());
     let machine = VirtualTime::new();
     commit(&[periodic(&wire, 3, look(&seen))]);
-    // 14 bytes each, so there is room for four; and one that is too long.
+    // There is room for four; and one is too long.
     let many = b"11\n12\n13\n14\n15\n16\n54321\n";
     arrive(&machine, &wire, &[(1, many), (11, b"17\n")]);
     machine.run();
@@ -113,7 +113,7 @@ fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
 
 #[test]
 fn r3_bytes_go_when_their_instance_is_complete_and_not_if_it_fails_or_sends_too_much() {
-    let wire = with_room("out", 16);
+    let wire = with_room("out", 1);
     let machine = VirtualTime::new().connect(&wire).contain_panics();
     let dag = every(10, "sending");
     let count = dag.jobs(4).source(job_numbers(0)).writes(&["job"]);
@@ -121,7 +121,7 @@ fn r3_bytes_go_when_their_instance_is_complete_and_not_if_it_fails_or_sends_too_
     let send = |mut wire: Sender<'_>, (job,): (u64,)| {
         wire.send(format!("job {job}").as_bytes());
         assert!(job != 3, "before it is complete");
-        wire.send(if job == 1 { &[b'x'; 12] } else { b"\n" });
+        wire.send(if job == 1 { &[b'x'; 2000] } else { b"\n" });
     };
     let sink = dag.using(wire.sending()).subtask(send).reads(&["job"]);
     sink.register(taking("send", 3));
@@ -133,7 +133,7 @@ fn r3_bytes_go_when_their_instance_is_complete_and_not_if_it_fails_or_sends_too_
     assert_eq!(machine.run().panics.len(), 1);
     assert_eq!(machine.sent(&wire), b"job 0\njob 2\n");
     let counts = wire.counts();
-    assert_eq!((counts.sent_bytes, counts.unsent_bytes), (12, 17));
+    assert_eq!((counts.sent_bytes, counts.unsent_bytes), (12, 2005));
 }
 
 #[test]
@@ -263,8 +263,8 @@ fn a_read_ends_with_the_next_packet_or_at_its_limit() {
 fn a_write_ends_when_all_has_gone_and_what_finds_no_room_never_goes() {
     for is_connected in [true, false] {
         let (seen, keep) = crate::support::Seen::shared();
-        let (wire, dag) = (with_room("out", 16), every(20, "writing"));
-        let mut bytes = [7, 9, 17].into_iter();
+        let (wire, dag) = (with_room("out", 2), every(20, "writing"));
+        let mut bytes = [7, 9, 2000].into_iter();
         let write = move |wire: WireWriter| {
             let (keep, count) = (keep.clone(), bytes.next().unwrap_or(1));
             async move {
@@ -290,12 +290,12 @@ fn a_write_ends_when_all_has_gone_and_what_finds_no_room_never_goes() {
                 assert_eq!(responses_ms(&report), [0, 0, 5, 0]);
                 assert_eq!(seen.all(), [Ok(()), Ok(()), Err(TimedOut), Ok(())]);
                 assert_eq!(machine.sent(&wire), [b'x'; 17], "not those of the third");
-                assert_eq!((counts.sent_bytes, counts.unsent_bytes), (17, 17));
+                assert_eq!((counts.sent_bytes, counts.unsent_bytes), (17, 2000));
             }
             false => {
                 assert_eq!(responses_ms(&report), [7, 7, 7, 5]);
                 assert_eq!(seen.all(), [Err(TimedOut); 4]);
-                assert_eq!((counts.sent_bytes, counts.unsent_bytes), (16, 18));
+                assert_eq!((counts.sent_bytes, counts.unsent_bytes), (16, 2001));
             }
         }
     }

@@ -1,0 +1,187 @@
+//! The fifth cell: places that two sides use in turn, a putter and a taker.
+//!
+//! A value stays in its place. The putter changes the places that are its own, and *shows* them to
+//! the taker, all at once; the taker gives each back. So a value is never moved, and a side that a
+//! fault ends in the middle has as many places as before.
+//!
+//! > **Place invariant.** The places from `read` on up to `written` are the taker's; all others are
+//! > the putter's. Only the putter moves `written`, only the taker moves `read`, both by `Release`
+//! > and over places that were their own; each looks at the other's by `Acquire`. There is one
+//! > putter and one taker, whose doings take `&mut self`.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+struct Places<T> {
+    /// As many as a power of two.
+    places: Box<[UnsafeCell<T>]>,
+    /// How many have ever been shown, and how many of them given back.
+    written: AtomicUsize,
+    read: AtomicUsize,
+}
+
+// SAFETY: by the place invariant a place is one thread's at a time, and `T: Send` goes from one to
+// another.
+unsafe impl<T: Send> Sync for Places<T> {}
+
+/// The end that fills places. There is one, and it cannot be cloned.
+pub(crate) struct Putter<T>(Arc<Places<T>>);
+
+/// The end that empties them. There is one, and it cannot be cloned.
+pub(crate) struct Taker<T>(Arc<Places<T>>);
+
+/// Says how many places are the taker's, to anybody.
+pub(crate) struct PlaceLevel<T>(Arc<Places<T>>);
+
+/// Makes places for so many values at least.
+pub(crate) fn places<T>(
+    count: usize,
+    value: impl FnMut() -> T,
+) -> (Putter<T>, Taker<T>, PlaceLevel<T>) {
+    let count = count.max(1).next_power_of_two();
+    let values = core::iter::repeat_with(value).map(UnsafeCell::new);
+    let places = Arc::new(Places {
+        places: values.take(count).collect(),
+        written: AtomicUsize::new(0),
+        read: AtomicUsize::new(0),
+    });
+    let [putter, taker] = [&places, &places].map(Arc::clone);
+    (Putter(putter), Taker(taker), PlaceLevel(places))
+}
+
+impl<T> Places<T> {
+    #[inline]
+    fn place(&self, number: usize) -> &UnsafeCell<T> {
+        &self.places[number & (self.places.len() - 1)]
+    }
+}
+
+impl<T> Putter<T> {
+    /// Returns the place that is so many behind those that were shown, unless it is the taker's.
+    #[inline]
+    pub(crate) fn place(&mut self, ahead: usize) -> Option<&mut T> {
+        let places = &*self.0;
+        let written = places.written.load(Ordering::Relaxed);
+        let shown = written.wrapping_sub(places.read.load(Ordering::Acquire));
+        if ahead >= places.places.len() - shown {
+            return None;
+        }
+        let place = places.place(written.wrapping_add(ahead)).get();
+        // SAFETY: by the place invariant it is the putter's, which we are, and `&mut self` keeps us
+        // from giving out another reference meanwhile.
+        Some(unsafe { &mut *place })
+    }
+
+    /// Shows the next places to the taker, which must be the putter's.
+    ///
+    /// # Panics
+    ///
+    /// If they are not.
+    #[inline]
+    pub(crate) fn show(&mut self, count: usize) {
+        if count > 0 {
+            assert!(self.place(count - 1).is_some(), "the place is the taker's");
+            let written = self.0.written.load(Ordering::Relaxed);
+            (self.0.written).store(written.wrapping_add(count), Ordering::Release);
+        }
+    }
+}
+
+impl<T> Taker<T> {
+    /// Returns a mark between the places that were shown and those that come later.
+    #[inline]
+    pub(crate) fn mark(&self) -> usize {
+        self.0.written.load(Ordering::Acquire)
+    }
+
+    /// Returns the oldest place that was shown before the mark.
+    #[inline]
+    pub(crate) fn front(&mut self, mark: usize) -> Option<&mut T> {
+        let places = &*self.0;
+        let read = places.read.load(Ordering::Relaxed);
+        if read == mark || read == self.mark() {
+            return None;
+        }
+        // SAFETY: by the place invariant it is the taker's, which we are, and `&mut self` keeps us
+        // from giving out another reference meanwhile.
+        Some(unsafe { &mut *places.place(read).get() })
+    }
+
+    /// Gives the oldest place back, if there is one.
+    #[inline]
+    pub(crate) fn give_back(&mut self) {
+        let read = self.0.read.load(Ordering::Relaxed);
+        if read != self.mark() {
+            self.0.read.store(read.wrapping_add(1), Ordering::Release);
+        }
+    }
+}
+
+impl<T> PlaceLevel<T> {
+    /// Reports whether no place is the taker's.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        let written = self.0.written.load(Ordering::Acquire);
+        written == self.0.read.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use super::{Putter, Taker, places};
+
+    fn put(putter: &mut Putter<u64>, value: u64) -> bool {
+        let place = putter.place(0).map(|place| *place = value);
+        place.is_some_and(|()| {
+            putter.show(1);
+            true
+        })
+    }
+
+    fn take(taker: &mut Taker<u64>) -> Option<u64> {
+        let value = *taker.front(taker.mark())?;
+        taker.give_back();
+        Some(value)
+    }
+
+    #[test]
+    fn what_is_staged_is_shown_at_once_and_no_place_is_shown_twice() {
+        let (mut putter, mut taker, level) = places(3, || 0);
+        let ahead = (0..5).map(|ahead| putter.place(ahead).map(|place| *place = ahead as u64 + 1));
+        assert_eq!(ahead.flatten().count(), 4, "a power of two");
+        assert!(level.is_empty() && taker.front(usize::MAX).is_none());
+        putter.show(4);
+        assert!(!level.is_empty() && putter.place(0).is_none());
+        let mark = taker.mark();
+        assert_eq!((take(&mut taker), take(&mut taker)), (Some(1), Some(2)));
+        assert!(put(&mut putter, 9));
+        assert_eq!((take(&mut taker), take(&mut taker)), (Some(3), Some(4)));
+        assert_eq!(taker.front(mark), None, "what comes behind the mark waits");
+        assert_eq!((take(&mut taker), take(&mut taker)), (Some(9), None));
+    }
+
+    #[test]
+    fn threads_hand_values_over_in_order() {
+        let values = if cfg!(miri) { 200 } else { 100_000 };
+        let (mut putter, mut taker, _) = places(4, || 0);
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                for value in 0..values {
+                    while !put(&mut putter, value) {
+                        thread::yield_now();
+                    }
+                }
+            });
+            for value in 0..values {
+                while taker.front(taker.mark()).is_none() {
+                    thread::yield_now();
+                }
+                assert_eq!(take(&mut taker), Some(value));
+            }
+        });
+    }
+}
