@@ -49,51 +49,56 @@ impl Packet {
 }
 
 struct Neighbour<B> {
+    /// Unspecified in a place that is free.
     ip: Ipv4Addr,
     /// None while the question for it has no answer.
     mac: Option<Mac>,
-    /// The latest frame that waits for the answer.
-    waiting: Option<B>,
+    /// Room for the latest frame that waits for the answer, and whether there is one.
+    frame: B,
+    is_waiting: bool,
     /// Counts the uses of the table; 0 if nothing was ever sent to this neighbour.
     last_use: u64,
 }
 
 /// The neighbours that are known or asked for.
 pub(crate) struct Neighbours<B> {
-    table: [Option<Neighbour<B>>; NEIGHBOURS],
+    table: [Neighbour<B>; NEIGHBOURS],
     uses: u64,
 }
 
 impl<B> Neighbours<B> {
-    pub(crate) const fn new() -> Self {
+    /// Makes the table, with room for a frame each.
+    pub(crate) fn new(mut room: impl FnMut() -> B) -> Self {
         Self {
-            table: [const { None }; NEIGHBOURS],
+            table: [(); NEIGHBOURS].map(|()| Neighbour {
+                ip: Ipv4Addr::UNSPECIFIED,
+                mac: None,
+                frame: room(),
+                is_waiting: false,
+                last_use: 0,
+            }),
             uses: 0,
         }
     }
 
     fn find(&mut self, ip: Ipv4Addr) -> Option<&mut Neighbour<B>> {
-        self.table.iter_mut().flatten().find(|known| known.ip == ip)
+        self.table.iter_mut().find(|known| known.ip == ip)
     }
 
     /// Returns the neighbour of an address. The one that was not sent to for the longest time
     /// makes room for a new one, so strangers who ask displace each other only.
     fn entry(&mut self, ip: Ipv4Addr) -> &mut Neighbour<B> {
-        let place = (0..NEIGHBOURS).min_by_key(|place| match &self.table[*place] {
-            Some(known) if known.ip == ip => (0, 0),
-            None => (1, 0),
-            Some(known) => (2, known.last_use),
+        let oldest = (0..NEIGHBOURS).min_by_key(|&place| {
+            let known = &self.table[place];
+            let is_taken = !known.ip.is_unspecified();
+            (known.ip != ip, is_taken, known.last_use)
         });
-        let place = &mut self.table[place.unwrap_or(0)];
-        if place.as_ref().is_none_or(|known| known.ip != ip) {
-            *place = None;
+        let place = &mut self.table[oldest.unwrap_or(0)];
+        if place.ip != ip {
+            (place.ip, place.mac) = (ip, None);
+            (place.is_waiting, place.last_use) = (false, 0);
         }
-        place.get_or_insert(Neighbour {
-            ip,
-            mac: None,
-            waiting: None,
-            last_use: 0,
-        })
+        place
     }
 
     /// Returns the Ethernet address of a neighbour that a frame is to be sent to, if it is known.
@@ -105,23 +110,32 @@ impl<B> Neighbours<B> {
         known.mac
     }
 
-    /// Keeps a frame until its neighbour has answered, and drops the one that was kept before.
-    pub(crate) fn keep(&mut self, ip: Ipv4Addr, frame: B) {
+    /// Keeps a frame until its neighbour has answered, by swapping it for the one that was kept
+    /// before.
+    pub(crate) fn keep(&mut self, ip: Ipv4Addr, frame: &mut B) {
         let uses = self.uses;
         let neighbour = self.entry(ip);
         neighbour.last_use = uses;
-        neighbour.waiting = Some(frame);
+        core::mem::swap(&mut neighbour.frame, frame);
+        neighbour.is_waiting = true;
     }
 
-    /// Learns from a packet, and returns the frame that has waited for it.
+    /// Learns from a packet, and returns the place of the frame that has waited for it.
     ///
     /// Only those are added that ask for us; those known, or asked for, are renewed.
-    pub(crate) fn learn(&mut self, (mac, ip): (Mac, Ipv4Addr), asks_us: bool) -> Option<B> {
+    pub(crate) fn learn(&mut self, (mac, ip): (Mac, Ipv4Addr), asks_us: bool) -> Option<usize> {
         let neighbour = match asks_us {
             true => self.entry(ip),
             false => self.find(ip)?,
         };
         neighbour.mac = Some(mac);
-        neighbour.waiting.take()
+        let was_waiting = core::mem::take(&mut neighbour.is_waiting);
+        let place = was_waiting.then(|| self.table.iter().position(|known| known.ip == ip));
+        place.flatten()
+    }
+
+    /// Returns the frame of a place.
+    pub(crate) fn frame(&mut self, place: usize) -> &mut B {
+        &mut self.table[place].frame
     }
 }

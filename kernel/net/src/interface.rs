@@ -89,9 +89,13 @@ pub struct Datagram {
     pub payload: Range<usize>,
 }
 
+/// The place of a [kept](Interface::keep) frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept(usize);
+
 /// A frame's meaning.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Heard<B> {
+pub enum Heard {
     /// Nothing is to be done.
     Nothing,
     /// The frame's first bytes have become the answer to it, which is to be sent.
@@ -99,10 +103,10 @@ pub enum Heard<B> {
         /// The number of these bytes.
         length: usize,
         /// A kept frame whose neighbour has become known by the question.
-        resolved: Option<B>,
+        resolved: Option<Kept>,
     },
     /// The neighbour of a kept frame has answered: the frame is whole, and is to be sent.
-    Resolved(B),
+    Resolved(Kept),
     /// A datagram.
     Datagram(Datagram),
 }
@@ -129,13 +133,14 @@ pub struct Interface<B> {
 }
 
 impl<B: AsMut<[u8]>> Interface<B> {
-    /// Returns the interface of a card.
+    /// Returns the interface of a card. Each `room` is for a frame that waits for a neighbour's
+    /// answer.
     #[must_use]
-    pub const fn new(mac: Mac, address: Address) -> Self {
+    pub fn new(mac: Mac, address: Address, room: impl FnMut() -> B) -> Self {
         Self {
             mac,
             address,
-            neighbours: Neighbours::new(),
+            neighbours: Neighbours::new(room),
             identification: 0,
             counts: Counts {
                 frames: 0,
@@ -166,7 +171,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Returns the meaning of a frame that came. An answer is made in place.
-    pub fn hear(&mut self, frame: &mut [u8]) -> Heard<B> {
+    pub fn hear(&mut self, frame: &mut [u8]) -> Heard {
         self.counts.frames += 1;
         let (Some(to), Some(kind)) = (mac_at(frame, 0), u16_at(frame, 12)) else {
             self.counts.malformed += 1;
@@ -188,7 +193,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Takes an ARP packet; none if it is malformed.
-    fn hear_arp(&mut self, frame: &mut [u8]) -> Option<Heard<B>> {
+    fn hear_arp(&mut self, frame: &mut [u8]) -> Option<Heard> {
         let packet = arp::Packet::read(&frame[ipv4::START..])?;
         self.counts.arps += 1;
         let (mac, ip) = packet.from;
@@ -196,9 +201,9 @@ impl<B: AsMut<[u8]>> Interface<B> {
             return Some(Heard::Nothing);
         }
         let asks_us = packet.is_question && packet.to.1 == self.address.ip;
-        let mut resolved = self.neighbours.learn(packet.from, asks_us);
-        if let Some(frame) = &mut resolved {
-            put(frame.as_mut(), 0, &mac.0);
+        let resolved = self.neighbours.learn(packet.from, asks_us).map(Kept);
+        if let Some(frame) = resolved {
+            put(self.kept(frame).as_mut(), 0, &mac.0);
         }
         if asks_us {
             let answer = arp::Packet {
@@ -213,7 +218,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Takes an IPv4 packet; none if it is malformed.
-    fn hear_ipv4(&mut self, frame: &mut [u8]) -> Option<Heard<B>> {
+    fn hear_ipv4(&mut self, frame: &mut [u8]) -> Option<Heard> {
         let packet = Packet::read(frame)?;
         let is_ours = packet.to == self.address.ip && !packet.to.is_unspecified();
         let is_for_all = self.address.is_for_all(packet.to);
@@ -240,7 +245,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Takes an ICMP message, and answers an echo request; none if it is malformed.
-    fn hear_icmp(&mut self, frame: &mut [u8], packet: &Packet) -> Option<Heard<B>> {
+    fn hear_icmp(&mut self, frame: &mut [u8], packet: &Packet) -> Option<Heard> {
         let message = &frame[packet.payload.clone()];
         if message.len() < 8 || check_sum(sum(message, 0)) != 0 {
             return None;
@@ -293,10 +298,16 @@ impl<B: AsMut<[u8]>> Interface<B> {
         mac.map_or(Route::Unresolved(hop), |_| Route::Ready)
     }
 
-    /// Keeps a frame until its neighbour has answered. One is kept for each neighbour: the frame
-    /// that was kept before is dropped.
-    pub fn keep(&mut self, neighbour: Ipv4Addr, frame: B) {
+    /// Keeps a frame until its neighbour has answered, by swapping it for the one that was kept
+    /// before: one is kept for each neighbour.
+    pub fn keep(&mut self, neighbour: Ipv4Addr, frame: &mut B) {
         self.neighbours.keep(neighbour, frame);
+    }
+
+    /// Returns a frame whose neighbour has answered, until another one is kept.
+    #[must_use]
+    pub fn kept(&mut self, Kept(place): Kept) -> &mut B {
+        self.neighbours.frame(place)
     }
 
     /// Writes the question for a neighbour, and returns its length.

@@ -20,7 +20,9 @@ use core::fmt;
 use core::net::Ipv4Addr;
 
 pub use dhcp::{Client, Lease};
-pub use interface::{Address, Counts, Datagram, HEADERS, Heard, Interface, MOST_PAYLOAD, Route};
+pub use interface::{
+    Address, Counts, Datagram, HEADERS, Heard, Interface, Kept, MOST_PAYLOAD, Route,
+};
 
 /// An Ethernet address.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -17,7 +17,7 @@ fn address(ip: Ipv4Addr) -> Address {
 }
 
 pub(super) fn interface() -> Interface<Vec<u8>> {
-    Interface::new(MAC, address(IP))
+    Interface::new(MAC, address(IP), Vec::new)
 }
 
 fn peer(ip: Ipv4Addr, port: u16) -> Peer {
@@ -68,23 +68,23 @@ fn frames_of_others_are_understood() {
 fn a_datagram_waits_for_its_neighbour_and_arrives_whole() {
     let other = Mac([2, 0, 0, 0, 0, 9]);
     for length in [0, 1, 2, 3, 63, 64, MOST_PAYLOAD] {
-        let (mut here, mut there) = (interface(), Interface::new(other, address(THERE)));
+        let (mut here, mut there) = (interface(), Interface::new(other, address(THERE), Vec::new));
         let payload: Vec<u8> = (0..length).map(|at| at.to_le_bytes()[0]).collect();
         let (mut frame, route) = datagram(&mut here, peer(THERE, 7), &payload);
         assert_eq!(route, Route::Unresolved(THERE));
-        here.keep(THERE, frame.clone());
+        here.keep(THERE, &mut frame.clone());
         let mut question = [0; HEADERS];
         let asked = here.question(&mut question, THERE);
         let heard = there.hear(&mut question[..asked]);
         let Heard::Answer { length, resolved } = heard else {
             panic!("{heard:?}");
         };
-        assert_eq!(resolved, None::<Vec<u8>>);
+        assert_eq!(resolved, None);
         frame[..6].copy_from_slice(&other.0);
-        assert_eq!(
-            here.hear(&mut question[..length]),
-            Heard::Resolved(frame.clone())
-        );
+        let Heard::Resolved(kept) = here.hear(&mut question[..length]) else {
+            panic!("it is no answer");
+        };
+        assert_eq!(*here.kept(kept), frame);
         let Heard::Datagram(heard) = there.hear(&mut frame) else {
             panic!("no datagram");
         };
@@ -110,16 +110,16 @@ fn ipv4_and_later(frame: &[u8]) -> impl Iterator<Item = usize> {
 #[test]
 fn a_question_that_crosses_ours_frees_the_frame_that_waits() {
     let mut here = interface();
-    let (frame, _) = datagram(&mut here, peer(THERE, 7), b"first");
-    here.keep(THERE, frame);
-    let (frame, _) = datagram(&mut here, peer(THERE, 7), b"latest");
-    here.keep(THERE, frame);
+    let (mut frame, _) = datagram(&mut here, peer(THERE, 7), b"first");
+    here.keep(THERE, &mut frame);
+    let (mut frame, _) = datagram(&mut here, peer(THERE, 7), b"latest");
+    here.keep(THERE, &mut frame);
     let mut question = vectors().remove(0);
     let heard = here.hear(&mut question);
     let Heard::Answer { resolved, .. } = heard else {
         panic!("{heard:?}");
     };
-    assert!(resolved.unwrap().ends_with(b"latest"));
+    assert!(here.kept(resolved.unwrap()).ends_with(b"latest"));
 }
 
 #[test]
