@@ -37,6 +37,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use sched_dag::DagId;
 
 use super::dag::Dag;
+use super::parameter::Parameter;
 use super::uses::{OutsideInput, Uses, sealed};
 use crate::draft::part::PartKind;
 use crate::run::cell::SetOnce;
@@ -105,6 +106,7 @@ pub(super) struct WireState {
     is_connected: AtomicBool,
     /// The signal that its packets raise, if a sporadic DAG begins with them.
     signal: SetOnce<Arc<RequestTarget>>,
+    link: Parameter<bool>,
 }
 
 /// Options of a wire.
@@ -188,6 +190,7 @@ impl Wire {
                 is_sent_on: AtomicBool::new(false),
                 is_connected: AtomicBool::new(false),
                 signal: SetOnce::new(),
+                link: Parameter::new(&format!("{name}.link"), true, false..=true),
             }),
         }
     }
@@ -244,6 +247,21 @@ impl Wire {
             "another subtask {does} on wire `{}`; let that one do it, or make another wire",
             self.name()
         );
+    }
+
+    /// Returns the state of its link, which a DAG may read as any [`Parameter`]: whether the cable is
+    /// in, and there is an address. A device that cannot tell has one.
+    ///
+    /// ```
+    /// use fass::shared::Wire;
+    ///
+    /// let wire = Wire::new("commands");
+    /// assert!(wire.link().value());
+    /// wire.link().set(false).unwrap(); // as a test may
+    /// ```
+    #[must_use]
+    pub fn link(&self) -> &Parameter<bool> {
+        &self.shared.link
     }
 
     /// Returns the wire's name.
@@ -325,7 +343,7 @@ impl DeviceEnd {
         if let Some(tell) = self.0.shared.on_packet.get() {
             tell();
         }
-        self.0.shared.signal.get()?.get()
+        self.released()
     }
 
     /// Reports whether there is a packet that is to go, or the rest of one.
@@ -334,11 +352,29 @@ impl DeviceEnd {
         !self.0.shared.outgoing.is_empty()
     }
 
-    /// Lets no packet that is sent have more bytes than the device takes.
+    /// Begins as a device of packets: none that is sent may have more bytes than that, and `ready` is
+    /// called when there are some to go, in the completion of the instance that has sent them. It
+    /// must not block.
     ///
     /// See [`swap_out`](Self::swap_out).
-    pub fn limit_packets(&self, most_bytes: usize) {
-        self.0.shared.outgoing.limit(most_bytes);
+    pub fn begin_packets(&self, most_bytes: usize, ready: fn()) {
+        self.0.shared.outgoing.begin_packets(most_bytes, ready);
+    }
+
+    /// Returns the DAG that packets release, once there is one.
+    ///
+    /// See [`announce`](Self::announce).
+    #[must_use]
+    pub fn released(&self) -> Option<(u64, DagId)> {
+        self.0.shared.signal.get()?.get()
+    }
+
+    /// Says whether the device has a link.
+    ///
+    /// See [`Wire::link`].
+    pub fn set_link(&self, is_up: bool) {
+        // Any truth value is in the range.
+        let _ = self.0.shared.link.set(is_up);
     }
 
     /// Hands over the oldest packet that is to go, and whom it is to. `send` may swap its buffer for

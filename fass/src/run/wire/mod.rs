@@ -26,8 +26,8 @@ use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use sched_dag::lifecycle::Request;
 
-use super::cell::ExclusiveCell;
 use super::cell::places::{PlaceLevel, Putter, Taker, places};
+use super::cell::{ExclusiveCell, SetOnce};
 use super::effect::Effect;
 use buffer::Buffer;
 
@@ -389,6 +389,8 @@ pub(crate) struct WireOutput {
     level: PlaceLevel<PacketInPlace>,
     /// The most bytes of a packet.
     most: AtomicUsize,
+    /// What the device does when there is something to go.
+    ready: SetOnce<fn()>,
     /// Bytes that were shown.
     pub(crate) sent: EventCounter,
     /// Bytes for which there was no room.
@@ -441,14 +443,16 @@ impl WireOutput {
             leaving: ExclusiveCell::new(Leaving { taker, gone: 0 }),
             level,
             most: AtomicUsize::new(usize::MAX),
+            ready: SetOnce::new(),
             sent: EventCounter::default(),
             lost: EventCounter::default(),
         }
     }
 
-    /// Lets no packet be longer.
-    pub(crate) fn limit(&self, most: usize) {
+    /// Lets no packet be longer, and has the device told when there is something to go.
+    pub(crate) fn begin_packets(&self, most: usize, ready: fn()) {
         self.most.store(most, Ordering::Relaxed);
+        self.ready.set(ready);
     }
 
     /// Begins an instance, which has sent nothing yet.
@@ -495,11 +499,16 @@ impl WireOutput {
         };
         staging.end_packet();
         let packets = core::mem::take(&mut staging.packets);
-        if is_complete(&staging) {
+        let goes = is_complete(&staging) && packets > 0;
+        if goes {
             staging.putter.show(packets);
         }
         // The next instance begins with nothing staged.
         (staging.bytes, staging.is_lost, staging.peer) = (0, false, None);
+        drop(staging);
+        if let Some(ready) = self.ready.get().filter(|_| goes) {
+            ready();
+        }
     }
 
     /// Shows what the complete instance has sent, or loses it where there was no room.

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use super::buffer::Buffer;
 use super::{Effect, Framing, PacketTaker, SendCompletion, SharedTaker, WireInput, WireOutput};
 use alloc::sync::Arc;
+use core::sync::atomic::{AtomicUsize, Ordering};
 
 /// Takes a packet that is there, as text, and its time.
 fn take(taker: &mut PacketTaker, mark: usize) -> Option<(String, u64)> {
@@ -137,10 +138,13 @@ fn no_buffer_is_lost_or_copied_however_often_an_instance_fails_at_its_packet() {
     assert_eq!(buffers.len(), 5, "those of the wire, and the device's");
 }
 
+/// How often the device was told that something goes.
+static READY: AtomicUsize = AtomicUsize::new(0);
+
 #[test]
 fn what_an_instance_sends_is_one_packet_unless_it_ends_more() {
     let outgoing = Arc::new(WireOutput::new(8, 2));
-    outgoing.limit(9);
+    outgoing.begin_packets(9, || _ = READY.fetch_add(1, Ordering::Relaxed));
     let mut completion = SendCompletion(Arc::clone(&outgoing));
     let mut complete = || completion.happen(0, &mut |_| ());
     let next = || {
@@ -187,4 +191,5 @@ fn what_an_instance_sends_is_one_packet_unless_it_ends_more() {
     assert!(outgoing.stage(b"at last"));
     complete();
     assert_eq!(next().as_deref(), Some(&b"at last"[..]));
+    assert_eq!(READY.load(Ordering::Relaxed), 3, "not for what is lost");
 }
