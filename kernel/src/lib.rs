@@ -32,8 +32,8 @@
 //! 3. **After commit nothing allocates**: from a job's release to its completion
 //!    all memory is there already.
 //! 4. **A core without work halts**, and is woken by the core that has some.
-//! 5. **`unsafe` is in the executive's `machine` and `memory`, and in `entry` and `start`** alone,
-//!    each block with the invariant that it relies on.
+//! 5. **`unsafe` is in the executive's `machine`, `memory` and `devices`, and in `entry` and `start`**
+//!    alone, each block with the invariant that it relies on. A driver has one such step.
 //! 6. **Apps are not trusted**: what they say is verified at commit, and nothing here lets one change
 //!    a core's interrupts:
 //!
@@ -44,7 +44,7 @@
 //! # Rooms, from top to bottom
 //!
 //! `entry` and `start` bring an image up, `app` is what an app sees of the kernel. `watch` looks in
-//! on a run, and [`report`] tells of it afterwards; [`options`] reads the words of the command
+//! on a run, [`devices`] is for drivers, and [`report`] tells of it afterwards; [`options`] reads the words of the command
 //! line. The part that executes jobs is below, in a crate of its own, `executive`: cores,
 //! interrupts, memory, the drivers of the scheduler, and output ([`console`], [`json`]).
 //! `docs/architecture.md` has the table that the tests hold this to.
@@ -54,6 +54,7 @@
 extern crate alloc;
 
 mod app;
+pub mod devices;
 #[allow(unsafe_code, reason = "the symbols that an image must define")]
 #[doc(hidden)]
 pub mod entry;

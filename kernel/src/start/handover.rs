@@ -14,6 +14,7 @@ use core::ops::Range;
 use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
 use boot::{BootInfo, Framebuffer, List, MAX_PROCESSORS, MAX_REGIONS, Module};
+use executive::devices::ecam;
 use executive::machine::calibration::{self, KnownClock, TscRate};
 use executive::machine::paging::MapError;
 use executive::machine::power::{self, PowerAction};
@@ -124,6 +125,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     }
     this_core::create(with_stacks(selected(info, &platform)));
     let core = processors::become_core(local_apic::id());
+    ecam::note_place(platform.ecam);
     let stack = core.context().stack_top();
     let start = BootHandover {
         info,

@@ -94,6 +94,8 @@ pub struct Qemu {
     pub stops: bool,
     /// The connection of the second serial port; `None`: there is no such port.
     pub second: Option<Second>,
+    /// QEMU's words for further devices, with blanks between.
+    pub devices: String,
     /// Write the address of each instruction that is executed to [`Running`]'s output.
     pub logs_instructions: bool,
     /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
@@ -116,6 +118,7 @@ impl Default for Qemu {
             has_input: false,
             stops: false,
             second: None,
+            devices: String::new(),
             logs_instructions: false,
             debugger: None,
         }
@@ -151,6 +154,9 @@ impl Qemu {
             "-device isa-debug-exit,iobase=0xf4,iosize=0x04 -nodefaults -no-user-config \
              -display none -no-reboot",
         ));
+        for device in words(&self.devices) {
+            arguments.extend(["-device".into(), device]);
+        }
         // `-S` stops the processor before its first instruction.
         if let Some(device) = &self.debugger {
             arguments.extend(["-S".into(), "-gdb".into(), device.clone()]);

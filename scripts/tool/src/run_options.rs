@@ -66,6 +66,8 @@ options! {
     MODE: Takes::OneOf(Mode::NAMES);
     /// The board.
     MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
+    /// QEMU's words for devices, with blanks between; on q35.
+    DEVICE: Takes::Text("WORDS");
     /// The loader.
     BOOT: Takes::OneOf(Loader::NAMES), or "pvh";
     /// The guest's MiB.

@@ -9,6 +9,8 @@ mod attacks;
 mod checksum;
 mod cluster_scale;
 mod delays;
+#[allow(unsafe_code, reason = "a device may send messages")]
+mod devices;
 mod endless;
 mod every_call;
 mod input;
@@ -42,6 +44,7 @@ const TESTS: &[(&str, Test)] = &[
     ("crime", crime),
     ("cluster_scale", cluster_scale::run),
     ("delays", delays::run),
+    ("devices", devices::run),
     ("starved", delays::starved),
     ("events", delays::events),
     ("deaf_alone", |machine| single::deaf(machine, false)),

@@ -8,6 +8,7 @@ mod cruise;
 mod dag_file;
 mod debian;
 mod delays;
+mod devices;
 mod drone;
 mod every_call;
 mod faults;

@@ -1,11 +1,67 @@
 //! The configuration space of PCI, in memory (ECAM; PCI Express Base Specification 3.0, 7.2.2).
 
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use fass::platform::SetOnce;
+
 use super::pci::{BUSES, Configuration, Place};
 use super::registers::Registers;
 
 /// The bytes of a function's configuration space, and those of a bus.
 const FUNCTION: u64 = 4096;
 const BUS: u64 = 256 * FUNCTION;
+
+/// Where the firmware's tables say that it is; 0: nowhere.
+static PLACE: AtomicU64 = AtomicU64::new(0);
+
+static ECAM: SetOnce<Ecam> = SetOnce::new();
+
+/// Notes where the machine has it. It is mapped when a driver asks.
+pub fn note_place(start: Option<u64>) {
+    PLACE.store(start.unwrap_or(0), Ordering::Relaxed);
+}
+
+/// Why there are no functions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EcamError {
+    /// The firmware's tables name no such memory.
+    Absent,
+    /// There is something else.
+    Taken(u64),
+}
+
+impl core::fmt::Display for EcamError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Absent => f.write_str(
+                "the machine has no PCI configuration space in memory; boot a PC with PCI \
+                 Express, in QEMU by `--machine q35`",
+            ),
+            Self::Taken(start) => write!(
+                f,
+                "the PCI configuration space at {start:#x} is where something else is; update the \
+                 firmware"
+            ),
+        }
+    }
+}
+
+/// Returns the machine's, mapped at the first call: an app that does not ask has no cost of it.
+///
+/// # Errors
+///
+/// [`EcamError`].
+pub fn configuration() -> Result<&'static Ecam, EcamError> {
+    if let Some(ecam) = ECAM.get() {
+        return Ok(ecam);
+    }
+    let start = PLACE.load(Ordering::Relaxed);
+    if start == 0 {
+        return Err(EcamError::Absent);
+    }
+    ECAM.set(Ecam::new(start).ok_or(EcamError::Taken(start))?);
+    ECAM.get().ok_or(EcamError::Absent)
+}
 
 /// The configuration space of the first buses.
 #[derive(Debug)]

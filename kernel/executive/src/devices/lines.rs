@@ -4,7 +4,8 @@ use core::sync::atomic::Ordering;
 
 use fass::platform::SetOnce;
 
-use super::pci::{Function, Message};
+use super::ecam;
+use super::pci::{Function, Message, PciError, Place};
 use super::registers::{RangeError, Registers};
 use crate::machine::interrupt::{self, Interrupted};
 use crate::machine::{clock, this_core, vector};
@@ -12,9 +13,10 @@ use crate::run::execution;
 
 /// A driver's answer to its device's message.
 pub trait DeviceLine: Sync {
-    /// Takes what the device has, and releases DAGs or answers waits by
-    /// [`execution::raise_in_interrupt`] and [`execution::answer`]. In an interrupt: it returns
-    /// soon, and calls no function of an app's.
+    /// Takes what the device has, and releases DAGs or answers waits, by
+    /// [`Signal::raise`](fass::shared::Signal::raise) and
+    /// [`DeviceDriver::answer`](fass::shared::DeviceDriver::answer). In an interrupt: it returns
+    /// soon, allocates nothing, and must not panic.
     fn interrupt(&self, now_ns: u64);
 }
 
@@ -28,6 +30,8 @@ pub enum LineError {
     Range(RangeError),
     /// All lines are taken.
     NoLine,
+    /// There is no core with this number.
+    NoCore(u32),
     /// Messages do not reach a core with so large a local APIC id.
     Unreachable(u32),
 }
@@ -41,6 +45,11 @@ impl core::fmt::Display for LineError {
                 "finds all {} lines of devices taken; use fewer devices",
                 vector::DEVICES
             ),
+            Self::NoCore(core) => write!(
+                f,
+                "finds no core {core}; tie it to one of 0 to {}",
+                this_core::all().len().saturating_sub(1)
+            ),
             Self::Unreachable(id) => write!(
                 f,
                 "cannot reach the core with APIC id {id}; tie it to one with an id below 255"
@@ -49,48 +58,118 @@ impl core::fmt::Display for LineError {
     }
 }
 
-/// Ties a message of a function to a driver, on this core, and has the function send it.
+/// A message that is tied to a driver.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    place: Place,
+    number: u16,
+    vector: u8,
+    /// Its entry in a table in memory, if the function has one.
+    entry: Option<(Registers, u64)>,
+}
+
+/// Ties a message of a function to a driver, and has the function send it to a core, given by its
+/// number. The function sends once it [may reach memory](Function::enable_reach).
 ///
 /// # Errors
 ///
 /// [`LineError`].
+///
+/// ```no_run
+/// use kernel::devices::{DeviceLine, Function, LineError, Registers, tie};
+///
+/// /// A driver that has nothing to do but to acknowledge.
+/// struct Quiet(Registers);
+///
+/// impl DeviceLine for Quiet {
+///     fn interrupt(&self, _now_ns: u64) {
+///         self.0.write32(0x64, self.0.read32(0x24));
+///     }
+/// }
+///
+/// fn silence(function: &Function<'_>, registers: Registers) -> Result<(), LineError> {
+///     let driver = Box::leak(Box::new(Quiet(registers)));
+///     tie(function, 0, driver, 0).map(drop)
+/// }
+/// ```
 pub fn tie(
     function: &Function<'_>,
     number: u16,
-    line: &'static dyn DeviceLine,
-) -> Result<(), LineError> {
-    let id = this_core::get().apic_id();
-    let reached = u8::try_from(id).ok().filter(|id| *id < u8::MAX);
-    let reached = reached.ok_or(LineError::Unreachable(id))?;
+    driver: &'static dyn DeviceLine,
+    core: u32,
+) -> Result<Line, LineError> {
+    reached(core)?;
     interrupt::install_devices(device_interrupt);
     let free = (vector::DEVICE..)
         .zip(&LINES)
-        .find(|(_, place)| place.set(line));
+        .find(|(_, place)| place.set(driver));
     let (vector, _) = free.ok_or(LineError::NoLine)?;
-    let message = Message {
-        address: 0xfee0_0000 | u32::from(reached) << 12,
-        data: vector.into(),
+    let mut line = Line {
+        place: function.place,
+        number,
+        vector,
+        entry: None,
     };
     let function_error = |error| LineError::Range(RangeError::Function(error));
-    let entry = function.send(number, message).map_err(function_error)?;
-    if let Some(entry) = entry {
+    let entry = function.send(number, line.message(core)?);
+    if let Some(entry) = entry.map_err(function_error)? {
         let table = Registers::of(function, entry.bar).map_err(LineError::Range)?;
-        table.write32(entry.offset, message.address);
-        table.write32(entry.offset + 4, 0);
-        table.write32(entry.offset + 8, message.data.into());
-        // No longer masked.
-        table.write32(entry.offset + 12, 0);
+        line.entry = Some((table, entry.offset));
+        line.route(core)?;
     }
-    Ok(())
+    Ok(line)
+}
+
+/// Returns the local APIC's id of a core, to which a message can be sent.
+fn reached(core: u32) -> Result<u8, LineError> {
+    let core = (this_core::all().get(core as usize)).ok_or(LineError::NoCore(core))?;
+    let id = u8::try_from(core.apic_id()).ok();
+    let id = id.filter(|id| *id < u8::MAX);
+    id.ok_or(LineError::Unreachable(core.apic_id()))
+}
+
+impl Line {
+    fn message(&self, core: u32) -> Result<Message, LineError> {
+        Ok(Message {
+            address: 0xfee0_0000 | u32::from(reached(core)?) << 12,
+            data: self.vector.into(),
+        })
+    }
+
+    /// Has the message sent to another core from now on. To be called between runs, while the
+    /// device has nothing to say: a message on its way may be lost.
+    ///
+    /// # Errors
+    ///
+    /// [`LineError`].
+    pub fn route(&self, core: u32) -> Result<(), LineError> {
+        let message = self.message(core)?;
+        let Some((table, offset)) = self.entry else {
+            let function = ecam::configuration().ok();
+            let function = function.and_then(|space| Function::at(space, self.place));
+            let sent = function.ok_or(PciError::NoMessages);
+            let sent = sent.and_then(|function| function.send(self.number, message));
+            let line_error = |error| LineError::Range(RangeError::Function(error));
+            return sent.map(drop).map_err(line_error);
+        };
+        // Masked while its parts do not fit each other.
+        table.write32(offset + 12, 1);
+        table.write32(offset, message.address);
+        table.write32(offset + 4, 0);
+        table.write32(offset + 8, message.data.into());
+        table.write32(offset + 12, 0);
+        Ok(())
+    }
 }
 
 /// Handles the message of a line.
 fn device_interrupt(line: u8, interrupted: &mut Interrupted) {
-    let core = this_core::get();
     let now_ns = clock::now_ns();
+    let core = this_core::get();
     core.interrupted_ns.store(now_ns, Ordering::Relaxed);
-    if let Some(driver) = LINES.get(usize::from(line)).and_then(SetOnce::get) {
-        driver.interrupt(now_ns);
-    }
-    execution::interrupt(interrupted, now_ns, false);
+    execution::device_interrupt(interrupted, now_ns, || {
+        if let Some(driver) = LINES.get(usize::from(line)).and_then(SetOnce::get) {
+            driver.interrupt(now_ns);
+        }
+    });
 }

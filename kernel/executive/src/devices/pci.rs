@@ -147,7 +147,8 @@ pub fn find<'c>(configuration: &'c dyn Configuration, each: &mut dyn FnMut(Funct
 }
 
 impl<'c> Function<'c> {
-    fn at(configuration: &'c dyn Configuration, place: Place) -> Option<Self> {
+    /// Returns the function at a place, if there is one.
+    pub(super) fn at(configuration: &'c dyn Configuration, place: Place) -> Option<Self> {
         let [a, b, c, d] = configuration.read(place, 0).to_le_bytes();
         let id = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
         (id.0 != u16::MAX && id.0 != 0).then(|| Self {

@@ -88,6 +88,8 @@ pub struct Core {
     pub wake: AtomicBool,
     /// This core watches `wake`: it needs no interrupt to see it.
     pub(super) watches: AtomicBool,
+    /// What is decided now is followed at the end of the interrupt that is being handled.
+    pub follows: AtomicBool,
     /// Its [`TimeSlicePart`] in the turns.
     part: AtomicU8,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
@@ -133,6 +135,7 @@ pub fn create(cores: impl Iterator<Item = (u32, CoreStacks)>) {
         spare: AtomicPtr::new(core::ptr::null_mut()),
         wake: AtomicBool::new(false),
         watches: AtomicBool::new(false),
+        follows: AtomicBool::new(false),
         part: AtomicU8::new(TimeSlicePart::None as u8),
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         arms_later: AtomicBool::new(false),

@@ -16,9 +16,17 @@ pub(super) fn chosen(options: &Parsed) -> Loader {
     named.unwrap_or(Loader::Pvh)
 }
 
-/// Returns the board that the options choose; a loader on a stick needs a PC.
+/// Returns what needs a PC, if the options ask for such a thing.
+fn needs_pc(options: &Parsed) -> Option<(&'static str, &'static str)> {
+    let stick = ("no firmware that boots from a stick", "boot");
+    let boots = chosen(options).needs_stick().then_some(stick);
+    let device = ("no PCI, which `--device` needs", "device");
+    boots.or(options.is_given(name::DEVICE).then_some(device))
+}
+
+/// Returns the board that the options choose, or what they need.
 pub(super) fn machine(options: &Parsed) -> Machine {
-    if chosen(options).needs_stick() {
+    if needs_pc(options).is_some() {
         return Machine::Q35;
     }
     let named = options.text(name::MACHINE).and_then(Machine::from_name);
@@ -33,14 +41,13 @@ pub(super) fn machine(options: &Parsed) -> Machine {
 pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> {
     let loader = chosen(options);
     let microvm = Machine::Microvm.name();
-    // Only a board that the person has named: the default gives way to the stick.
-    if loader.needs_stick()
+    // Only a board that the person has named: the default gives way.
+    if let Some((lacks, option)) = needs_pc(options)
         && options.is_given(name::MACHINE)
         && options.text(name::MACHINE) == Some(microvm)
     {
         return Err(format!(
-            "`--machine {microvm}`: it has no firmware that boots from a stick, as `--boot \
-             {loader}` does; give --machine q35, or leave --boot out"
+            "`--machine {microvm}`: it has {lacks}; give --machine q35, or leave --{option} out"
         ));
     }
     if loader == Loader::Uefi && mode == Some(Mode::Deterministic) {
@@ -114,7 +121,12 @@ mod tests {
     fn a_stick_takes_a_pc() {
         let board = |line: &str| machine(&right(&RUN, line));
         assert_eq!(board(""), Machine::Microvm);
-        for line in ["--boot pvh --machine q35", "--boot bios", "--boot uefi"] {
+        for line in [
+            "--boot pvh --machine q35",
+            "--boot bios",
+            "--boot uefi",
+            "--device edu",
+        ] {
             assert_eq!(board(line), Machine::Q35, "{line}");
         }
     }

@@ -251,6 +251,7 @@ fn describe(
         has_input: options.is_given(name::CONSOLE),
         stops: screen::can_stop(options),
         second: handed::second(options),
+        devices: options.text(name::DEVICE).unwrap_or_default().into(),
         logs_instructions: false,
         debugger: options.is_given(name::GDB).then(|| "tcp::1234".into()),
     }

@@ -20,8 +20,9 @@ use crate::qemu::{self, Ending, Mode};
 use crate::run_options::name;
 
 /// Options that concern QEMU, its guest, or the bare-metal kernel alone.
-const FOREIGN: [Name; 6] = [
+const FOREIGN: [Name; 7] = [
     name::BOOT,
+    name::DEVICE,
     name::GDB,
     name::LATEST,
     name::MACHINE,

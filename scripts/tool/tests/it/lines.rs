@@ -59,6 +59,8 @@ run --input - --console | `--input -` and `--console` both
 run --output - | `--output -`: standard output is
 run --dag x --output y | `--output` and `--dag` exclude
 run --boot bios --machine microvm | `--machine microvm`: it has no firmware
+run --device edu --machine microvm | `--machine microvm`: it has no PCI, which `--device` needs; give --machine q35, or leave --device out
+run --on linux --device edu | `--device` is for the bare machine; leave
 run --boot uefi --mode deterministic | give --mode threads
 new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`
 new-app fork-join | new-app: there is an app `fork-join` already; choose another name, or edit apps/fork-join

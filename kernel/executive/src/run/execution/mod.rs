@@ -43,7 +43,7 @@ pub use status::{
 };
 use step::RequestQueue;
 pub use step::{answer, raise, raise_in_interrupt};
-pub use step::{complete, fail, find_work, interrupt};
+pub use step::{complete, device_interrupt, fail, find_work, interrupt};
 
 /// The next work of a core.
 pub enum CoreWork {

@@ -171,7 +171,9 @@ pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: 
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.
-    timer::set(Alarm::Schedule, clock::now_ns());
+    if !this_core::get().follows.load(Ordering::Relaxed) {
+        timer::set(Alarm::Schedule, clock::now_ns());
+    }
 }
 
 /// The DAG whose bodies are being dropped, and since when.

@@ -344,6 +344,16 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     woken.wake();
 }
 
+/// Lets a driver take what its device has, and follows on this core what that has decided: no other
+/// interrupt is needed. In an interrupt handler.
+pub fn device_interrupt(interrupted: &mut Interrupted, now_ns: u64, driver: impl FnOnce()) {
+    let core = this_core::get();
+    core.follows.store(true, Ordering::Relaxed);
+    driver();
+    core.follows.store(false, Ordering::Relaxed);
+    interrupt(interrupted, now_ns, false);
+}
+
 /// The requests of a run that are on their way to its scheduler.
 pub(super) struct RequestQueue {
     /// The number of the plan that runs.
@@ -383,7 +393,10 @@ impl ClusterRun {
 #[track_caller]
 pub fn raise(plan: u64, dag: DagId) {
     let were_enabled = interrupt_flag::disable();
-    let is_instance = status::running(this_core::get()).is_some();
+    let core = this_core::get();
+    // A driver may, whatever its message has interrupted.
+    let is_driver = core.follows.load(Ordering::Relaxed);
+    let is_instance = !is_driver && status::running(core).is_some();
     if !is_instance {
         raise_in_interrupt(plan, dag);
     }

@@ -1,0 +1,120 @@
+//! The messages of QEMU's device `edu`, each of which releases a DAG on the core that it is sent to.
+
+use alloc::boxed::Box;
+use alloc::format;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+
+use executive::machine::this_core;
+use fass::shared::Signal;
+use fass::{Occupation, create_dag, execute_for, finish_create_dags};
+use kernel::devices::{self, DeviceLine, Function, LineError, Registers, tie};
+use kernel::{AppError, Machine, json};
+
+use crate::single::named;
+
+const MESSAGES: u64 = 500;
+
+/// Registers that say why the device has sent a message, have it send one, and acknowledge.
+const WHY: u64 = 0x24;
+const RAISE: u64 = 0x60;
+const ACKNOWLEDGE: u64 = 0x64;
+
+/// What has come on each of two cores, and messages without a reason.
+static CAME: [AtomicU64; 3] = [const { AtomicU64::new(0) }; 3];
+/// The timer interrupts while the messages came.
+static TIMER: AtomicU64 = AtomicU64::new(0);
+
+struct Driver(Registers, Signal);
+
+impl DeviceLine for Driver {
+    fn interrupt(&self, _now_ns: u64) {
+        let why = self.0.read32(WHY);
+        self.0.write32(ACKNOWLEDGE, why);
+        let core = this_core::get().index as usize;
+        CAME[if why == 0 { 2 } else { core }].fetch_add(1, Ordering::Relaxed);
+        self.1.raise();
+    }
+}
+
+/// Has the messages sent to each core in turn, a run for each, and says what came.
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
+    machine.options().finish(&["test"])?;
+    let edu = devices::find(0x1234, 0x11e8)?;
+    let registers = Registers::of(&edu, 0).map_err(|why| devices::refusal(&edu, why))?;
+    // SAFETY: it is told no address.
+    unsafe { edu.enable_reach() };
+    for core in 0..this_core::all().len() {
+        let index = u32::try_from(core).unwrap_or(u32::MAX);
+        let came = run_on(machine, &edu, registers, index)?;
+        json::emit("devices", |line| {
+            line.number("core", core as u64)
+                .number("came", CAME[core].swap(0, Ordering::Relaxed))
+                .number(
+                    "elsewhere",
+                    CAME.iter()
+                        .map(|count| count.load(Ordering::Relaxed))
+                        .sum::<u64>(),
+                )
+                .number("releases", came)
+                .number("timer_interrupts", TIMER.load(Ordering::Relaxed));
+        });
+    }
+    refuse_more(&edu, registers)
+}
+
+/// Runs a DAG that has the messages sent while it runs, and the one that they release. Returns how
+/// often that ran.
+fn run_on(
+    machine: &Machine,
+    edu: &Function<'_>,
+    registers: Registers,
+    core: u32,
+) -> Result<u64, AppError> {
+    let (answers, asks) = (create_dag(), create_dag());
+    let ms = Duration::from_millis;
+    answers.name("answers").relative_deadline(ms(1));
+    let signal = answers.sporadic(Duration::from_micros(20));
+    answers.source(|| ()).register(named("answer"));
+    asks.name("asks")
+        .jobs(1)
+        .period(ms(100))
+        .relative_deadline(ms(100));
+    let ask = move || {
+        let before = kernel::timer_interrupts();
+        for _ in 0..MESSAGES {
+            registers.write32(RAISE, 1);
+            execute_for(Duration::from_micros(40), Occupation::Spin);
+        }
+        TIMER.store(kernel::timer_interrupts() - before, Ordering::Relaxed);
+    };
+    asks.source(ask).register(named("ask"));
+    let refused = |why: LineError| devices::refusal(edu, why);
+    let driver = Box::leak(Box::new(Driver(registers, signal)));
+    let line = tie(edu, 0, driver, 0).map_err(refused)?;
+    line.route(core).map_err(refused)?;
+    finish_create_dags(&[answers, asks])?;
+    let run = machine.run()?;
+    match run.allocations() {
+        0 => Ok(run.statistics("answers").completed),
+        count => Err(AppError::Failure(format!(
+            "{count} allocations while jobs ran"
+        ))),
+    }
+}
+
+/// Ties more messages than there are, sends them to a core that is none, and says why not.
+fn refuse_more(edu: &Function<'_>, registers: Registers) -> Result<(), AppError> {
+    let signal = create_dag().sporadic(Duration::from_millis(1));
+    let driver: &Driver = Box::leak(Box::new(Driver(registers, signal)));
+    for (number, core) in [(1, 0), (0, 9)] {
+        if let Err(why) = tie(edu, number, driver, core) {
+            kernel::println!("{}", devices::refusal(edu, why));
+        }
+    }
+    let refused = (0..10).find_map(|_| tie(edu, 0, driver, 0).err());
+    refused.map_or(Ok(()), |why| {
+        kernel::println!("{}", devices::refusal(edu, why));
+        Ok(())
+    })
+}
