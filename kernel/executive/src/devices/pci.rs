@@ -194,8 +194,9 @@ impl<'c> Function<'c> {
     ///
     /// # Safety
     ///
-    /// The device is told no address but those of [`DmaMemory`](super::dma::DmaMemory), each with
-    /// a length within it: it writes wherever it is told.
+    /// The device writes wherever it is told. So it is told no address but those of
+    /// [`DmaMemory`](super::dma::DmaMemory), and of memory that the driver owns and leaves alone
+    /// until the device is done with it, each with a length within it.
     pub unsafe fn enable_reach(&self) {
         self.command(command::MEMORY | command::MASTER | command::NO_LINE);
     }

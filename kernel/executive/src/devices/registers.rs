@@ -1,7 +1,7 @@
 //! Registers of a device in memory, uncached.
 //!
 //! **Register invariant**: a [`Registers`] covers pages that are mapped as a device's for good,
-//! and no memory.
+//! and no memory; or memory of a fake device, which is its own for good.
 
 use core::ops::Range;
 
@@ -77,6 +77,15 @@ impl Registers {
     pub fn of(function: &Function<'_>, bar: u8) -> Result<Self, RangeError> {
         let range = function.range(bar).map_err(RangeError::Function)?;
         Self::map(range).ok_or(RangeError::Taken(bar))
+    }
+
+    /// Makes registers of memory, for a fake device.
+    #[doc(hidden)]
+    pub fn over(memory: &'static mut [u64]) -> Self {
+        Self {
+            length: size_of_val(memory) as u64,
+            start: memory.as_mut_ptr().expose_provenance() as u64,
+        }
     }
 
     /// Maps a range, unless there is something else.
