@@ -490,6 +490,28 @@ impl<T> Iterator for Received<'_, T> {
     }
 }
 
+impl<T> Received<'_, T> {
+    /// Has `look` see the bytes of the next packet where they are, with the time at which it was
+    /// whole and whom it is from: nothing is decoded, or copied. `None` if there is no more.
+    ///
+    /// ```
+    /// use fass::shared::Received;
+    ///
+    /// fn longest(mut packets: Received<'_, ()>) -> (usize,) {
+    ///     let lengths = std::iter::from_fn(|| packets.look(|bytes, _time_ns, _from| bytes.len()));
+    ///     (lengths.max().unwrap_or(0),)
+    /// }
+    /// ```
+    pub fn look<R>(
+        &mut self,
+        look: impl FnOnce(&[u8], u64, Option<SocketAddrV4>) -> R,
+    ) -> Option<R> {
+        (self.held.taker).take(self.mark, |packet| {
+            look(packet.buffer.content(), packet.time_ns, packet.peer)
+        })
+    }
+}
+
 impl Sender<'_> {
     /// Sends bytes, when this instance is complete.
     ///

@@ -20,6 +20,7 @@ use executive::run::platform::KERNEL;
 use executive::run::{contexts, edge, execution, record, worker};
 use executive::text::console;
 use front::app::ending::AppError;
+use front::app::endpoint::word_of;
 use front::app::machine::System;
 use front::json;
 use front::report::HeapUsage;
@@ -98,8 +99,9 @@ impl System for BareMachine {
         });
         record::end_run(&run);
         report::tell_left(&run);
-        if let Some(endpoint) = CONNECTED.get() {
+        for endpoint in CONNECTED.iter() {
             front::report::tell_wire(endpoint.end().wire());
+            endpoint.tell();
         }
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
@@ -118,7 +120,13 @@ impl System for BareMachine {
         options: &CommandLine<'static>,
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError> {
-        endpoint::connect(wire, &EndpointWords { options, module })
+        let word = word_of(wire, options)?;
+        let words = EndpointWords {
+            options,
+            module,
+            word,
+        };
+        endpoint::connect(wire, &words)
     }
 
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError> {

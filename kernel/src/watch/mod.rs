@@ -12,6 +12,9 @@ use executive::machine::this_core::Core;
 /// Looks in on the run. In a heartbeat of this core.
 pub(crate) fn beat(core: &Core, now_ns: u64) {
     background::stall::look(core, now_ns);
+    for endpoint in background::endpoint::CONNECTED.iter() {
+        endpoint.beat(core, now_ns);
+    }
     if core.index == 0 {
         background::beat(now_ns);
         panic::beat(now_ns);

@@ -67,6 +67,31 @@ impl Second {
     }
 }
 
+/// A network, and the card in it.
+#[derive(Clone, Debug)]
+pub struct Network {
+    /// QEMU's words for the network, such as `user,hostfwd=udp:127.0.0.1:17007-:5000`.
+    pub words: String,
+    /// QEMU's name of the card.
+    pub card: &'static str,
+    /// The file for its traffic, in the form that Wireshark opens.
+    pub traffic: Option<PathBuf>,
+}
+
+impl Network {
+    /// Returns QEMU's arguments for it.
+    fn arguments(&self) -> Vec<OsString> {
+        let Self { words, card, .. } = self;
+        let mut arguments = vec!["-netdev".into(), format!("{words},id=net").into()];
+        arguments.extend(["-device".into(), format!("{card},netdev=net").into()]);
+        if let Some(path) = &self.traffic {
+            let dump = file_value("filter-dump,id=traffic,netdev=net,file=", path);
+            arguments.extend(["-object".into(), dump]);
+        }
+        arguments
+    }
+}
+
 /// A guest to be started.
 #[derive(Clone, Debug)]
 pub struct Qemu {
@@ -96,6 +121,8 @@ pub struct Qemu {
     pub second: Option<Second>,
     /// QEMU's words for further devices, with blanks between.
     pub devices: String,
+    /// The network; `None`: there is no card.
+    pub network: Option<Network>,
     /// Write the address of each instruction that is executed to [`Running`]'s output.
     pub logs_instructions: bool,
     /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
@@ -119,6 +146,7 @@ impl Default for Qemu {
             stops: false,
             second: None,
             devices: String::new(),
+            network: None,
             logs_instructions: false,
             debugger: None,
         }
@@ -157,6 +185,7 @@ impl Qemu {
         for device in words(&self.devices) {
             arguments.extend(["-device".into(), device]);
         }
+        arguments.extend(self.network.iter().flat_map(Network::arguments));
         // `-S` stops the processor before its first instruction.
         if let Some(device) = &self.debugger {
             arguments.extend(["-S".into(), "-gdb".into(), device.clone()]);

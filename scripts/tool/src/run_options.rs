@@ -68,6 +68,12 @@ options! {
     MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
     /// QEMU's words for devices, with blanks between; on q35.
     DEVICE: Takes::Text("WORDS");
+    /// QEMU's words for a network; on q35.
+    NET: Takes::Text("WORDS");
+    /// Its card.
+    CARD: Takes::OneOf(&["virtio", "e1000e"]), or "virtio";
+    /// The network's traffic, for Wireshark.
+    PCAP: Takes::File("FILE");
     /// The loader.
     BOOT: Takes::OneOf(Loader::NAMES), or "pvh";
     /// The guest's MiB.

@@ -8,7 +8,8 @@ use super::ecam;
 use super::pci::{Function, Message, PciError, Place};
 use super::registers::{RangeError, Registers};
 use crate::machine::interrupt::{self, Interrupted};
-use crate::machine::{clock, this_core, vector};
+use crate::machine::this_core::Core;
+use crate::machine::{clock, local_apic, this_core, vector};
 use crate::run::execution;
 
 /// A driver's answer to its device's message.
@@ -99,11 +100,7 @@ pub fn tie(
     core: u32,
 ) -> Result<Line, LineError> {
     reached(core)?;
-    interrupt::install_devices(device_interrupt);
-    let free = (vector::DEVICE..)
-        .zip(&LINES)
-        .find(|(_, place)| place.set(driver));
-    let (vector, _) = free.ok_or(LineError::NoLine)?;
+    let vector = take(driver)?;
     let mut line = Line {
         place: function.place,
         number,
@@ -118,6 +115,35 @@ pub fn tie(
         line.route(core)?;
     }
     Ok(line)
+}
+
+/// Takes a line for a driver, and returns its vector.
+fn take(driver: &'static dyn DeviceLine) -> Result<u8, LineError> {
+    interrupt::install_devices(device_interrupt);
+    let free = (vector::DEVICE..)
+        .zip(&LINES)
+        .find(|(_, place)| place.set(driver));
+    free.map(|(vector, _)| vector).ok_or(LineError::NoLine)
+}
+
+/// A line whose message a core sends, to itself or another.
+#[derive(Clone, Copy, Debug)]
+pub struct Bell(u8);
+
+impl Bell {
+    /// Ties it to a driver.
+    ///
+    /// # Errors
+    ///
+    /// [`LineError`].
+    pub fn new(driver: &'static dyn DeviceLine) -> Result<Self, LineError> {
+        take(driver).map(Self)
+    }
+
+    /// Has the driver called on a core, as soon as interrupts are enabled there.
+    pub fn ring(self, core: &Core) {
+        local_apic::send(core.apic_id(), self.0);
+    }
 }
 
 /// Returns the local APIC's id of a core, to which a message can be sent.

@@ -32,10 +32,7 @@ pub enum EndpointWord {
 /// # Errors
 ///
 /// [`UsageError`] if it is none of those that are allowed.
-pub fn word_of(
-    wire: &Wire,
-    options: &CommandLine<'_>,
-) -> Result<Option<EndpointWord>, UsageError> {
+pub fn word_of(wire: &Wire, options: &CommandLine<'_>) -> Result<Option<EndpointWord>, UsageError> {
     let key = format!("wire.{}", wire.name());
     let Some(value) = options.text(&key) else {
         return Ok(None);
@@ -84,12 +81,24 @@ mod tests {
             assert_eq!(word_of(&Wire::new("motor"), &options), Ok(None));
         }
         for value in [
-            "", "udp", "udp://", "udp://:", "udp://:0", "udp://:65536", "udp://10.0.0.2",
-            "udp://0.0.0.0:7", "udp://host:7", "tcp://:7", "udp://[::1]:7", "udp://10.0.0.2:0",
+            "",
+            "udp",
+            "udp://",
+            "udp://:",
+            "udp://:0",
+            "udp://:65536",
+            "udp://10.0.0.2",
+            "udp://0.0.0.0:7",
+            "udp://host:7",
+            "tcp://:7",
+            "udp://[::1]:7",
+            "udp://10.0.0.2:0",
         ] {
             let line = format!("wire.radar={value}");
             let options = CommandLine::parse(&line).unwrap();
-            let refused = word_of(&Wire::new("radar"), &options).unwrap_err().to_string();
+            let refused = word_of(&Wire::new("radar"), &options)
+                .unwrap_err()
+                .to_string();
             assert!(refused.starts_with(&format!("`{line}`: allowed are udp://:PORT")));
         }
     }

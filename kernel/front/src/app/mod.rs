@@ -2,5 +2,6 @@
 //! it lets people take part.
 
 pub mod ending;
+pub mod endpoint;
 pub mod machine;
 pub mod terms;

@@ -100,9 +100,6 @@ impl SlicedWork {
 /// Does in core 0's heartbeat what is its own, and a slice if the background does not
 /// come to it.
 pub(crate) fn beat(now_ns: u64) {
-    if let Some(endpoint) = CONNECTED.get() {
-        endpoint.beat(now_ns);
-    }
     stall::beat(now_ns);
     look_for_end();
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
@@ -140,7 +137,7 @@ impl Background {
         let periods = [
             (wishes.console.is_some() || input.is_some()).then_some(shell::PERIOD_NS),
             Some(wishes.status_ns).filter(|&period_ns| period_ns > 0),
-            CONNECTED.get().map(|_| endpoint::PERIOD_NS),
+            (!CONNECTED.is_empty()).then_some(endpoint::PERIOD_NS),
         ];
         let periods = periods.into_iter().flatten();
         heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
@@ -161,9 +158,8 @@ impl Background {
         let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| ByteListener::new(input, wishes.stops));
         watch_for_end(wishes.stops && wishes.console.is_none() && listener.is_none());
-        if let Some(endpoint) = CONNECTED.get() {
-            endpoint.begin_run(clock::now_ns());
-        }
+        let endpoints = CONNECTED.iter();
+        endpoints.for_each(|endpoint| endpoint.begin_run(clock::now_ns()));
         Self {
             heartbeat_before_ns: before_ns,
             progress: RunProgress::new(total),
@@ -181,7 +177,8 @@ impl Background {
         if let Some(listener) = &self.listener {
             listener.step();
         }
-        let has_more = CONNECTED.get().is_some_and(|endpoint| endpoint.step());
+        let steps = CONNECTED.iter().map(|endpoint| endpoint.step());
+        let has_more = steps.fold(false, |has_more, more| has_more | more);
         if !self.is_sliced {
             return has_more;
         }
@@ -192,9 +189,7 @@ impl Background {
     pub(crate) fn end(self) -> bool {
         heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
         stall::stop();
-        if let Some(endpoint) = CONNECTED.get() {
-            endpoint.end_run();
-        }
+        CONNECTED.iter().for_each(|endpoint| endpoint.end_run());
         tell_log(execution::task_set);
         containment::take_last_faults(containment::tell_fault);
         RAN_NS.store(u64::MAX, Ordering::Relaxed);

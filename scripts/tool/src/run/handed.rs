@@ -18,7 +18,7 @@ use crate::files::{self, Named, Temporary};
 use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::proof::observed;
-use crate::qemu::Second;
+use crate::qemu::{Network, Second};
 use crate::recordings;
 use crate::run_options::name;
 use crate::system;
@@ -202,6 +202,22 @@ pub(super) fn second(options: &Parsed) -> Option<Second> {
     (output.is_some() || options.is_given(name::INPUT)).then(|| Second {
         is_live: is_live(options),
         output,
+    })
+}
+
+/// Returns the network, if `--net` is given.
+pub(super) fn network(options: &Parsed) -> Option<Network> {
+    let words = options.text(name::NET)?.into();
+    // Without the program by which a firmware would boot from the network.
+    let card = match options.text(name::CARD) {
+        Some("e1000e") => "e1000e,romfile=",
+        _ => "virtio-net-pci,romfile=",
+    };
+    let traffic = options.path(name::PCAP).map(PathBuf::from);
+    Some(Network {
+        words,
+        card,
+        traffic,
     })
 }
 

@@ -21,7 +21,10 @@ fn needs_pc(options: &Parsed) -> Option<(&'static str, &'static str)> {
     let stick = ("no firmware that boots from a stick", "boot");
     let boots = chosen(options).needs_stick().then_some(stick);
     let device = ("no PCI, which `--device` needs", "device");
-    boots.or(options.is_given(name::DEVICE).then_some(device))
+    let network = ("no PCI, which `--net` needs", "net");
+    boots
+        .or(options.is_given(name::DEVICE).then_some(device))
+        .or(options.is_given(name::NET).then_some(network))
 }
 
 /// Returns the board that the options choose, or what they need.
@@ -49,6 +52,13 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
         return Err(format!(
             "`--machine {microvm}`: it has {lacks}; give --machine q35, or leave --{option} out"
         ));
+    }
+    for option in [name::CARD, name::PCAP] {
+        if options.is_given(option) && !options.is_given(name::NET) {
+            return Err(format!(
+                "`--{option}`: there is no network; give --net WORDS, such as --net user"
+            ));
+        }
     }
     if loader == Loader::Uefi && mode == Some(Mode::Deterministic) {
         return Err(
@@ -126,6 +136,7 @@ mod tests {
             "--boot bios",
             "--boot uefi",
             "--device edu",
+            "--net user",
         ] {
             assert_eq!(board(line), Machine::Q35, "{line}");
         }

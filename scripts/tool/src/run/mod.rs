@@ -252,6 +252,7 @@ fn describe(
         stops: screen::can_stop(options),
         second: handed::second(options),
         devices: options.text(name::DEVICE).unwrap_or_default().into(),
+        network: handed::network(options),
         logs_instructions: false,
         debugger: options.is_given(name::GDB).then(|| "tcp::1234".into()),
     }

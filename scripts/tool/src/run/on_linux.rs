@@ -20,9 +20,12 @@ use crate::qemu::{self, Ending, Mode};
 use crate::run_options::name;
 
 /// Options that concern QEMU, its guest, or the bare-metal kernel alone.
-const FOREIGN: [Name; 7] = [
+const FOREIGN: [Name; 10] = [
     name::BOOT,
     name::DEVICE,
+    name::NET,
+    name::CARD,
+    name::PCAP,
     name::GDB,
     name::LATEST,
     name::MACHINE,

@@ -58,6 +58,11 @@ pub(super) fn of_dag(dag: DagId) -> &'static ClusterState {
     }
 }
 
+/// Returns the number of the first core of a DAG's cluster.
+pub fn first_core_of(dag: DagId) -> u32 {
+    of_dag(dag).core(cluster::FIRST_SEAT)
+}
+
 fn among_several(dag: DagId) -> &'static ClusterState {
     let place = nth(0).execution.lock();
     let task_set = place.as_ref().map(ClusterRun::task_set);

@@ -30,7 +30,7 @@ use sched_dag::{Dag, Journal, TaskSet};
 use crate::machine::context::Parked;
 use crate::machine::this_core;
 pub use cluster::{count as clusters, first_core};
-pub use divided::is_finished;
+pub use divided::{first_core_of, is_finished};
 pub use loans::RunnerLoan;
 use loans::RunnerTable;
 use port::{CoreRunner, SmpPort};

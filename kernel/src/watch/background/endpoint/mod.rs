@@ -4,8 +4,10 @@
 //! [`ENDPOINTS`]. It is reached through these only, so an image whose app connects no wire has no
 //! code for any.
 
+mod network;
 mod script;
 mod serial;
+mod udp;
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -15,16 +17,18 @@ use fass::platform::SetOnce;
 use fass::shared::{DeviceEnd, Wire};
 
 use crate::options::CommandLine;
+use executive::machine::this_core::Core;
 use executive::run::execution;
 use front::app::ending::AppError;
+use front::app::endpoint::EndpointWord;
 
 /// A device that a run serves, besides people.
-pub(crate) trait Endpoint: Sync {
+pub(crate) trait Endpoint: Send + Sync {
     /// Begins a run.
     fn begin_run(&self, _now_ns: u64) {}
 
-    /// Takes what has arrived. In core 0's heartbeat.
-    fn beat(&self, now_ns: u64);
+    /// Takes what has arrived, if it does so on this core. In each core's heartbeat.
+    fn beat(&self, core: &Core, now_ns: u64);
 
     /// Sends some of what is to go, and reports whether there may be more. In the background.
     fn step(&self) -> bool {
@@ -34,6 +38,9 @@ pub(crate) trait Endpoint: Sync {
     /// Ends the run: sends the rest.
     fn end_run(&self) {}
 
+    /// Tells of the run that has ended, besides the wire's counts.
+    fn tell(&self) {}
+
     /// Returns the wire's other end.
     fn end(&self) -> &DeviceEnd;
 }
@@ -42,6 +49,8 @@ pub(crate) trait Endpoint: Sync {
 pub(crate) struct EndpointWords<'a> {
     pub(crate) options: &'a CommandLine<'static>,
     pub(crate) module: &'a Cell<Option<&'static [u8]>>,
+    /// That of the wire, if there is one.
+    pub(crate) word: Option<EndpointWord>,
 }
 
 /// Makes an endpoint of a wire, if the words mean this one.
@@ -54,27 +63,56 @@ type Open = fn(&Wire, &EndpointWords<'_>) -> Opened;
 type Opened = Result<Option<Box<dyn Endpoint>>, AppError>;
 
 /// Every endpoint, in the order in which they are asked. The last one takes any words.
-const ENDPOINTS: &[Open] = &[script::open, serial::open];
+const ENDPOINTS: &[Open] = &[udp::open, script::open, serial::open];
 
-/// The endpoint, if the app has connected a wire.
-pub(crate) static CONNECTED: SetOnce<&'static dyn Endpoint> = SetOnce::new();
+/// The endpoints of the wires that the app has connected.
+pub(crate) static CONNECTED: Chain<Box<dyn Endpoint>> = Chain::new();
 
 /// The time between two looks at a device.
 pub(super) const PERIOD_NS: u64 = 1_000_000;
 
+/// Values for good, to which others are added before the commit.
+pub(crate) struct Chain<T: 'static>(SetOnce<&'static ChainLink<T>>);
+
+struct ChainLink<T: 'static> {
+    value: T,
+    next: Chain<T>,
+}
+
+impl<T: Send + Sync> Chain<T> {
+    const fn new() -> Self {
+        Self(SetOnce::new())
+    }
+
+    /// Adds a value, as the last one.
+    fn add(&self, value: T) {
+        let mut last = self;
+        while let Some(link) = last.0.get() {
+            last = &link.next;
+        }
+        let next = Self::new();
+        last.0.set(Box::leak(Box::new(ChainLink { value, next })));
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &'static T> {
+        let links = core::iter::successors(self.0.get(), |link| link.next.0.get());
+        links.map(|link| &link.value)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.get().is_none()
+    }
+}
+
 /// Connects a wire to the endpoint that the words name.
 pub(crate) fn connect(wire: &Wire, words: &EndpointWords<'_>) -> Result<(), AppError> {
-    let second = || failure(wire, "is a second one; connect one wire, once");
-    // Not even opened: the script would take its bytes off the app's file once more.
-    if CONNECTED.get().is_some() {
-        return Err(second());
-    }
     let mut opened = ENDPOINTS
         .iter()
         .filter_map(|open| open(wire, words).transpose());
-    let endpoint = opened.next().transpose()?;
-    let is_connected = endpoint.is_some_and(|endpoint| CONNECTED.set(Box::leak(endpoint)));
-    is_connected.then_some(()).ok_or_else(second)
+    if let Some(endpoint) = opened.next().transpose()? {
+        CONNECTED.add(endpoint);
+    }
+    Ok(())
 }
 
 /// Returns the other end of a wire, for an endpoint.
@@ -96,31 +134,13 @@ fn arrive(wire: &DeviceEnd, bytes: &[u8], now_ns: u64) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Box, CONNECTED, Cell, CommandLine, DeviceEnd, Endpoint, EndpointWords, Wire};
-
-    struct DeadEnd(DeviceEnd);
-
-    impl Endpoint for DeadEnd {
-        fn beat(&self, _now_ns: u64) {}
-
-        fn end(&self) -> &DeviceEnd {
-            &self.0
-        }
-    }
+    use super::Chain;
 
     #[test]
-    fn a_second_wire_is_refused_as_that_whatever_the_words_say() {
-        let [first, second] = ["first", "second"].map(Wire::new);
-        let end = DeadEnd(DeviceEnd::of(&first).unwrap());
-        assert!(CONNECTED.set(Box::leak(Box::new(end))));
-        let options = CommandLine::parse("input=3").unwrap();
-        let module = Cell::new(Some(&b"own"[..]));
-        let words = EndpointWords {
-            options: &options,
-            module: &module,
-        };
-        let why = super::connect(&second, &words).unwrap_err().to_string();
-        assert_eq!(why, "wire `second` is a second one; connect one wire, once");
-        assert_eq!(module.get(), Some(&b"own"[..]));
+    fn a_chain_has_its_values_in_the_order_in_which_they_were_added() {
+        static CHAIN: Chain<u32> = Chain::new();
+        assert!(CHAIN.is_empty());
+        (0..5).for_each(|value| CHAIN.add(value));
+        assert!(CHAIN.iter().copied().eq(0..5));
     }
 }

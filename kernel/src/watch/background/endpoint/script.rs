@@ -6,6 +6,7 @@
 //! made it, and so what is no entry is its end. What is sent goes by the port.
 
 use alloc::boxed::Box;
+use alloc::format;
 
 use fass::shared::{DeviceEnd, Wire};
 
@@ -13,9 +14,10 @@ use super::serial::SerialEndpoint;
 use super::{Endpoint, EndpointWords, Opened, arrive};
 use crate::options::UsageError;
 use executive::machine::spinlock::SpinLock;
-use executive::machine::this_core;
+use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
+use front::app::endpoint::EndpointWord;
 
 struct ScriptEndpoint {
     port: SerialEndpoint,
@@ -35,7 +37,12 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
     // The script stands behind the app's own bytes.
     let (own, script) = file.split_at(own);
     words.module.set(Some(own).filter(|own| !own.is_empty()));
-    if script.is_empty() {
+    let is_meant = words.word.is_none_or(|word| word == EndpointWord::File);
+    if script.is_empty() || !is_meant {
+        if words.word == Some(EndpointWord::File) {
+            let line = format!("`wire.{}=file` has no file; give --input FILE", wire.name());
+            return Err(UsageError::new(line).into());
+        }
         return Ok(None);
     }
     Ok(Some(Box::new(ScriptEndpoint {
@@ -81,9 +88,9 @@ impl Endpoint for ScriptEndpoint {
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, now_ns);
     }
 
-    fn beat(&self, now_ns: u64) {
+    fn beat(&self, core: &Core, now_ns: u64) {
         // As often as the script has entries.
-        while self.play(now_ns) {}
+        while core.index == 0 && self.play(now_ns) {}
     }
 
     fn step(&self) -> bool {

@@ -14,7 +14,7 @@ use fass::shared::{DeviceEnd, Wire};
 use super::{Endpoint, EndpointWords, Opened, arrive, end_of};
 use crate::options::UsageError;
 use executive::machine::serial::SECOND;
-use executive::machine::this_core;
+use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
 use front::app::ending::AppError;
 
@@ -32,6 +32,9 @@ pub(super) fn open(wire: &Wire, _words: &EndpointWords<'_>) -> Opened {
     Ok(Some(Box::new(SerialEndpoint::new(wire)?)))
 }
 
+/// Whether a wire has the port.
+static IS_TAKEN: AtomicBool = AtomicBool::new(false);
+
 impl SerialEndpoint {
     pub(super) fn new(wire: &Wire) -> Result<Self, AppError> {
         if !SECOND.is_there() {
@@ -39,6 +42,13 @@ impl SerialEndpoint {
             return Err(AppError::Usage(UsageError::new(format!(
                 "wire `{name}` has no device, as there is no second serial port; give --input FILE \
                  or --output FILE"
+            ))));
+        }
+        if IS_TAKEN.swap(true, Ordering::Relaxed) {
+            return Err(AppError::Usage(UsageError::new(format!(
+                "wire `{0}` finds the serial port taken by another wire; connect this one \
+                 elsewhere, such as by `wire.{0}=udp://:5000`",
+                wire.name()
             ))));
         }
         let (end, is_run) = (end_of(wire)?, AtomicBool::new(false));
@@ -52,8 +62,8 @@ impl Endpoint for SerialEndpoint {
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, now_ns);
     }
 
-    fn beat(&self, now_ns: u64) {
-        if !self.is_run.load(Ordering::Relaxed) {
+    fn beat(&self, core: &Core, now_ns: u64) {
+        if core.index > 0 || !self.is_run.load(Ordering::Relaxed) {
             return;
         }
         let mut bytes = [0; FIFO_BYTES];

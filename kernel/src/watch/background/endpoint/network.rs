@@ -1,0 +1,443 @@
+//! The machine's network: its first card, and the interface at which wires hear and send.
+//!
+//! Frames that come are taken in the card's interrupt, on one core: the first one of the cluster
+//! whose DAG the first wire releases. What is sent goes on the core that has completed the instance,
+//! by an interrupt that this core sends itself, so when it has dropped the scheduler's lock.
+//!
+//! # A storm is bounded by law
+//!
+//! An interrupt takes [`Law::most`] frames. Then the card is masked: the next interrupt comes
+//! [`Law::distance_ns`] later, by an alarm of the same core, and takes as many. Meanwhile the card
+//! drops what it has no buffer for, at no cost. So whatever comes, it costs that core at most one
+//! such interrupt in each distance, which bounds are charged.
+//!
+//! # Locks
+//!
+//! The card's two halves have a lock each, so a core that sends waits for one frame to be heard at
+//! most. Neither is held where functions are told: a wait that ends needs the scheduler's.
+
+use alloc::boxed::Box;
+use alloc::format;
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+
+use cards::{Card, Receive, Transmit};
+use executive::devices::lines::{Bell, DeviceLine, Line, tie};
+use executive::devices::{ecam, pci};
+use executive::machine::clock;
+use executive::machine::spinlock::SpinLock;
+use executive::machine::this_core::{self, Core};
+use executive::machine::timer::{self, Alarm};
+use executive::run::execution;
+use fass::platform::{Buffer, SetOnce};
+use fass::shared::Wire;
+use front::app::ending::AppError;
+use front::json;
+use net::{Address, Client, Heard, Interface, Kept, Mac, Peer, Route};
+use sched_dag::DagId;
+
+use super::udp::{Sent, UdpWire};
+use super::{Chain, failure};
+use crate::options::{CommandLine, UsageError};
+
+/// What a storm costs at most.
+#[derive(Clone, Copy)]
+struct Law {
+    /// How many frames are taken, or packets sent, in an interrupt.
+    most: u64,
+    /// The least time from one interrupt to the next, in nanoseconds.
+    distance_ns: u64,
+}
+
+pub(super) struct Network {
+    mac: Mac,
+    pub(super) wires: Chain<UdpWire>,
+    receiver: SpinLock<Box<dyn Receive>>,
+    sender: SpinLock<NetworkSender>,
+    law: Law,
+    /// The core that the card interrupts.
+    core: AtomicU32,
+    /// When the card may interrupt again, if it may not now; else `u64::MAX`.
+    unmask_ns: AtomicU64,
+    is_run: AtomicBool,
+    is_linked: AtomicBool,
+    interrupts: AtomicU64,
+    longest_ns: AtomicU64,
+    /// Datagrams to no wire.
+    unheard: AtomicU64,
+}
+
+/// The sending half, and the interface, whose neighbours both halves need.
+struct NetworkSender {
+    transmitter: Box<dyn Transmit>,
+    interface: Interface<Buffer>,
+    dhcp: Option<Client>,
+    /// For frames of our own: questions, and messages of DHCP.
+    own: Buffer,
+}
+
+static NETWORK: SetOnce<Network> = SetOnce::new();
+static LINE: SetOnce<Line> = SetOnce::new();
+static BELL: SetOnce<Bell> = SetOnce::new();
+
+/// Returns the network, which the first wire opens.
+pub(super) fn open(
+    wire: &Wire,
+    options: &CommandLine<'static>,
+) -> Result<&'static Network, AppError> {
+    if let Some(network) = NETWORK.get() {
+        return Ok(network);
+    }
+    let address = address(options)?;
+    let most = options.number("net_packets", 1..=16, 4)?;
+    let distance_us = options.number("net_us", 10..=1_000_000, 100)?;
+    let space = ecam::configuration().map_err(|why| failure(wire, &format!("finds that {why}")))?;
+    let mut opened = None;
+    pci::find(space, &mut |function| {
+        if opened.is_none() {
+            opened = cards::open(&function).map(|card| (function, card));
+        }
+    });
+    let Some((function, card)) = opened else {
+        let line = "finds no network card that is known, virtio-net or an 82574; give one, in QEMU \
+                    by `--net user`";
+        return Err(failure(wire, line));
+    };
+    let card = card.map_err(|why| AppError::Failure(format!("{why}")))?;
+    let message = card.message;
+    NETWORK.set(Network::new(
+        card,
+        address,
+        Law {
+            most,
+            distance_ns: distance_us * 1_000,
+        },
+    ));
+    let network = NETWORK.get();
+    let network = network.ok_or_else(|| failure(wire, "finds the network being opened"))?;
+    let line_error = |why| AppError::Failure(format!("network card at {} {why}", function.place));
+    BELL.set(Bell::new(&SendLine).map_err(line_error)?);
+    LINE.set(tie(&function, message, &CardLine, 0).map_err(line_error)?);
+    Ok(network)
+}
+
+/// Takes the word for the address: `net=ADDRESS/PREFIX`, with `,GATEWAY` or not, or `dhcp`.
+fn address(options: &CommandLine<'static>) -> Result<Option<Address>, UsageError> {
+    let Some(value) = options.text("net").filter(|value| *value != "dhcp") else {
+        return Ok(None);
+    };
+    let read = || {
+        let (place, gateway) = match value.split_once(',') {
+            Some((place, gateway)) => (place, Some(gateway.parse().ok()?)),
+            None => (value, None),
+        };
+        let (ip, prefix) = place.split_once('/')?;
+        Some(Address {
+            ip: ip.parse().ok()?,
+            prefix: prefix.parse().ok().filter(|prefix| *prefix <= 32)?,
+            gateway,
+        })
+    };
+    read().map(Some).ok_or_else(|| {
+        let allowed = "allowed are dhcp, ADDRESS/PREFIX and ADDRESS/PREFIX,GATEWAY, such as";
+        UsageError::new(format!("`net={value}`: {allowed} 10.0.2.15/24,10.0.2.2"))
+    })
+}
+
+/// Has what is to go sent by this core, behind the completion that it makes.
+pub(super) fn ring() {
+    if let Some(bell) = BELL.get() {
+        bell.ring(this_core::get());
+    }
+}
+
+/// The card's message: frames have come.
+struct CardLine;
+
+/// A core's message to itself: there is something to go.
+struct SendLine;
+
+impl DeviceLine for CardLine {
+    fn interrupt(&self, now_ns: u64) {
+        if let Some(network) = NETWORK.get() {
+            network.receive(now_ns);
+        }
+    }
+}
+
+impl DeviceLine for SendLine {
+    fn interrupt(&self, now_ns: u64) {
+        if let Some(network) = NETWORK.get() {
+            // At the begin of a run there may be frames already.
+            network.unmask(this_core::get(), now_ns);
+            network.send();
+        }
+    }
+}
+
+impl Network {
+    fn new(card: Card, address: Option<Address>, law: Law) -> Self {
+        let room = || Buffer::new(Buffer::LEAST_BYTES);
+        let first = address.unwrap_or(Address::NONE);
+        // Unlikely to be another client's: the time at which this one has booted.
+        let transaction = u32::from_le_bytes(card.mac.0[2..].try_into().unwrap_or_default());
+        let transaction = transaction.wrapping_add(clock::now_ns().to_le_bytes()[2].into());
+        Self {
+            mac: card.mac,
+            wires: Chain::new(),
+            receiver: SpinLock::new(card.receiver),
+            sender: SpinLock::new(NetworkSender {
+                transmitter: card.transmitter,
+                interface: Interface::new(card.mac, first, room),
+                dhcp: address
+                    .is_none()
+                    .then(|| Client::new(card.mac, transaction)),
+                own: room(),
+            }),
+            law,
+            core: AtomicU32::new(0),
+            unmask_ns: AtomicU64::new(u64::MAX),
+            is_run: AtomicBool::new(false),
+            is_linked: AtomicBool::new(false),
+            interrupts: AtomicU64::new(0),
+            longest_ns: AtomicU64::new(0),
+            unheard: AtomicU64::new(0),
+        }
+    }
+
+    /// Begins a run, in which the first wire's packets release that DAG.
+    pub(super) fn begin_run(&self, dag: Option<DagId>) {
+        let core = dag.map_or(0, execution::first_core_of);
+        let routed = LINE.get().map(|line| line.route(core));
+        // A core that messages do not reach leaves the card to core 0.
+        let core = if matches!(routed, Some(Ok(()))) {
+            core
+        } else {
+            0
+        };
+        self.core.store(core, Ordering::Relaxed);
+        self.is_run.store(true, Ordering::Relaxed);
+        // There may be frames already, of which there is no message.
+        self.unmask_ns.store(0, Ordering::Relaxed);
+        if let (Some(bell), Some(core)) = (BELL.get(), this_core::all().get(core as usize)) {
+            bell.ring(core);
+        }
+    }
+
+    /// Ends the run: sends the rest, and hears nothing any more.
+    pub(super) fn end_run(&self) {
+        self.is_run.store(false, Ordering::Relaxed);
+        self.unmask_ns.store(u64::MAX, Ordering::Relaxed);
+        self.receiver.lock().set_interrupt(false);
+        while self.send() {}
+    }
+
+    /// Takes the frames of an interrupt, and masks the card until the next one.
+    fn receive(&self, now_ns: u64) {
+        // One that was on its way when the card was masked.
+        if self.unmask_ns.load(Ordering::Relaxed) != u64::MAX {
+            return;
+        }
+        let until_ns = now_ns.saturating_add(self.law.distance_ns);
+        self.unmask_ns.store(until_ns, Ordering::Relaxed);
+        timer::set_no_later(this_core::get(), Alarm::Heartbeat, until_ns);
+        let mut receiver = self.receiver.lock();
+        receiver.set_interrupt(false);
+        for _ in 0..self.law.most {
+            if !receiver.receive(&mut |frame| self.hear(frame, now_ns)) {
+                break;
+            }
+        }
+        drop(receiver);
+        self.wires.iter().for_each(UdpWire::tell);
+        let took_ns = clock::now_ns().saturating_sub(now_ns);
+        self.longest_ns.fetch_max(took_ns, Ordering::Relaxed);
+        self.interrupts.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Lets the card interrupt this core again, when the distance has passed.
+    fn unmask(&self, core: &Core, now_ns: u64) {
+        let is_ours = core.index == self.core.load(Ordering::Relaxed);
+        let until_ns = self.unmask_ns.load(Ordering::Relaxed);
+        if !is_ours || until_ns == u64::MAX {
+            return;
+        }
+        if now_ns < until_ns {
+            return timer::set_no_later(core, Alarm::Heartbeat, until_ns);
+        }
+        self.unmask_ns.store(u64::MAX, Ordering::Relaxed);
+        let has_frames = self.receiver.lock().set_interrupt(true);
+        if has_frames {
+            self.receive(now_ns);
+        }
+    }
+
+    /// Hears a frame.
+    fn hear(&self, frame: &mut Buffer, now_ns: u64) {
+        let mut sender = self.sender.lock();
+        let start = frame.range().start;
+        match sender.interface.hear(frame.content_mut()) {
+            Heard::Nothing => {}
+            Heard::Answer { length, resolved } => {
+                frame.set_range(start..start + length);
+                // Without room it is lost, as it may be on any way.
+                let _ = sender.transmitter.send(frame);
+                sender.send_kept(resolved);
+            }
+            Heard::Resolved(kept) => sender.send_kept(Some(kept)),
+            Heard::Datagram(datagram) => {
+                let payload = datagram.payload;
+                frame.set_range(start + payload.start..start + payload.end);
+                if datagram.port == Client::PORT {
+                    return sender.hear_server(frame, now_ns);
+                }
+                drop(sender);
+                let mut wires = self.wires.iter();
+                let heard = wires.find(|wire| wire.hears(datagram.port, datagram.from));
+                match heard.filter(|_| self.is_run.load(Ordering::Relaxed)) {
+                    Some(wire) => wire.take(frame, datagram.from, now_ns),
+                    None => _ = self.unheard.fetch_add(1, Ordering::Relaxed),
+                }
+            }
+        }
+    }
+
+    /// Sends what is to go, as much as an interrupt does. Reports whether something has gone.
+    fn send(&self) -> bool {
+        let mut sender = self.sender.lock();
+        let mut left = self.law.most;
+        for wire in self.wires.iter() {
+            while left > 0 && wire.send(|packet, port, to| sender.send(packet, port, to)) {
+                left -= 1;
+            }
+        }
+        let has_gone = left < self.law.most;
+        if has_gone {
+            sender.transmitter.ring();
+        }
+        drop(sender);
+        if has_gone {
+            self.wires.iter().for_each(UdpWire::tell);
+        }
+        has_gone
+    }
+
+    /// Does what is due now and then.
+    pub(super) fn beat(&self, core: &Core, now_ns: u64) {
+        self.unmask(core, now_ns);
+        if core.index > 0 || !self.is_run.load(Ordering::Relaxed) {
+            return;
+        }
+        let is_linked = self.receiver.lock().is_linked();
+        let mut sender = self.sender.lock();
+        sender.ask_server(now_ns);
+        let has_address = !sender.interface.address().ip.is_unspecified();
+        drop(sender);
+        if self
+            .is_linked
+            .swap(is_linked && has_address, Ordering::Relaxed)
+            != (is_linked && has_address)
+        {
+            let wires = self.wires.iter();
+            wires.for_each(|wire| wire.end.set_link(is_linked && has_address));
+        }
+        // What found no room, or no address, and what was more than an interrupt sends.
+        self.send();
+    }
+
+    /// Tells of the run that has ended.
+    pub(super) fn tell(&self) {
+        let dropped = self.receiver.lock().dropped();
+        let sender = self.sender.lock();
+        let (address, counts) = (sender.interface.address(), sender.interface.counts());
+        drop(sender);
+        let longest_ns = self.longest_ns.swap(0, Ordering::Relaxed);
+        let interrupts = self.interrupts.swap(0, Ordering::Relaxed);
+        let unheard = self.unheard.load(Ordering::Relaxed);
+        crate::println!(
+            "network: {} frames came, {} malformed, {} for others, {unheard} to no wire; the longest \
+             of {interrupts} interrupts took {longest_ns} ns",
+            counts.frames,
+            counts.malformed + dropped,
+            counts.foreign
+        );
+        json::emit("network", |line| {
+            line.text("mac", format!("{}", self.mac))
+                .text("address", format!("{}/{}", address.ip, address.prefix))
+                .number("frames", counts.frames)
+                .number("malformed", counts.malformed + dropped)
+                .number("foreign", counts.foreign)
+                .number("arps", counts.arps)
+                .number("echoes", counts.echoes)
+                .number("datagrams", counts.datagrams)
+                .number("unheard", unheard)
+                .number("interrupts", interrupts)
+                .number("most_packets", self.law.most)
+                .number("distance_ns", self.law.distance_ns)
+                .number("longest_ns", longest_ns);
+        });
+    }
+}
+
+impl NetworkSender {
+    /// Sends a packet, which has room for its headers in front.
+    fn send(&mut self, packet: &mut Buffer, port: u16, to: Peer) -> Sent {
+        match self
+            .interface
+            .address_datagram(packet.content_mut(), port, to)
+        {
+            Route::Ready if self.transmitter.send(packet) => Sent::Gone,
+            Route::Ready | Route::None => Sent::Waits,
+            Route::Unresolved(neighbour) => {
+                self.interface.keep(neighbour, packet);
+                let start = Buffer::HEADROOM;
+                let length = self
+                    .interface
+                    .question(&mut self.own.whole()[start..], neighbour);
+                self.own.set_range(start..start + length);
+                let _ = self.transmitter.send(&mut self.own);
+                Sent::Gone
+            }
+        }
+    }
+
+    /// Sends a frame whose neighbour has answered, and what else was sent before.
+    fn send_kept(&mut self, kept: Option<Kept>) {
+        if let Some(kept) = kept {
+            let _ = self.transmitter.send(self.interface.kept(kept));
+        }
+        self.transmitter.ring();
+    }
+
+    /// Sends the message to the server of addresses that is due, if one is.
+    fn ask_server(&mut self, now_ns: u64) {
+        let Some(client) = self
+            .dhcp
+            .as_mut()
+            .filter(|client| client.due_ns() <= now_ns)
+        else {
+            return;
+        };
+        let start = Buffer::HEADROOM;
+        let sent = client.send(now_ns, &mut self.own.whole()[start..]);
+        let lease = client.lease();
+        self.interface
+            .set_address(lease.map_or(Address::NONE, |lease| lease.address));
+        if let Some(length) = sent {
+            let mut own = core::mem::take(&mut self.own);
+            own.set_range(start - net::HEADERS..start + length);
+            let _ = self.send(&mut own, Client::PORT, Client::SERVERS);
+            self.own = own;
+            self.transmitter.ring();
+        }
+    }
+
+    /// Takes a message of a server of addresses.
+    fn hear_server(&mut self, message: &Buffer, now_ns: u64) {
+        if let Some(client) = &mut self.dhcp
+            && client.take(message.content(), now_ns)
+        {
+            let address = client.lease().map_or(Address::NONE, |lease| lease.address);
+            self.interface.set_address(address);
+        }
+    }
+}
