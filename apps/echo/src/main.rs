@@ -1,0 +1,45 @@
+//! Boots into an echo, and says how it went.
+
+#![no_std]
+#![no_main]
+
+extern crate alloc;
+
+use alloc::format;
+use core::time::Duration;
+
+use echo::{build, wire};
+use fass::finish_create_dags;
+use kernel::{AppError, Machine, println};
+
+kernel::entry!(main);
+
+fn main(machine: &Machine) -> Result<(), AppError> {
+    let options = machine.options();
+    // Not by a number of jobs: packets that come together are one job's.
+    let milliseconds = options.number("ms", 0..=86_400_000, 0)?;
+    let distance = Duration::from_micros(options.number("us", 50..=1_000_000, 1_000)?);
+    let wire = wire();
+    machine.connect(&wire)?;
+    machine.offer_clusters()?;
+    options.finish(&["ms", "us", "input", "clusters"])?;
+
+    let dags = build(&wire, distance, milliseconds);
+    machine.spread(&dags);
+    let commit = finish_create_dags(&dags)?;
+    for answer in commit.answers() {
+        println!("{answer}");
+    }
+    let run = machine.run()?;
+    let counts = run.statistics("echo");
+    println!(
+        "echo: {} jobs complete, {} deadlines missed; {} allocations while jobs ran",
+        counts.completed,
+        counts.misses,
+        run.allocations()
+    );
+    match run.violations().count() {
+        0 => Ok(()),
+        count => Err(AppError::Failure(format!("{count} violations"))),
+    }
+}
