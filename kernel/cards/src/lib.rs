@@ -5,7 +5,7 @@
 //! core may receive while another sends. Frames are not copied: their buffers are swapped.
 //!
 //! **Reach invariant**: a card is told the addresses of its rings, which are [DMA
-//! memory](executive::devices::dma), and of [`Buffers`], each with a length within it. A buffer
+//! memory](executive::devices::dma), and of [`Buffers`](half::Buffers), each with a length within it. A buffer
 //! leaves them when the card has said that it is done with it. Those of a driver that is
 //! dropped are never given back.
 //!
@@ -18,6 +18,7 @@
 extern crate alloc;
 
 mod e1000e;
+mod half;
 mod virtio;
 
 #[cfg(test)]
@@ -25,12 +26,14 @@ mod tests;
 
 use alloc::boxed::Box;
 use core::fmt;
-use core::mem::ManuallyDrop;
 
+use executive::devices::dma::DmaMemory;
 use executive::devices::pci::{Function, Place};
 use executive::devices::registers::{RangeError, Registers};
 use fass::platform::Buffer;
 use net::Mac;
+
+use half::{Half, Ring};
 
 /// A card that is ready. It sends no message before it [is told to](Receive::set_interrupt).
 pub struct Card {
@@ -76,8 +79,6 @@ pub trait Transmit: Send {
 /// Why a card cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardError {
-    /// What card it is.
-    pub kind: &'static str,
     /// Where it is.
     pub place: Place,
     /// What is wrong.
@@ -89,22 +90,16 @@ pub struct CardError {
 pub enum Fault {
     /// Its registers cannot be had.
     Range(RangeError),
-    /// It does not offer what its driver needs.
+    /// There is none of this, which its driver needs.
     Lacks(&'static str),
-    /// It does not end its reset.
-    Stuck,
-    /// There is no memory for its rings.
-    NoMemory,
 }
 
 impl fmt::Display for CardError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "network card {} at {} ", self.kind, self.place)?;
+        write!(f, "network card at {} ", self.place)?;
         match self.fault {
             Fault::Range(error) => error.fmt(f),
-            Fault::Lacks(what) => write!(f, "has no {what}; use a card that has"),
-            Fault::Stuck => f.write_str("does not end its reset; turn the machine off and on"),
-            Fault::NoMemory => f.write_str("finds no memory for its rings; give the machine more"),
+            Fault::Lacks(what) => write!(f, "has no {what}"),
         }
     }
 }
@@ -119,18 +114,34 @@ pub fn open(function: &Function<'_>) -> Option<Result<Card, CardError>> {
 }
 
 fn open_by(function: &Function<'_>, map: Map<'_>) -> Option<Result<Card, CardError>> {
-    type Open = fn(&Function<'_>, Map<'_>) -> Result<Card, Fault>;
-    let (kind, open): (_, Open) = match function.id {
-        (0x1af4, 0x1000 | 0x1041) => ("virtio-net", virtio::open),
-        (0x8086, 0x10d3) => ("82574", e1000e::open),
+    let open: fn(&Function<'_>, Map<'_>) -> Result<Card, Fault> = match function.id {
+        (0x1af4, 0x1000 | 0x1041) => virtio::open,
+        (0x8086, 0x10d3) => e1000e::open,
         _ => return None,
     };
-    let place = function.place;
     // Whatever it was told before, it reaches no memory until it has been reset.
     function.enable();
-    let card = open(function, map);
-    Some(card.map_err(|fault| CardError { kind, place, fault }))
+    let place = function.place;
+    Some(open(function, map).map_err(|fault| CardError { place, fault }))
 }
+
+/// Makes a card of its address and its rings.
+fn card<R: Ring>(mac: [u8; 6], [receive, transmit]: [R; 2]) -> Result<Card, Fault> {
+    let is_one = mac[0] & 1 == 0 && mac != [0; 6];
+    let lacks = Fault::Lacks("address of one card; give it one");
+    let mac = is_one.then_some(Mac(mac)).ok_or(lacks)?;
+    let mut receiver = Half::new(receive);
+    receiver.fill_all();
+    Ok(Card {
+        mac,
+        message: MESSAGE,
+        receiver: Box::new(receiver),
+        transmitter: Box::new(Half::new(transmit)),
+    })
+}
+
+/// The message of received frames, of either card.
+const MESSAGE: u16 = 0;
 
 /// Lets a card reach memory, after its reset.
 #[expect(unsafe_code, reason = "the one step that the compiler cannot judge")]
@@ -139,67 +150,21 @@ fn enable_reach(function: &Function<'_>) {
     unsafe { function.enable_reach() };
 }
 
-/// Waits for a card. A read of a register takes a good part of a microsecond.
-fn wait(is_done: impl Fn() -> bool) -> Result<(), Fault> {
-    const READS: u32 = 100_000;
-    let is_done = (0..READS).any(|_| is_done());
-    is_done.then_some(()).ok_or(Fault::Stuck)
+/// Waits for the end of a card's reset. A read of a register takes a good part of a microsecond.
+fn wait(is_reset: impl Fn() -> bool) -> Result<(), Fault> {
+    let lacks = Fault::Lacks("end of its reset; turn the machine off and on");
+    (0..100_000).any(|_| is_reset()).then_some(()).ok_or(lacks)
 }
 
-/// Returns an address, if it is that of one card.
-fn mac(bytes: [u8; 6]) -> Result<Mac, Fault> {
-    let is_one = bytes[0] & 1 == 0 && bytes != [0; 6];
-    is_one.then_some(Mac(bytes)).ok_or(Fault::Lacks("address"))
+/// Allocates a ring.
+fn new_memory() -> Result<DmaMemory, Fault> {
+    let lacks = Fault::Lacks("memory for its rings; give the machine more");
+    DmaMemory::new(4096).ok_or(lacks)
 }
 
-/// Splits an address into the halves in which cards are told it, the lower one first.
-fn halves(address: u64) -> [u32; 2] {
+/// Tells a card an address, by the two registers of its halves.
+fn tell_address(registers: Registers, register: u64, address: u64) {
     let [a, b, c, d, high @ ..] = address.to_le_bytes();
-    [[a, b, c, d], high].map(u32::from_le_bytes)
-}
-
-/// The most descriptors of a ring, and the buffers that are theirs, by their numbers.
-const RING: u16 = 64;
-type Buffers = ManuallyDrop<Box<[Buffer]>>;
-
-fn new_buffers(count: u16) -> Buffers {
-    let new = |_| Buffer::new(Buffer::LEAST_BYTES);
-    ManuallyDrop::new((0..count).map(new).collect())
-}
-
-/// The lengths of frames: of Ethernet's header, of the shortest that is sent, and of the longest.
-const LEAST_FRAME: usize = 14;
-const PADDED_FRAME: usize = 60;
-const MOST_FRAME: usize = 1514;
-
-/// The bytes of a buffer that a card may fill.
-const FILLED: u16 = 2048;
-const _: () = assert!(FILLED as usize == Buffer::LEAST_BYTES);
-
-/// Returns the address of a buffer, if a card may fill it.
-fn filled(buffer: &mut Buffer) -> Option<u64> {
-    let bytes = buffer.whole();
-    let address = bytes.as_mut_ptr().expose_provenance() as u64;
-    (bytes.len() >= Buffer::LEAST_BYTES).then_some(address)
-}
-
-/// Puts zeros before a frame, a header of a card, and after it where it is short. Returns the
-/// address of the header and the whole length; `None`: that is no frame.
-fn framed(buffer: &mut Buffer, header: usize) -> Option<(u64, u16)> {
-    let frame = buffer.range();
-    let start = frame.start.checked_sub(header)?;
-    let end = frame.end.max(frame.start + PADDED_FRAME);
-    let whole = buffer.whole();
-    let is_frame = (LEAST_FRAME..=MOST_FRAME).contains(&frame.len()) && end <= whole.len();
-    let length = u16::try_from(end - start).ok().filter(|_| is_frame)?;
-    whole[start..frame.start].fill(0);
-    whole[frame.end..end].fill(0);
-    let address = whole[start..].as_mut_ptr().expose_provenance() as u64;
-    Some((address, length))
-}
-
-/// Swaps a frame that was told to the card for the free buffer of its descriptor.
-fn exchange(frame: &mut Buffer, free: &mut Buffer) {
-    core::mem::swap(frame, free);
-    frame.set_range(0..0);
+    registers.write32(register, u32::from_le_bytes([a, b, c, d]));
+    registers.write32(register + 4, u32::from_le_bytes(high));
 }
