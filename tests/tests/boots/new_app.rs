@@ -309,3 +309,31 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
     };
     golden.assert_is(&excerpt(shown, &boot(&app), str::to_string));
 }
+
+#[test]
+fn the_driver_of_the_page_answers_by_messages_and_copies_repeat() {
+    let page = page("docs/driver.md");
+    let blocks = blocks(&page);
+    let code = blocks.iter().filter(|block| block.info == "rust");
+    let code: Vec<&str> = code.map(|block| &*block.text).collect();
+    let app = repository("edu");
+    fs::write(app.join("src/main.rs"), code.join("\n")).expect("it is ours");
+    // As the page says, for the linters look at all of the app.
+    fs::remove_file(app.join("examples/edu-linux.rs")).expect("the new app has it");
+    cargo(&app, "clippy --all-targets -- -D warnings");
+
+    let said = cargo(&app, "run --quiet -- --device edu --mode threads");
+    let shown = blocks.iter().find(|block| block.info == "console");
+    let shown = &shown.expect("the commands").text;
+    let shown: Vec<&str> = shown
+        .lines()
+        .filter(|line| !line.starts_with('$'))
+        .collect();
+    assert_eq!(shown.len(), 3);
+    assert!(said.contains(&shown.join("\n")), "{said}");
+
+    let copy = "run --quiet -- --quiet --device edu --mode deterministic --append work=copy";
+    let said = cargo(&app, copy);
+    assert!(said.contains("4: Ok(4)\n5: Ok(5)\n6: Ok(6)\n"), "{said}");
+    assert_eq!(cargo(&app, copy), said);
+}
