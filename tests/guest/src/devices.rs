@@ -44,19 +44,15 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let registers = Registers::of(&edu, 0).map_err(|why| devices::refusal(&edu, why))?;
     // SAFETY: it is told no address.
     unsafe { edu.enable_reach() };
-    for core in 0..this_core::all().len() {
-        let index = u32::try_from(core).unwrap_or(u32::MAX);
-        let came = run_on(machine, &edu, registers, index)?;
+    for (core, came) in (0..).zip(&CAME).take(this_core::all().len()) {
+        let releases = run_on(machine, &edu, registers, core)?;
+        let came = came.swap(0, Ordering::Relaxed);
+        let elsewhere = CAME.iter().map(|count| count.load(Ordering::Relaxed));
         json::emit("devices", |line| {
-            line.number("core", core as u64)
-                .number("came", CAME[core].swap(0, Ordering::Relaxed))
-                .number(
-                    "elsewhere",
-                    CAME.iter()
-                        .map(|count| count.load(Ordering::Relaxed))
-                        .sum::<u64>(),
-                )
-                .number("releases", came)
+            line.number("core", core)
+                .number("came", came)
+                .number("elsewhere", elsewhere.sum::<u64>())
+                .number("releases", releases)
                 .number("timer_interrupts", TIMER.load(Ordering::Relaxed));
         });
     }
