@@ -77,14 +77,14 @@ pub(super) fn open(function: &Function<'_>, map: Map<'_>) -> Result<Card, Fault>
 }
 
 /// Starts a card after its reset.
-fn start(registers: Registers) -> Result<[Queue; 2], Fault> {
+fn start(registers: Registers) -> Result<[LegacyRing; 2], Fault> {
     let control = registers.read32(register::CONTROL);
     registers.write32(register::CONTROL, control | SET_LINK_UP);
     let control = registers.read32(register::EXTENDED_CONTROL);
     registers.write32(register::EXTENDED_CONTROL, control | KEEP_MASK);
     registers.write32(register::MESSAGES, MESSAGE_IS_RECEIVED);
     registers.write32(register::AUTO_CLEAR, RECEIVED);
-    let queue = |first| Queue::new(registers, first);
+    let queue = |first| LegacyRing::new(registers, first);
     let queues = [queue(register::RECEIVE)?, queue(register::TRANSMIT)?];
     registers.write32(register::RECEIVE_CONTROL, RECEIVE_ON);
     registers.write32(register::TRANSMIT_CONTROL, TRANSMIT_ON);
@@ -93,7 +93,7 @@ fn start(registers: Registers) -> Result<[Queue; 2], Fault> {
 
 /// A ring. The card has the descriptors from its head, which it moves, to the tail, which it is
 /// told; where both are the same it has none. So of those that were given it has one less.
-struct Queue {
+struct LegacyRing {
     registers: Registers,
     first: u64,
     memory: DmaMemory,
@@ -102,7 +102,7 @@ struct Queue {
     taken: u16,
 }
 
-impl Queue {
+impl LegacyRing {
     fn new(registers: Registers, first: u64) -> Result<Self, Fault> {
         let memory = new_memory()?;
         tell_address(registers, first, memory.address());
@@ -122,7 +122,7 @@ impl Queue {
     }
 }
 
-impl Ring for Queue {
+impl Ring for LegacyRing {
     const HEADER: usize = 0;
 
     fn free(&self) -> Option<u16> {
@@ -191,14 +191,13 @@ mod tests {
 
     struct Fake {
         registers: Registers,
-        halves: [Half<Queue>; 2],
-        /// The first descriptor that the card has, by half, and all that it has.
+        halves: [Half<LegacyRing>; 2],
+        /// The first descriptor that the card has, by half.
         heads: [u16; 2],
-        owned: Vec<(u16, u64, u32)>,
     }
 
     impl Device for Fake {
-        type Ring = Queue;
+        type Ring = LegacyRing;
         const IS_ORDERED: bool = true;
 
         fn new() -> Self {
@@ -207,16 +206,15 @@ mod tests {
                 registers,
                 halves: start(registers).unwrap().map(Half::new),
                 heads: [0; 2],
-                owned: Vec::new(),
             }
         }
 
-        fn halves(&mut self) -> &mut [Half<Queue>; 2] {
+        fn halves(&mut self) -> &mut [Half<LegacyRing>; 2] {
             &mut self.halves
         }
 
-        fn owned(&mut self, half: usize) -> &[(u16, u64, u32)] {
-            let Queue { first, memory, .. } = &self.halves[half].ring;
+        fn owned(&mut self, half: usize) -> Vec<(u16, u64, u32)> {
+            let LegacyRing { first, memory, .. } = &self.halves[half].ring;
             let tail = self.registers.read32(first + RING_TAIL);
             let ids = (0..RING).map(|id| (self.heads[half] + id) % RING);
             let ids = ids.take_while(|id| u32::from(*id) != tail);
@@ -226,8 +224,7 @@ mod tests {
                 assert!(half == 0 || commands >> 16 == SEND >> 16);
                 (id, memory.read64(place), commands & 0xffff)
             };
-            self.owned = ids.map(describe).collect();
-            &self.owned
+            ids.map(describe).collect()
         }
 
         fn give_back(&mut self, half: usize, id: u16, length: u32) {

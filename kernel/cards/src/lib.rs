@@ -5,9 +5,9 @@
 //! core may receive while another sends. Frames are not copied: their buffers are swapped.
 //!
 //! **Reach invariant**: a card is told the addresses of its rings, which are [DMA
-//! memory](executive::devices::dma), and of [`Buffers`](half::Buffers), each with a length within it. A buffer
-//! leaves them when the card has said that it is done with it. Those of a driver that is
-//! dropped are never given back.
+//! memory](executive::devices::dma), and of the buffers of its halves, each with a length within
+//! it. A buffer leaves these when the card has said that it is done with it. Those of a driver
+//! that is dropped are never given back.
 //!
 //! Nothing that a card says is believed. A length that cannot be costs the frame. A statement
 //! about buffers that cannot be ends the ring: it receives or sends nothing any more. Against a
@@ -79,13 +79,13 @@ pub trait Transmit: Send {
 /// Why a card cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardError {
-    /// Where it is.
+    /// The place of its function.
     pub place: Place,
-    /// What is wrong.
+    /// The fault.
     pub fault: Fault,
 }
 
-/// What is wrong with a card.
+/// A fault of a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// Its registers cannot be had.
@@ -146,7 +146,7 @@ const MESSAGE: u16 = 0;
 /// Lets a card reach memory, after its reset.
 #[expect(unsafe_code, reason = "the one step that the compiler cannot judge")]
 fn enable_reach(function: &Function<'_>) {
-    // SAFETY: it is told nothing but its rings and `Buffers` (reach invariant).
+    // SAFETY: it is told nothing but its rings and the buffers of its halves (reach invariant).
     unsafe { function.enable_reach() };
 }
 

@@ -60,9 +60,11 @@ pub(crate) fn open(words: &Words, map: &dyn Fn(u8) -> Option<Registers>) -> Resu
 fn a_function_that_is_no_known_card_is_left_alone() {
     for id in [0x1001_1af4, 0x1041_8086, 0x100e_8086, 0x10d3_1af4] {
         let words = Words::new(&[(0, id)]);
-        let refused = |function: Function<'_>| assert!(super::open(&function).is_none());
-        find(&words, &mut |function| refused(function));
-        assert_eq!(words.0.borrow()[1], 0);
+        let mut known = 0;
+        find(&words, &mut |function| {
+            known += u32::from(super::open(&function).is_some())
+        });
+        assert_eq!((known, words.0.borrow()[1]), (0, 0));
     }
 }
 
@@ -75,7 +77,7 @@ pub(crate) trait Device: Sized {
     fn new() -> Self;
     fn halves(&mut self) -> &mut [Half<Self::Ring>; 2];
     /// Returns what the card has been told of a half, and may use: number, address and length.
-    fn owned(&mut self, half: usize) -> &[(u16, u64, u32)];
+    fn owned(&mut self, half: usize) -> Vec<(u16, u64, u32)>;
     fn give_back(&mut self, half: usize, id: u16, length: u32);
     /// Returns whether the last call has turned messages off.
     fn is_masked(&self) -> bool;
@@ -185,10 +187,8 @@ impl<D: Device> Traffic<D> {
     }
 
     fn assert_free(&mut self, buffer: u64) {
-        for half in 0..2 {
-            let mut owned = self.card.owned(half).iter();
-            assert!(!owned.any(|(_, address, _)| (buffer..buffer + 2048).contains(address)));
-        }
+        let mut owned = (0..2).flat_map(|half| self.card.owned(half));
+        assert!(!owned.any(|(_, address, _)| (buffer..buffer + 2048).contains(&address)));
     }
 
     fn arrive(&mut self) {
@@ -245,8 +245,8 @@ impl<D: Device> Traffic<D> {
 
     /// Sends a frame that is new, if there is one.
     fn fetch(&mut self) -> Option<Vec<u8>> {
-        let mut owned = self.card.owned(1).iter();
-        let &(id, address, length) = owned.find(|(id, ..)| !self.sent.contains(id))?;
+        let mut owned = self.card.owned(1).into_iter();
+        let (id, address, length) = owned.find(|(id, ..)| !self.sent.contains(id))?;
         self.sent.push(id);
         let whole = &self.card.at(1, address)[..usize::try_from(length).unwrap()];
         let (header, frame) = whole.split_at(D::Ring::HEADER);

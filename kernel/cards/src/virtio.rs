@@ -94,7 +94,7 @@ impl Interface {
     }
 
     /// Starts a card after its reset (3.1.1).
-    fn start(&self) -> Result<[Queue; 2], Fault> {
+    fn start(&self) -> Result<[SplitRing; 2], Fault> {
         let common = self.common;
         common.write8(common::STATUS, DRIVEN);
         for (half, features) in [(0, ADDRESS_AND_LINK), (1, VERSION_1)] {
@@ -113,14 +113,17 @@ impl Interface {
                 "way to do without its features; turn these off",
             ));
         }
-        let queues = [Queue::new(self, 0, MESSAGE)?, Queue::new(self, 1, NONE)?];
+        let queues = [
+            SplitRing::new(self, 0, MESSAGE)?,
+            SplitRing::new(self, 1, NONE)?,
+        ];
         common.write8(common::STATUS, AT_WORK);
         Ok(queues)
     }
 }
 
 /// A ring: number 0 is filled, number 1 is sent.
-struct Queue {
+struct SplitRing {
     memory: DmaMemory,
     /// The descriptors that the card has, a bit each.
     out: u64,
@@ -132,7 +135,7 @@ struct Queue {
     device: Registers,
 }
 
-impl Queue {
+impl SplitRing {
     fn new(interface: &Interface, number: u16, message: u16) -> Result<Self, Fault> {
         let common = interface.common;
         common.write16(common::QUEUE, number);
@@ -177,7 +180,7 @@ impl Queue {
     }
 }
 
-impl Ring for Queue {
+impl Ring for SplitRing {
     const HEADER: usize = 12;
 
     fn free(&self) -> Option<u16> {
@@ -246,7 +249,7 @@ mod tests {
 
     struct Fake {
         device: Registers,
-        halves: [Half<Queue>; 2],
+        halves: [Half<SplitRing>; 2],
         /// How many of those that it was given it has seen, by half, and what it has of them.
         seen: [u16; 2],
         owned: [Vec<(u16, u64, u32)>; 2],
@@ -262,7 +265,7 @@ mod tests {
     }
 
     impl Device for Fake {
-        type Ring = Queue;
+        type Ring = SplitRing;
         const IS_ORDERED: bool = false;
 
         fn new() -> Self {
@@ -285,11 +288,11 @@ mod tests {
             }
         }
 
-        fn halves(&mut self) -> &mut [Half<Queue>; 2] {
+        fn halves(&mut self) -> &mut [Half<SplitRing>; 2] {
             &mut self.halves
         }
 
-        fn owned(&mut self, half: usize) -> &[(u16, u64, u32)] {
+        fn owned(&mut self, half: usize) -> Vec<(u16, u64, u32)> {
             let (seen, memory) = (&mut self.seen[half], &self.halves[half].ring.memory);
             let owned = &mut self.owned[half];
             while *seen != memory.read16(GIVEN + 2) {
@@ -300,7 +303,7 @@ mod tests {
                 assert_eq!(memory.read16(at + 12), [2, 0][half]);
                 *seen = seen.wrapping_add(1);
             }
-            owned
+            owned.clone()
         }
 
         fn give_back(&mut self, half: usize, id: u16, length: u32) {
@@ -334,7 +337,7 @@ mod tests {
 
     /// Has the card say something of a ring. Returns the length that it says, if the descriptor
     /// may be taken back.
-    fn say(queue: &mut Queue, random: &mut Random) -> Option<u32> {
+    fn say(queue: &mut SplitRing, random: &mut Random) -> Option<u32> {
         let out = queue.given.wrapping_sub(queue.taken);
         let any = random.within(0..=u16::MAX);
         let done = random.one_of(&[0, 1, 1, 1, 2, out, out + 1, any]);

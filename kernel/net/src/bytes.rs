@@ -36,21 +36,31 @@ pub(crate) fn put(bytes: &mut [u8], at: usize, what: &[u8]) {
 
 /// Adds bytes to a sum of 16-bit words. An odd last byte is the upper half of a word.
 ///
-/// Words of 32 bits are added, as the sum of their halves has the same remainder.
+/// Words of 64 bits are added in this machine's order: their sum has the same remainder as that of
+/// their quarters, but for the order of two bytes.
 pub(crate) fn sum(bytes: &[u8], before: u64) -> u64 {
-    let (words, rest) = bytes.as_chunks::<4>();
-    let whole = words
-        .iter()
-        .map(|word| u64::from(u32::from_be_bytes(*word)));
-    let mut last = [0; 4];
+    let word = |word: &[u8; 8]| u128::from(u64::from_le_bytes(*word));
+    let (words, rest) = bytes.as_chunks::<8>();
+    let (blocks, words) = words.as_chunks::<4>();
+    let mut last = [0; 8];
     last[..rest.len()].copy_from_slice(rest);
-    before + whole.sum::<u64>() + u64::from(u32::from_be_bytes(last))
+    let mut whole = words.iter().map(word).sum::<u128>() + word(&last);
+    for [a, b, c, d] in blocks {
+        whole += word(a) + word(b) + word(c) + word(d);
+    }
+    before + u64::from(folded(whole).swap_bytes())
 }
 
 /// Returns the check sum of what was added: 0 if it was added with its own right check sum.
 pub(crate) fn check_sum(sum: u64) -> u16 {
-    // Each step adds the upper half to the lower one; a sum of 64 bits is below 2^16 after four.
-    let folded = (0..4).fold(sum, |sum, _| (sum & 0xffff) + (sum >> 16));
-    let [.., high, low] = folded.to_be_bytes();
-    !u16::from_be_bytes([high, low])
+    !folded(sum.into())
+}
+
+/// Adds the words of 16 bits that a number has, and so on, until it is one.
+fn folded(sum: u128) -> u16 {
+    let half = |sum: u128, bits: u32| (sum & ((1 << bits) - 1)) + (sum >> bits);
+    // The halves of 65 bits have 33, and so on.
+    let sum = [64, 32, 16, 16, 16].into_iter().fold(sum, half);
+    let [low, high, ..] = sum.to_le_bytes();
+    u16::from_le_bytes([low, high])
 }
