@@ -133,9 +133,9 @@ impl Ring for LegacyRing {
     fn post(&mut self, id: u16, address: u64, length: u16) {
         let place = DESCRIPTOR * usize::from(id);
         self.memory.write64(place, address);
-        self.memory
-            .write32(place + LENGTH, SEND | u32::from(length));
-        self.memory.write32(place + STATE, 0);
+        // The state, above, becomes 0.
+        let word = u64::from(SEND | u32::from(length));
+        self.memory.write64(place + LENGTH, word);
         self.given = self.given.wrapping_add(1);
     }
 

@@ -43,9 +43,10 @@ const LINK: u64 = 6;
 const DEVICE: u64 = 8;
 
 /// The parts of a ring's page: descriptors, those that the card is given, those that it is done
-/// with. The latter two begin with flags, of which bit 0 is "do not call", and an index.
+/// with. The latter two begin with flags, of which bit 0 is "do not call", and an index; the last
+/// one's elements, behind these, are words of 8 bytes.
 const GIVEN: usize = 16 * RING as usize;
-const DONE: usize = 2048;
+const DONE: usize = 2052;
 
 /// Opens a card.
 pub(super) fn open(function: &Function<'_>, map: Map<'_>) -> Result<Card, Fault> {
@@ -191,9 +192,9 @@ impl Ring for SplitRing {
     fn post(&mut self, id: u16, address: u64, length: u16) {
         let descriptor = 16 * usize::from(id);
         self.memory.write64(descriptor, address);
-        self.memory.write32(descriptor + 8, length.into());
-        let is_filled = u16::from(self.number == 0);
-        self.memory.write16(descriptor + 12, is_filled << 1);
+        let is_filled = u64::from(self.number == 0);
+        let length = u64::from(length) | is_filled << 33;
+        self.memory.write64(descriptor + 8, length);
         self.memory.write16(self.place(GIVEN, 2, self.given), id);
         self.out |= 1 << id;
         self.given = self.given.wrapping_add(1);
@@ -215,14 +216,14 @@ impl Ring for SplitRing {
 
     fn take(&mut self) -> Option<(u16, usize)> {
         fence(Ordering::Acquire);
-        let place = self.place(DONE, 8, self.taken);
-        let (id, end) = (self.memory.read32(place), self.memory.read32(place + 4));
-        let bit = 1_u64.checked_shl(id).unwrap_or(0);
-        // More than it was given, or one that it was not given?
-        if self.done() > self.given.wrapping_sub(self.taken) || self.out & bit == 0 {
+        let element = self.memory.read64(self.place(DONE, 8, self.taken));
+        let (id, end) = (element & 0xffff_ffff, element >> 32);
+        let is_out = id < 64 && self.out >> id & 1 == 1;
+        // One that it was not given, or more than it was given?
+        if !is_out || self.done() > self.given.wrapping_sub(self.taken) {
             return None;
         }
-        self.out ^= bit;
+        self.out ^= 1 << id;
         self.taken = self.taken.wrapping_add(1);
         Some((u16::try_from(id).ok()?, usize::try_from(end).ok()?))
     }
