@@ -11,7 +11,7 @@ use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::report;
-use executive::machine::context::Registers;
+use executive::machine::context::SavedRegisters;
 use executive::machine::fault::CpuException;
 use executive::machine::interrupt::Interrupted;
 use executive::machine::{cpu, interrupt_flag, non_maskable, power, this_core};
@@ -65,7 +65,12 @@ pub(super) fn beat(now_ns: u64) {
     clippy::too_many_lines,
     reason = "the order in which a report is safe, whatever has failed"
 )]
-fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
+fn die(
+    what: &str,
+    message: &dyn Display,
+    place: &dyn Display,
+    registers: Option<&SavedRegisters>,
+) -> ! {
     interrupt_flag::disable();
     let core = this_core::is_ready().then(this_core::get);
     let index = core.map_or(0, |core| core.index);

@@ -122,13 +122,13 @@ options! {
     SERIAL: Takes::File("FILE");
     /// The committed DAGs, for `dot -Tsvg FILE`.
     DOT: Takes::File("FILE");
-    /// Measure, commit with that, and compare; docs/proving.md.
+    /// Measure, commit, and compare; docs/proving.md.
     PROVE in "bounds": Takes::Nothing;
-    /// --prove: per cent that a WCET is above the longest call; 20.
+    /// --prove: per cent above the longest call; 20.
     MARGIN: Takes::Number(0, 1_000);
     /// --prove: measure so many seeds; 1.
     SEEDS: Takes::Number(1, 1_000);
-    /// Commit with WCETs that `recording --observe` has written.
+    /// Commit with WCETs of `recording --observe`.
     WCETS: Takes::File("FILE");
     /// Talk to the kernel, in real time: type `help`.
     CONSOLE in "person": Takes::Nothing;

@@ -20,7 +20,7 @@ const WHY: u64 = 0x24;
 const RAISE: u64 = 0x60;
 const ACKNOWLEDGE: u64 = 0x64;
 
-/// What has come on each of two cores, and messages without a reason.
+/// The messages that have come on each of two cores, and those without a reason.
 static CAME: [AtomicU64; 3] = [const { AtomicU64::new(0) }; 3];
 /// The timer interrupts while the messages came.
 static TIMER: AtomicU64 = AtomicU64::new(0);
@@ -47,11 +47,12 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     for (core, came) in (0..).zip(&CAME).take(this_core::all().len()) {
         let releases = run_on(machine, &edu, registers, core)?;
         let came = came.swap(0, Ordering::Relaxed);
-        let elsewhere = CAME.iter().map(|count| count.load(Ordering::Relaxed));
+        let others = CAME.iter().map(|count| count.load(Ordering::Relaxed));
+        let elsewhere: u64 = others.sum();
         json::emit("devices", |line| {
             line.number("core", core)
                 .number("came", came)
-                .number("elsewhere", elsewhere.sum::<u64>())
+                .number("elsewhere", elsewhere)
                 .number("releases", releases)
                 .number("timer_interrupts", TIMER.load(Ordering::Relaxed));
         });

@@ -104,7 +104,7 @@ pub struct Message {
 
 /// The place of a message in a table in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TableEntry {
+pub struct MessageEntry {
     /// The BAR of the table.
     pub bar: u8,
     /// The entry's place in that range.
@@ -261,7 +261,7 @@ impl<'c> Function<'c> {
     /// # Errors
     ///
     /// [`PciError`].
-    pub fn send(&self, number: u16, message: Message) -> Result<Option<TableEntry>, PciError> {
+    pub fn send(&self, number: u16, message: Message) -> Result<Option<MessageEntry>, PciError> {
         const MSI_X: u8 = 0x11;
         const MSI: u8 = 5;
         if let Some(at) = self.capabilities(MSI_X).next() {
@@ -282,7 +282,7 @@ impl<'c> Function<'c> {
         Ok(None)
     }
 
-    fn table_entry(&self, at: u16, number: u16) -> Result<TableEntry, PciError> {
+    fn table_entry(&self, at: u16, number: u16) -> Result<MessageEntry, PciError> {
         const ON: u32 = 1 << 31;
         const MASKED: u32 = 1 << 30;
         let control = self.read(at);
@@ -296,7 +296,7 @@ impl<'c> Function<'c> {
         }
         // Each entry is masked by itself until it is written.
         self.write(at, control & !MASKED | ON);
-        Ok(TableEntry { bar, offset })
+        Ok(MessageEntry { bar, offset })
     }
 }
 
@@ -458,7 +458,7 @@ mod tests {
             assert_eq!(is_on, message.is_ok());
             message
         };
-        let at = |offset| Ok(Some(TableEntry { bar: 1, offset }));
+        let at = |offset| Ok(Some(MessageEntry { bar: 1, offset }));
         assert_eq!(message(0, 0, 1), at(0));
         assert_eq!(message(2, 0x4002, 0x801), at(0x820));
         assert_eq!(message(255, 0x7ff, 1), at(4080));

@@ -22,7 +22,7 @@ use fass::platform::LockWords;
 #[derive(Debug, Default)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the processor's own names")]
-pub struct Registers {
+pub struct SavedRegisters {
     pub r15: u64,
     pub r14: u64,
     pub r13: u64,
@@ -47,7 +47,7 @@ pub struct Registers {
     pub ss: u64,
 }
 
-impl Registers {
+impl SavedRegisters {
     const INTERRUPTS_ENABLED: u64 = 1 << 9;
 
     /// Reports whether interrupts were enabled where these were pushed.
@@ -56,7 +56,7 @@ impl Registers {
     }
 }
 
-impl fmt::Display for Registers {
+impl fmt::Display for SavedRegisters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let registers = [
             ("rax", self.rax),
@@ -105,14 +105,14 @@ const CONTROL: [(usize, [u8; 8]); 2] = [
 #[repr(C, align(64))]
 struct SaveArea {
     vector_state: [u8; VECTOR_BYTES],
-    registers: Registers,
+    registers: SavedRegisters,
 }
 
 const _: () = {
     // `interrupt.s` relies on each of these.
-    assert!(size_of::<Registers>() == 22 * 8);
+    assert!(size_of::<SavedRegisters>() == 22 * 8);
     assert!(core::mem::offset_of!(SaveArea, registers) == VECTOR_BYTES);
-    assert!((VECTOR_BYTES + size_of::<Registers>()).is_multiple_of(16));
+    assert!((VECTOR_BYTES + size_of::<SavedRegisters>()).is_multiple_of(16));
     // What `xsaveopt64` writes to begins on a multiple of 64.
     assert!(VECTOR_BYTES.is_multiple_of(64));
 };
@@ -165,11 +165,11 @@ unsafe impl Sync for Context {}
 impl Context {
     /// Returns the address where the processor's interrupt frame has to end.
     pub(super) fn frame_end(&self) -> u64 {
-        self.registers() as u64 + size_of::<Registers>() as u64
+        self.registers() as u64 + size_of::<SavedRegisters>() as u64
     }
 
     /// Returns where `interrupt.s` keeps this context's registers.
-    pub(super) fn registers(&self) -> *mut Registers {
+    pub(super) fn registers(&self) -> *mut SavedRegisters {
         self.save_area.get().wrapping_byte_add(VECTOR_BYTES).cast()
     }
 
@@ -264,10 +264,10 @@ impl Parked {
         let save_area = SaveArea {
             vector_state: [0; VECTOR_BYTES],
             // The segments stay these: all code has them.
-            registers: Registers {
+            registers: SavedRegisters {
                 cs: u64::from(super::descriptors::CODE),
                 ss: 0,
-                ..Registers::default()
+                ..SavedRegisters::default()
             },
         };
         let context = Box::leak(Box::new(Context {
@@ -318,7 +318,7 @@ impl Parked {
         // What a function finds in the others means nothing to it.
         registers.rbp = 0;
         registers.rip = entry as *const () as u64;
-        registers.rflags = Registers::INTERRUPTS_ENABLED;
+        registers.rflags = SavedRegisters::INTERRUPTS_ENABLED;
         // As after a call: a function expects the stack to be 8 off.
         registers.rsp = self.0.stack_top - 8;
     }
@@ -340,7 +340,7 @@ impl Parked {
     }
 
     /// Returns where `interrupt.s` keeps the context's registers.
-    pub(super) fn registers(&self) -> *mut Registers {
+    pub(super) fn registers(&self) -> *mut SavedRegisters {
         self.0.registers()
     }
 

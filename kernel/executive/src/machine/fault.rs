@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::context::Registers;
+use super::context::SavedRegisters;
 use super::{cpu, machine_check, this_core};
 
 /// The vector of the non-maskable interrupt: another core's message
@@ -18,7 +18,7 @@ pub struct CpuException<'a> {
     /// Its name, such as `page fault`.
     pub name: &'static str,
     /// The registers at the faulting instruction.
-    pub registers: &'a Registers,
+    pub registers: &'a SavedRegisters,
     /// The address that was accessed, for a page fault.
     pub address: Option<u64>,
 }
@@ -66,7 +66,7 @@ impl fmt::Display for CpuException<'_> {
         if self.registers.vector == MACHINE_CHECK {
             machine_check::write_errors(f)?;
         }
-        let Registers {
+        let SavedRegisters {
             error_code, rsp, ..
         } = self.registers;
         write!(f, ", error code {error_code:#x}, stack {rsp:#x}")
@@ -75,7 +75,7 @@ impl fmt::Display for CpuException<'_> {
 
 impl<'a> CpuException<'a> {
     /// Names the exception that has pushed `registers`.
-    pub(super) fn new(registers: &'a Registers) -> Self {
+    pub(super) fn new(registers: &'a SavedRegisters) -> Self {
         let vector = registers.vector;
         let name = usize::try_from(vector)
             .ok()

@@ -8,7 +8,7 @@ use core::arch::global_asm;
 use core::panic::Location;
 
 use super::abandoned::AbandonedContext;
-use super::context::{Parked, Registers, VECTOR_BYTES};
+use super::context::{Parked, SavedRegisters, VECTOR_BYTES};
 use super::fault::{self, CpuException};
 use super::this_core::Core;
 use super::{
@@ -110,7 +110,7 @@ pub fn load_table() {
 }
 
 /// Handles one interrupt and returns the registers to resume.
-extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
+extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegisters {
     interrupts_off::note_disabled(Location::caller());
     turns::begin_urgent();
     // SAFETY: `interrupt.s` passes the registers of the context that this core
@@ -148,7 +148,7 @@ const LAST_ANSWER: u32 = 8;
 
 /// Handles one exception and returns the registers to resume, or null for those of the code
 /// that was interrupted.
-extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
+extern "C" fn handle_exception(registers: *mut SavedRegisters) -> *mut SavedRegisters {
     // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
     // own stack, where nobody else looks.
     let pushed = unsafe { &*registers };

@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU32, AtomicU64, 
 use alloc::boxed::Box;
 
 use super::accusation::AccusationBox;
-use super::context::{Context, Parked, Registers};
+use super::context::{Context, Parked, SavedRegisters};
 use super::cpu;
 use super::descriptors::{self, TaskState};
 use fass::platform::SetOnce;
@@ -88,7 +88,7 @@ pub struct Core {
     pub wake: AtomicBool,
     /// This core watches `wake`: it needs no interrupt to see it.
     pub(super) watches: AtomicBool,
-    /// What is decided now is followed at the end of the interrupt that is being handled.
+    /// Decisions are followed at the end of the interrupt that is being handled.
     pub follows: AtomicBool,
     /// Its [`TimeSlicePart`] in the turns.
     part: AtomicU8,
@@ -222,7 +222,7 @@ unsafe extern "C" {
 ///
 /// They are those of a context that does not run and that this core has made its own;
 /// interrupts are disabled.
-unsafe fn resume(registers: *mut Registers) -> ! {
+unsafe fn resume(registers: *mut SavedRegisters) -> ! {
     // SAFETY: the caller's condition is what `interrupt.s` asks for.
     unsafe {
         asm!(
