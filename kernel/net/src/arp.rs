@@ -16,13 +16,13 @@ const KINDS: [u8; 6] = [0, 1, 8, 0, 6, 4];
 
 /// A question for an Ethernet address, or the answer.
 #[derive(Clone, Copy)]
-pub(crate) struct Packet {
+pub(crate) struct ArpPacket {
     pub(crate) is_question: bool,
     pub(crate) from: (Mac, Ipv4Addr),
     pub(crate) to: (Mac, Ipv4Addr),
 }
 
-impl Packet {
+impl ArpPacket {
     pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
         (array(bytes, 0)? == KINDS).then_some(())?;
         Some(Self {

@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use crate::arp::{self, Neighbours};
 use crate::bytes::{check_sum, mac_at, put, sum, u16_at};
-use crate::ipv4::{self, Packet};
+use crate::ipv4::{self, Ipv4Packet};
 use crate::{Mac, Peer, udp};
 
 /// The bytes of all headers before a datagram's payload: Ethernet, IPv4, UDP.
@@ -194,7 +194,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
 
     /// Takes an ARP packet; none if it is malformed.
     fn hear_arp(&mut self, frame: &mut [u8]) -> Option<Heard> {
-        let packet = arp::Packet::read(&frame[ipv4::START..])?;
+        let packet = arp::ArpPacket::read(&frame[ipv4::START..])?;
         self.counts.arps += 1;
         let (mac, ip) = packet.from;
         if mac.is_group() || !is_host(ip) {
@@ -206,7 +206,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
             put(self.kept(frame).as_mut(), 0, &mac.0);
         }
         if asks_us {
-            let answer = arp::Packet {
+            let answer = arp::ArpPacket {
                 is_question: false,
                 from: (self.mac, self.address.ip),
                 to: packet.from,
@@ -219,7 +219,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
 
     /// Takes an IPv4 packet; none if it is malformed.
     fn hear_ipv4(&mut self, frame: &mut [u8]) -> Option<Heard> {
-        let packet = Packet::read(frame)?;
+        let packet = Ipv4Packet::read(frame)?;
         let is_ours = packet.to == self.address.ip && !packet.to.is_unspecified();
         let is_for_all = self.address.is_for_all(packet.to);
         match packet.protocol {
@@ -245,7 +245,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Takes an ICMP message, and answers an echo request; none if it is malformed.
-    fn hear_icmp(&mut self, frame: &mut [u8], packet: &Packet) -> Option<Heard> {
+    fn hear_icmp(&mut self, frame: &mut [u8], packet: &Ipv4Packet) -> Option<Heard> {
         let message = &frame[packet.payload.clone()];
         if message.len() < 8 || check_sum(sum(message, 0)) != 0 {
             return None;
@@ -316,7 +316,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
     ///
     /// Panics if the frame is shorter than [`HEADERS`].
     pub fn question(&self, frame: &mut [u8], neighbour: Ipv4Addr) -> usize {
-        let question = arp::Packet {
+        let question = arp::ArpPacket {
             is_question: true,
             from: (self.mac, self.address.ip),
             to: (Mac::default(), neighbour),
@@ -324,7 +324,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
         self.write_arp(frame, Mac::BROADCAST, question)
     }
 
-    fn write_arp(&self, frame: &mut [u8], to: Mac, packet: arp::Packet) -> usize {
+    fn write_arp(&self, frame: &mut [u8], to: Mac, packet: arp::ArpPacket) -> usize {
         self.write_ethernet(frame, to, TYPE_ARP);
         put(frame, ipv4::START, &packet.bytes());
         ipv4::START + arp::LENGTH

@@ -15,7 +15,7 @@ pub(crate) const ICMP: u8 = 1;
 pub(crate) const UDP: u8 = 17;
 
 /// A packet in a frame.
-pub(crate) struct Packet {
+pub(crate) struct Ipv4Packet {
     pub(crate) protocol: u8,
     pub(crate) from: Ipv4Addr,
     pub(crate) to: Ipv4Addr,
@@ -24,7 +24,7 @@ pub(crate) struct Packet {
     pub(crate) payload: Range<usize>,
 }
 
-impl Packet {
+impl Ipv4Packet {
     /// Reads the header, if its lengths and its check sum are right.
     pub(crate) fn read(frame: &[u8]) -> Option<Self> {
         let bytes = frame.get(START..)?;

@@ -4,7 +4,7 @@ use core::net::Ipv4Addr;
 use core::ops::Range;
 
 use crate::bytes::{check_sum, put, sum, u16_at};
-use crate::ipv4::{self, Packet};
+use crate::ipv4::{self, Ipv4Packet};
 
 /// The bytes of the header.
 pub(crate) const LENGTH: usize = 8;
@@ -17,7 +17,7 @@ fn pseudo_header((from, to): (Ipv4Addr, Ipv4Addr), length: u16) -> u64 {
 
 /// Reads a datagram, if its length and its check sum are right: the ports it is from and to, and
 /// the place of its payload in the frame.
-pub(crate) fn read(frame: &[u8], packet: &Packet) -> Option<(u16, u16, Range<usize>)> {
+pub(crate) fn read(frame: &[u8], packet: &Ipv4Packet) -> Option<(u16, u16, Range<usize>)> {
     let bytes = &frame[packet.payload.clone()];
     let length = u16_at(bytes, 4)?;
     let datagram = bytes.get(..usize::from(length))?;

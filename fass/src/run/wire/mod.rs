@@ -389,7 +389,7 @@ pub(crate) struct WireOutput {
     level: PlaceLevel<PacketInPlace>,
     /// The most bytes of a packet.
     most: AtomicUsize,
-    /// What the device does when there is something to go.
+    /// Tells the device that there is something to go.
     ready: SetOnce<fn()>,
     /// Bytes that were shown.
     pub(crate) sent: EventCounter,
@@ -397,7 +397,7 @@ pub(crate) struct WireOutput {
     pub(crate) lost: EventCounter,
 }
 
-/// What the instance has sent that is not complete yet.
+/// The packets of an instance that is not complete yet.
 struct Staging {
     putter: Putter<PacketInPlace>,
     /// How many packets are whole, how many bytes the one behind them has, and all of them.

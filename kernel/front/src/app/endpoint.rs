@@ -14,7 +14,7 @@ use fass::shared::Wire;
 
 use crate::options::{CommandLine, UsageError};
 
-/// What a wire is connected to.
+/// The endpoint that a word names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndpointWord {
     /// The serial port.

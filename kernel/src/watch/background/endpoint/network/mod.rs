@@ -16,6 +16,8 @@
 //! The card's two halves have a lock each, so a core that sends waits for one frame to be heard at
 //! most. Neither is held where functions are told: a wait that ends needs the scheduler's.
 
+mod wire;
+
 use alloc::boxed::Box;
 use alloc::format;
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
@@ -35,11 +37,12 @@ use front::json;
 use net::{Address, Client, Heard, Interface, Kept, Mac, Peer, Route};
 use sched_dag::DagId;
 
-use super::udp::{Sent, UdpWire};
 use super::{Chain, failure};
 use crate::options::{CommandLine, UsageError};
+use wire::Sent;
+pub(super) use wire::UdpWire;
 
-/// What a storm costs at most.
+/// The most that a storm costs.
 #[derive(Clone, Copy)]
 struct Law {
     /// How many frames are taken, or packets sent, in an interrupt.
