@@ -153,17 +153,16 @@ pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: 
     let Some(execution) = place.as_mut() else {
         return;
     };
-    match plan {
-        Some(plan) if plan != execution.signals.plan => return,
-        Some(_) if !execution.signals.has_begun => {
-            return execution.engine.requests.keep(request);
-        }
-        _ => {}
+    if plan.is_some_and(|plan| plan != execution.signals.plan) {
+        return;
     }
     let mut woken = CoreSet::default();
     if execution.parts(&mut woken).1.forward(request) {
         drop(place);
         return woken.wake();
+    }
+    if plan.is_some() && !execution.signals.has_begun {
+        return execution.engine.requests.keep(request);
     }
     let seat = cluster::visit(cluster);
     execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request));

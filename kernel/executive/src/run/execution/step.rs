@@ -27,7 +27,7 @@ use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters};
 use super::loans::RunnerLoan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};
-use super::{ClusterRun, CoreWork, EPOCH_NS, divided};
+use super::{ClusterRun, CoreWork, EPOCH_NS};
 use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
@@ -411,9 +411,10 @@ pub fn raise(plan: u64, dag: DagId) {
 }
 
 /// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
-/// are disabled.
+/// are disabled. One for another cluster is a letter.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
-    status::serve(Some(plan), divided::of_dag(dag), Request::Signal(dag));
+    let cluster = cluster::cluster_of(this_core::get());
+    status::serve(Some(plan), cluster, Request::Signal(dag));
 }
 
 /// Takes the answer to a wait of the plan with a number, from wherever it comes: an instance, an
