@@ -10,7 +10,8 @@
 //! | `drive`, the sink | the speed | a line on the wire |
 //!
 //! It runs every 10 ms, or, released by packets, at most so often. Without a fresh gap the car
-//! stops. The DAG `clock` does nothing but keep the run going. The code here knows no kernel.
+//! stops. The DAG `watch` looks every 10 ms whether the wire has a link, and enters the mode `lost`
+//! without: then the DAG `brake` runs in place of `cruise`. The code here knows no kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -20,7 +21,7 @@ extern crate alloc;
 use core::fmt::Write;
 use core::time::Duration;
 
-use fass::shared::{Received, Sender, Wire};
+use fass::shared::{ModeSwitch, Modes, Received, Sender, Wire};
 use fass::{Dag, SubtaskAttributes, create_dag};
 
 /// The time between two jobs, or the least time.
@@ -48,8 +49,8 @@ fn decode(line: &[u8]) -> Option<i32> {
     gap.parse().ok().filter(|gap| (0..100_000).contains(gap))
 }
 
-/// Builds the DAGs. Those with a period end after `jobs` jobs.
-pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 2] {
+/// Builds the DAGs. The run ends after `jobs` periods.
+pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
     let taking = |name, us| SubtaskAttributes::named(name).wcet(Duration::from_micros(us));
     let cruise = create_dag();
     (cruise.name("cruise").record::<Option<i32>>("gap")).record::<i32>("speed");
@@ -88,12 +89,40 @@ pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 2] {
         .due(PERIOD)
         .register(taking("drive", 100));
 
-    let clock = create_dag();
-    clock
-        .name("clock")
-        .jobs(jobs)
+    let brake = create_dag();
+    brake.name("brake").jobs(jobs).relative_deadline(PERIOD);
+    let mut without = 0_u32;
+    let slow_down = move || {
+        without += 1;
+        fass::log!(Warn, "no link", periods = without);
+    };
+    brake
         .period(PERIOD)
-        .relative_deadline(PERIOD);
-    clock.register_untyped_subtask(|_job| (), taking("tick", 50));
-    [cruise, clock]
+        .source(slow_down)
+        .register(taking("slow_down", 100));
+
+    let modes = Modes::new();
+    let following = modes.mode("following", &[&cruise]);
+    let lost = modes.mode("lost", &[&brake]);
+    let watch = create_dag();
+    watch.name("watch").jobs(jobs).relative_deadline(PERIOD);
+    let mut was_up = true;
+    type Around<'a> = (bool, ModeSwitch<'a>, ModeSwitch<'a>);
+    let look = move |(is_up, mut following, mut lost): Around<'_>| {
+        match (was_up, is_up) {
+            (true, false) => lost.at_once(),
+            (false, true) => following.at_once(),
+            _ => {}
+        }
+        was_up = is_up;
+        (is_up,)
+    };
+    watch
+        .period(PERIOD)
+        .using((wire.link().reading(), following.entering(), lost.entering()))
+        .source(look)
+        .writes(&["link"])
+        .register(taking("look", 50));
+    watch.record::<bool>("link");
+    [cruise, brake, watch]
 }

@@ -53,3 +53,20 @@ fn released_by_packets_it_answers_each_but_not_too_often() {
     assert_eq!(releases, [5, 15, 40]);
     assert_eq!(machine.sent(&wire), b"speed 10\nspeed 20\nspeed 30\n");
 }
+
+#[test]
+fn without_a_link_the_car_brakes_until_there_is_one() {
+    let wire = Wire::new("radar");
+    let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
+    finish_create_dags(&build(&wire, Releases::Period, 12)).expect("it is sound");
+    let run_to = |to| machine.run_for(ms(to));
+    run_to(25);
+    wire.link().set(false).unwrap();
+    run_to(40);
+    wire.link().set(true).unwrap();
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    let jobs = ["cruise", "brake", "watch"].map(|dag| report.statistics(dag).completed);
+    // At 30 ms both have a job: `watch` looks then.
+    assert_eq!(jobs, [8, 4, 12]);
+}
