@@ -128,6 +128,7 @@ pub mod shared {
     //! | [`Device`] | a subtask that asks and waits, and what answers | [`create_device`] |
     //! | [`Lock`]ed data | what else shares no edge | [`Lock::new`] |
     //! | [`Parameter`] | DAGs and people who tune them | [`Parameter::new`] |
+    //! | [`WallClock`] | DAGs and the world's time | [`WallClock::new`] |
     //! | [`Switch`] | a DAG and those that pause and resume it | [`Dag::switching`](crate::Dag::switching) |
     //! | [`Modes`] | groups of DAGs, of which one runs | [`Modes::new`] |
     //! | [`Shutdown`] | all: when the run ends | [`shutting_down`] |
@@ -149,6 +150,7 @@ pub mod shared {
     pub use crate::api::state::{State, StateRead, StateUpdate, StateValue};
     pub use crate::api::uses::{ResettableUses, SubtaskBuilder, Uses};
     pub use crate::api::waiting::TimedOut;
+    pub use crate::api::wall_clock::{UnixTime, WallClock, WallClockUse};
     pub use crate::api::wire::{
         DeviceEnd, Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions,
     };

@@ -29,5 +29,6 @@ pub(crate) mod subtask;
 pub(crate) mod topics;
 pub(crate) mod uses;
 pub(crate) mod waiting;
+pub(crate) mod wall_clock;
 pub(crate) mod wire;
 pub(crate) mod wire_waits;

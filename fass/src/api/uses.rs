@@ -23,6 +23,7 @@
 //! | [`Wire::reading`](crate::shared::Wire::reading) | `WireReader<T>` | a wait |
 //! | [`Wire::writing`](crate::shared::Wire::writing) | `WireWriter` | a wait |
 //! | [`Parameter::reading`](crate::shared::Parameter::reading) | `T` | input |
+//! | [`WallClock::reading`](crate::shared::WallClock::reading) | `UnixTime` | input |
 //! | [`Device::asking`](crate::shared::Device::asking) | `Asker<Q, A>` | a wait |
 //! | [`Lock::entering`](crate::shared::Lock::entering) | `()` | blocking |
 //!
@@ -70,7 +71,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()`, `wire.reading(decode)`, `wire.writing()`, `parameter.reading()`, `device.asking()` and `lock.entering(1)`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()`, `wire.reading(decode)`, `wire.writing()`, `parameter.reading()`, `clock.reading()`, `device.asking()` and `lock.entering(1)`"
 )]
 pub trait Uses: sealed::Sealed {
     /// The argument of the function.

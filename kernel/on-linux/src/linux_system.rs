@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use fass::platform::RunConfig;
 use fass::shared::{Signal, Wire};
@@ -178,6 +178,11 @@ impl System for LinuxSystem {
                 wire.name()
             ))),
         }
+    }
+
+    fn unix_ns() -> Option<u64> {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+        u64::try_from(since_1970.ok()?.as_nanos()).ok()
     }
 
     fn measure_overheads(_margin_percent: u32) -> Result<(), AppError> {

@@ -129,6 +129,10 @@ impl System for BareMachine {
         endpoint::connect(wire, &words)
     }
 
+    fn unix_ns() -> Option<u64> {
+        machine::date::unix_s().map(|seconds| seconds * 1_000_000_000)
+    }
+
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError> {
         calibration::charge(margin_percent)
     }

@@ -1,11 +1,10 @@
 //! Every call that an app's `main` can make of its machine: one source for the machine and Linux.
 
 use alloc::format;
-use alloc::vec;
 use core::time::Duration;
 
-use fass::shared::{Parameter, Wire};
-use fass::{Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::shared::{Parameter, UnixTime, WallClock, Wire};
+use fass::{Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags, now_ns};
 use kernel::{AppError, Machine, println};
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -21,6 +20,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.show_topics();
     let (log, gain) = (Wire::new("log"), Parameter::new("gain", 1_u64, 1..=9));
     machine.connect(&log)?;
+    let clock = WallClock::new();
+    machine.set_clock(&clock)?;
     machine.offer(&[&gain])?;
     let options = machine.options();
     let starts_later = options.number("later", 0..=1, 0)? == 1;
@@ -30,7 +31,10 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let [timed, raised] = &dags;
     timed.name("timed").jobs(20).relative_deadline(PERIOD);
     let named = SubtaskAttributes::named;
-    timed.register_periodic_subtask(|| (), vec![], PERIOD, named("tick"));
+    // No clock is before 2000.
+    let tick = |time: UnixTime| assert!(time.of(now_ns()) > Some(946_684_800_000_000_000));
+    let tick = timed.period(PERIOD).using(clock.reading()).source(tick);
+    tick.register(named("tick"));
     raised.name("raised").relative_deadline(PERIOD);
     let signal = raised.sporadic(PERIOD);
     let read = raised.using((gain.reading(), log.sending()));

@@ -58,6 +58,7 @@ const TESTS: &[(&str, Test)] = &[
     ("large", large::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
+    ("stamped", recorded::stamped),
     ("recorded_long", recorded::long),
     ("scenarios", scenarios::run),
     ("soak", soak::run),

@@ -7,9 +7,10 @@ use core::slice;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
+use fass::shared::{UnixTime, WallClock};
 use fass::{Occupation, OverrunPolicy, SubtaskAttributes};
 use fass::{create_dag, execute_for, finish_create_dags};
-use kernel::{AppError, Machine};
+use kernel::{AppError, Machine, json};
 
 const PERIOD: Duration = Duration::from_millis(20);
 
@@ -63,6 +64,42 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.spread(slice::from_ref(&dag));
     finish_create_dags(&[dag])?;
     machine.run().map(drop)
+}
+
+/// Runs a source that reads the wall clock, and a sink that stamps its start, and says the last stamp.
+pub(crate) fn stamped(machine: &Machine) -> Result<(), AppError> {
+    machine.options().finish(&["test"])?;
+    let clock = WallClock::new();
+    machine.set_clock(&clock)?;
+    let dag = create_dag();
+    dag.name("stamps")
+        .jobs(5)
+        .period(PERIOD)
+        .record::<UnixTime>("time")
+        .record::<u64>("stamp");
+    let read = dag.using(clock.reading()).source(|time: UnixTime| (time,));
+    read.writes(&["time"])
+        .register(SubtaskAttributes::named("read"));
+    let stamp = |(time,): (UnixTime,)| (time.of(fass::now_ns()).unwrap_or(0),);
+    dag.register_subtask(
+        stamp,
+        ["time"],
+        ["stamp"],
+        SubtaskAttributes::named("stamp"),
+    );
+    let (last, shown) = (
+        Arc::new(AtomicU64::new(0)),
+        SubtaskAttributes::named("show"),
+    );
+    let kept = Arc::clone(&last);
+    let keep = move |(stamp,): (u64,)| kept.store(stamp, Ordering::Relaxed);
+    dag.register_sink_subtask(keep, ["stamp"], PERIOD, shown);
+    finish_create_dags(&[dag])?;
+    machine.run()?;
+    json::emit("stamped", |line| {
+        line.number("last_ns", last.load(Ordering::Relaxed));
+    });
+    Ok(())
 }
 
 /// Runs a chain that leaves one core no pause, each link of which is recorded.

@@ -7,7 +7,7 @@ use harness::file::File;
 use harness::{Guest, Members, Said, lawful_runs};
 use recording::{Entry, EntryKind, Recordable, Recording};
 use tool::protocol::Status;
-use tool::{Machine, recordings};
+use tool::{Machine, Outcome, recordings};
 
 /// Returns what the guest has sent to a file.
 fn bytes(file: &File) -> Vec<u8> {
@@ -136,4 +136,23 @@ fn without_a_debug_port_the_record_goes_to_the_console() {
     assert_eq!((recording.lost(), recording.is_cut()), (0, false));
     assert!(recording.count() > 100, "{}", recording.count());
     assert_eq!(lawful_runs(&outcome, u64::MAX).len(), 1);
+}
+
+/// The PC's clock begins with 2000 where instructions are counted, and in the replay ten years later.
+#[test]
+fn unix_time_is_an_input_of_a_run() {
+    let file = File::new("unix-time", "rec");
+    let last_s = |outcome: &Outcome| outcome.line("stamped").number("last_ns") / 1_000_000_000;
+    let stamped = Guest::test("stamped");
+    let recorded = stamped.clone().records(&file.0, 64).succeed();
+    fs::write(&file.0, bytes(&file)).expect("it is our file");
+    assert_eq!(last_s(&recorded), 946_684_800);
+    let later = [("base=2000", "base=2010")];
+    let apart = stamped.clone().altered(&later, "").succeed();
+    assert_eq!(last_s(&apart), 1_262_304_000);
+    let replayed = stamped.altered(&later, "").replays(&file.0).succeed();
+    assert_eq!(last_s(&replayed), 946_684_800);
+    replayed
+        .line("replayed")
+        .has([("compared", 5), ("uncompared", 0)]);
 }

@@ -15,6 +15,7 @@ pub mod clock;
 pub mod context;
 pub mod counted_time;
 pub mod cpu;
+pub mod date;
 pub(crate) mod debug_port;
 pub(crate) mod descriptors;
 pub mod fault;

@@ -13,7 +13,7 @@ use core::time::Duration;
 
 use fass::commit::CoreDivision;
 use fass::platform::{self, RunConfig, call_app};
-use fass::shared::{Signal, Tunable, Wire};
+use fass::shared::{Signal, Tunable, WallClock, Wire};
 use fass::{Dag, Policy, Preemption};
 use sched_dag::engine::Run;
 
@@ -61,6 +61,9 @@ pub trait System: Sized {
         options: &CommandLine<'static>,
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError>;
+
+    /// Returns the Unix time now, in nanoseconds, if the system knows it.
+    fn unix_ns() -> Option<u64>;
 
     /// Measures what it takes itself, and charges that with so many hundredths more.
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError>;
@@ -350,6 +353,32 @@ impl<S: System> Machine<S> {
     /// ```
     pub fn connect(&self, wire: &Wire) -> Result<(), AppError> {
         self.system.connect(wire, &self.options, &self.module)
+    }
+
+    /// Sets a clock of Unix time by the machine's own: that of a PC is right within a second, at best.
+    /// In mode `deterministic` it is set by the first second of 2000, on the guest's clock.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Failure`] if the machine keeps no date.
+    ///
+    /// ```no_run
+    /// fn app(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
+    ///     let clock = fass::shared::WallClock::new();
+    ///     machine.set_clock(&clock)?;
+    ///     machine.options().finish(&[])?;
+    ///     // a source that uses `clock.reading()` stamps what it makes
+    ///     machine.run().map(drop)
+    /// }
+    /// ```
+    pub fn set_clock(&self, clock: &WallClock) -> Result<(), AppError> {
+        let unix_ns = S::unix_ns().ok_or_else(|| {
+            let line = "the machine has no clock that keeps the date; state the time by \
+                        `WallClock::correct`";
+            AppError::Failure(line.into())
+        })?;
+        clock.correct(fass::now_ns(), unix_ns, Duration::ZERO);
+        Ok(())
     }
 
     /// Lets people look at topics at the console: `echo TOPIC` shows values of those that are
