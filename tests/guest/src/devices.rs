@@ -5,8 +5,9 @@ use alloc::format;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
+use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
-use fass::shared::Signal;
+use fass::shared::{Asker, DeviceDriver, Signal, create_device};
 use fass::{Occupation, create_dag, execute_for, finish_create_dags};
 use kernel::devices::{self, DeviceLine, Function, LineError, Registers, tie};
 use kernel::{AppError, Machine, json};
@@ -114,4 +115,50 @@ fn refuse_more(edu: &Function<'_>, registers: Registers) -> Result<(), AppError>
         kernel::println!("{}", devices::refusal(edu, why));
         Ok(())
     })
+}
+
+/// A driver that answers in the interrupt itself.
+struct Answerer(Registers, SpinLock<DeviceDriver<(), u32>>);
+
+impl DeviceLine for Answerer {
+    fn interrupt(&self, _now_ns: u64) {
+        self.0.write32(ACKNOWLEDGE, self.0.read32(WHY));
+        let mut questions = self.1.lock();
+        if let Some((ticket, ())) = questions.question() {
+            let _ = questions.answer(ticket, 7);
+        }
+    }
+}
+
+/// Asks the device, which a question has send a message, on each core in turn.
+pub(crate) fn ask(machine: &Machine) -> Result<(), AppError> {
+    machine.options().finish(&["test"])?;
+    let edu = devices::find(0x1234, 0x11e8)?;
+    let registers = Registers::of(&edu, 0).map_err(|why| devices::refusal(&edu, why))?;
+    // SAFETY: it is told no address.
+    unsafe { edu.enable_reach() };
+    let ms = Duration::from_millis;
+    for (core, _) in (0..).zip(this_core::all()) {
+        let (device, questions) = create_device::<(), u32>("edu");
+        let driver = Box::leak(Box::new(Answerer(registers, SpinLock::new(questions))));
+        tie(&edu, 0, driver, core).map_err(|why| devices::refusal(&edu, why))?;
+        let (starts, asks) = (create_dag(), create_dag());
+        starts.name("starts").relative_deadline(ms(1));
+        device.served_by(&starts.sporadic(Duration::from_micros(20)));
+        let start = move || registers.write32(RAISE, 1);
+        starts.source(start).register(named("start"));
+        asks.name("asks")
+            .jobs(20)
+            .period(ms(1))
+            .relative_deadline(ms(1));
+        let ask = |edu: Asker<(), u32>| async move { assert_eq!(edu.ask(()).await, Ok(7)) };
+        let ask = asks.using(device.asking()).async_source(ask);
+        ask.register(named("ask").wait(Duration::from_micros(500)));
+        finish_create_dags(&[starts, asks])?;
+        let answered = machine.run()?.statistics("asks").completed;
+        json::emit("answered", |line| {
+            line.number("core", core).number("answered", answered);
+        });
+    }
+    Ok(())
 }

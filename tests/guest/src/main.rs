@@ -45,6 +45,7 @@ const TESTS: &[(&str, Test)] = &[
     ("cluster_scale", cluster_scale::run),
     ("delays", delays::run),
     ("devices", devices::run),
+    ("devices_answer", devices::ask),
     ("starved", delays::starved),
     ("events", delays::events),
     ("deaf_alone", |machine| single::deaf(machine, false)),

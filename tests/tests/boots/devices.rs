@@ -35,6 +35,18 @@ fn each_message_of_a_device_takes_one_interrupt_on_its_core() {
 }
 
 #[test]
+fn a_message_ends_a_wait_on_whichever_core_it_comes() {
+    let guest = Guest::test("devices_answer").machine(Machine::Q35).cores(2);
+    let outcome = guest.altered(&[], "-device edu").succeed();
+    let answered = outcome.lines("answered");
+    let answered: Vec<u64> = answered
+        .iter()
+        .map(|line| line.number("answered"))
+        .collect();
+    assert_eq!(answered, [20, 20]);
+}
+
+#[test]
 fn a_machine_without_devices_says_what_it_lacks() {
     let edu = Guest::test("devices");
     for (guest, remedy) in [
