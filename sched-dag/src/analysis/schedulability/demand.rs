@@ -11,7 +11,8 @@
 //! stretch in which the core is busy, every deadline is met. Of these `t` it looks at those that
 //! can be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last one down.
 //!
-//! The time for which long steps keep the core in the stretch (bursts, in `workload`) is added.
+//! The time for which long steps keep the core (bursts, in `workload`) is added: in the stretch, and
+//! in each `t`, as they fall into it.
 //!
 //! The proof is about all DAGs together. Under EDF each of them may delay every other, so what
 //! enters one enters all.
@@ -119,7 +120,6 @@ fn demand(case: &AnalysisInput<'_>) -> Option<(u128, Vec<u128>)> {
             after => busy = after,
         }
     }
-    let lost = bursts.during(busy);
     // The last time before another at which something is due.
     let last_before = |time: u128| {
         let last = all.iter().filter_map(|due| {
@@ -138,11 +138,12 @@ fn demand(case: &AnalysisInput<'_>) -> Option<(u128, Vec<u128>)> {
             let left = time.checked_sub(due.deadline_ns.into());
             left.map_or(0, |left| left / u128::from(due.period_ns) + 1)
         });
-        if demand.saturating_add(blocking(time)).saturating_add(lost) > time {
+        let demand = demand.saturating_add(bursts.during(time));
+        if demand.saturating_add(blocking(time)) > time {
             return None;
         }
-        // From there on no more is due, and no more may block.
-        next = last_before(time.min(demand + most + lost));
+        // From there on no more is due or lost, and no more may block.
+        next = last_before(time.min(demand + most));
     }
     Some((busy, times))
 }
