@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cruise::{Releases, build};
+use fass::commit::Overheads;
 use fass::finish_create_dags;
 use fass::shared::Wire;
 use virtual_time::{Silent, VirtualTime};
@@ -15,6 +16,12 @@ const fn ms(ms: u64) -> Duration {
 fn the_car_follows_fresh_gaps_and_stops_without() {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
+    // What a network card may take of a core.
+    let machine = machine.overheads(Overheads {
+        device_ns: 4_000,
+        device_distance_ns: 100_000,
+        ..Overheads::NONE
+    });
     let dags = build(&wire, Releases::Period, 10);
     let commit = finish_create_dags(&dags).expect("it is sound");
     assert!(

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use drone::{FRAME, Workload};
+use fass::commit::Overheads;
 use fass::shared::Parameter;
 use fass::{Policy, finish_create_dags};
 use virtual_time::{EventKind, Report, VirtualTime};
@@ -16,9 +17,16 @@ const WORKLOAD: Workload = Workload {
     survived: 0,
 };
 
+/// What a network card may take of a core.
+const NETWORK: Overheads = Overheads {
+    device_ns: 4_000,
+    device_distance_ns: 100_000,
+    ..Overheads::NONE
+};
+
 fn machine(cores: u32, policy: Policy) -> VirtualTime {
     let machine = VirtualTime::new().cores(cores).policy(policy);
-    machine.contain_panics()
+    machine.overheads(NETWORK).contain_panics()
 }
 
 /// Commits the DAGs.

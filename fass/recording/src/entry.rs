@@ -313,6 +313,9 @@ crate::recordable! {
         /// The uses of locks: DAG and subtask, the lock, its longest section, if it is stated, and
         /// the most sections of an instance. Since version 8.
         pub locks: Vec<(u32, u32, String, Option<u64>, u32)>,
+        /// The longest interrupt of a device, and the least time from one to the next; 0: there is
+        /// none. Since version 9.
+        pub device_ns: [u64; 2],
     }
 
     /// A DAG of a [`Commit`].

@@ -207,15 +207,19 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 7 it ends before the answers and locks, in version 6 before the pins, and in
-                // version 5 before the waits: all that follows is 0.
+                // In version 8 it ends before the device, in version 7 before the answers and locks, in
+                // version 6 before the pins, and in version 5 before the waits: all that follows is 0.
                 let of_before = |lacks: usize| {
-                    let bytes = [payload, &[0; 28][..lacks]].concat();
+                    let bytes = [payload, &[0; 44][..lacks]].concat();
                     Commit::from_bytes(&bytes).ok()
                 };
                 let commit = Commit::from_bytes(payload);
-                let commit = commit
-                    .or_else(|wrong| [8, 24, 28].into_iter().find_map(of_before).ok_or(wrong));
+                let commit = commit.or_else(|wrong| {
+                    [16, 24, 40, 44]
+                        .into_iter()
+                        .find_map(of_before)
+                        .ok_or(wrong)
+                });
                 commit.map(Chunk::Commit)
             }
             EVENTS => Events::read(payload).map(Chunk::Events),
@@ -253,7 +257,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 8 of recordings, which are those that are read");
+            input.expected("version 1 to 9 of recordings, which are those that are read");
         // A later version may have kinds that this code cannot check; an earlier one only lacks
         // some.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {

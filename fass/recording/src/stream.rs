@@ -33,8 +33,9 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 /// those before 5 no commits, events and times, and no [states](crate::Role::State); those before 6
 /// no [waits](Commit::waits) and no [answers](crate::Role::Answer); those before 7 no
 /// [pins](Commit::pins) and [affinities](Commit::affinities); those before 8 no
-/// [answers](Commit::answers) and [locks](Commit::locks).
-pub const VERSION: u16 = 8;
+/// [answers](Commit::answers) and [locks](Commit::locks); those before 9 no
+/// [device](Commit::device_ns).
+pub const VERSION: u16 = 9;
 
 /// The kinds of frames.
 pub(super) const HEADER: u8 = 1;

@@ -172,6 +172,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
         locks: locks(task_set),
         move_ns: overheads.of_a_move_ns(options.preemption),
         answers: plan.answers.in_words(),
+        device_ns: [overheads.device_ns, overheads.device_distance_ns],
     }
 }
 

@@ -5,8 +5,8 @@
 //! | `policy=static\|edf` | how ready instances are ordered | `static` |
 //! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
-//! | `overheads_ns=S,D,I,R` | what a commit charges: context switch, dispatch, interrupt, and for
-//! each instance that becomes ready | 0,0,0,0 |
+//! | `overheads_ns=S,D,I,R,C,E` | what a commit charges: context switch, dispatch, interrupt, for
+//! each instance that becomes ready, and a device's interrupt each E ns | 0,0,0,0,0,0 |
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
 //! | `keep=N` | the record of the boot is sent, to QEMU's debug port or in lines: commits, events,
 //! times, and what crosses the edge of the run, from a buffer of N KiB; 0: it is not | 0 |

@@ -96,7 +96,7 @@ texts! {
 /// the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let dags = task_set.dags().iter();
-    let all = of_cluster(settings, settings.cores, dags.clone());
+    let all = of_cluster(settings, settings.cores, &mut dags.clone());
     let overhead_ns = all.overheads.of_an_instance_ns(settings.preemption);
     let overhead_ns = overhead_ns.ok_or(TaskError::VolumeOverflow);
     let mut tasks = Vec::with_capacity(task_set.dags().len());

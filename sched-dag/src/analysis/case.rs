@@ -48,10 +48,10 @@ fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
 }
 
 /// Returns the settings for a cluster of so many cores, with these DAGs.
-pub(super) fn of_cluster<'a>(
+pub(super) fn of_cluster(
     settings: &AnalysisSettings,
     cores: u32,
-    dags: impl Iterator<Item = &'a Dag>,
+    dags: &mut dyn Iterator<Item = &Dag>,
 ) -> AnalysisSettings {
     AnalysisSettings {
         cores,

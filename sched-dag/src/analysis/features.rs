@@ -65,6 +65,8 @@ features! {
     OVERHEADS
     /// Steps of the scheduler are long that make much ready.
     BURSTS
+    /// A device interrupts a core.
+    DEVICE
     /// Jobs are released by signals.
     SPORADIC
 }
@@ -134,7 +136,9 @@ impl Features {
         } else {
             Self::CORES
         };
-        let charges = Self::OVERHEADS.if_so(*overheads != Overheads::default());
+        let charges = Self::OVERHEADS
+            .if_so(*overheads != Overheads::default())
+            .and(Self::DEVICE.if_so(overheads.device_ns > 0));
         let sinks = Self::SINK_DEADLINES.if_so(relation.ranks_sinks);
         let both = Self::BURSTS
             .if_so(!bursts.are_none())

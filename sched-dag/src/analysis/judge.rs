@@ -34,7 +34,7 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
         let own: Vec<usize> = own.collect();
         let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
-        let settings = of_cluster(settings, cores, own.iter().map(|&dag| &dags[dag]));
+        let settings = of_cluster(settings, cores, &mut own.iter().map(|&dag| &dags[dag]));
         let first_failing = &mut answer.first_failing;
         with_case(
             dags,

@@ -16,6 +16,9 @@
 //! These are of a step in which few instances become ready. For each one that does, `ready` is
 //! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
 //!
+//! A *device* interrupts one core, and its driver keeps it from interrupting again too soon. An
+//! instance is charged nothing for that: `workload` has that term, too.
+//!
 //! Not covered: timer interrupts, caches refilled after a preemption, bus
 //! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for
 //! the charges, and the step of it that is not proven.
@@ -84,6 +87,11 @@ overheads! {
     /// By how much a step is longer for each instance that becomes ready in it, in
     /// nanoseconds.
     ready_ns = "readiness", segment 0 + 0, move 0;
+    /// The longest interrupt of a device, with all that its core does for it, in nanoseconds; 0:
+    /// there is no device.
+    device_ns = "device interrupt", segment 0 + 0, move 0;
+    /// The least time between the beginnings of two such interrupts, in nanoseconds.
+    device_distance_ns = "device distance", segment 0 + 0, move 0;
 }
 
 /// Where overheads are from.
@@ -156,6 +164,21 @@ impl Overheads {
         }
     }
 
+    /// Returns how long the device's interrupts keep its core at most, within a time.
+    #[must_use]
+    pub const fn of_device_ns(&self, within_ns: u64) -> u64 {
+        match within_ns.checked_div(self.device_distance_ns) {
+            Some(whole) => whole.saturating_add(1).saturating_mul(self.device_ns),
+            None => self.device_ns,
+        }
+    }
+
+    /// Reports whether the device leaves its core some time.
+    #[must_use]
+    pub const fn device_leaves_time(&self) -> bool {
+        self.device_ns == 0 || self.device_ns < self.device_distance_ns
+    }
+
     /// Returns them in a cluster with these DAGs, whose subtasks may enter sections of locks, on a
     /// machine of so many cores in all.
     ///
@@ -164,7 +187,7 @@ impl Overheads {
     /// preempted while it waits for a section, it waits for its turn anew. `docs/proving.md` has the
     /// argument.
     #[must_use]
-    pub fn among<'a>(self, dags: impl Iterator<Item = &'a Dag>, cores: u32) -> Self {
+    pub fn among(self, dags: &mut dyn Iterator<Item = &Dag>, cores: u32) -> Self {
         let (mut longest_ns, mut turn_ns) = (0, 0);
         for of in dags.flat_map(Dag::locks) {
             longest_ns = of.longest_ns.unwrap_or(u64::MAX).max(longest_ns);
@@ -200,6 +223,20 @@ mod tests {
     }
 
     #[test]
+    fn a_device_takes_its_time_and_leaves_some() {
+        let of = |device_ns, device_distance_ns| Overheads {
+            device_ns,
+            device_distance_ns,
+            ..Overheads::NONE
+        };
+        let charged = [0, 99, 100, 250].map(|within_ns| of(4, 100).of_device_ns(within_ns));
+        assert_eq!(charged, [4, 4, 8, 12]);
+        let devices = [(0, 0), (4, 5), (4, 4), (4, 0)];
+        let leave_time = devices.map(|of_device| of(of_device.0, of_device.1).device_leaves_time());
+        assert_eq!(leave_time, [true, true, false, false]);
+    }
+
+    #[test]
     fn what_was_measured_is_charged_with_its_margin() {
         let costs = MeasuredCosts {
             owed_ns: 7,
@@ -207,7 +244,7 @@ mod tests {
             ..MeasuredCosts::default()
         };
         let charged = |margin, at_once| Overheads::measured(&costs, margin, at_once).stated();
-        assert_eq!(charged(0, 0), "0,9,7,0");
-        assert_eq!(charged(50, 10), "0,14,11,2");
+        assert_eq!(charged(0, 0), "0,9,7,0,0,0");
+        assert_eq!(charged(50, 10), "0,14,11,2,0,0");
     }
 }

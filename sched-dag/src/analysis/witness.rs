@@ -9,6 +9,7 @@
 //! machine CORES ORDER OVERHEAD_NS             static: by the numbers of subtasks; edf: by deadlines; any
 //! bursts READY_NS LATE                        only if it takes time to make instances ready
 //! moves MOVE_NS                               likewise to move them, where subtasks are pinned
+//! device DEVICE_NS DISTANCE_NS                only if one interrupts a core
 //! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! queue WAITING                               of `bursts`, the most releases that wait for room: none, or
@@ -64,6 +65,7 @@ use alloc::vec::Vec;
 use super::AnalysisSettings;
 use super::case::{AnalysisInput, of_cluster, with_case};
 use super::cover::{heaviest, peel};
+use super::overheads::Overheads;
 use super::ranks::InstanceOrder;
 use super::schedulability::{write_certificates, write_terms};
 use super::witness_text::WitnessText;
@@ -82,7 +84,7 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let place = task_set.is_divided().then_some(cluster);
         let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
         let dags = task_set.part(cluster);
-        let settings = of_cluster(settings, cores, dags.iter());
+        let settings = of_cluster(settings, cores, &mut dags.iter());
         whole(&dags, place, &settings)
     });
     parts.collect()
@@ -149,6 +151,14 @@ impl WitnessText {
         }
         if case.is_pinned() && bursts.move_ns > 0 {
             self.line(format_args!("moves {}", bursts.move_ns));
+        }
+        let Overheads {
+            device_ns,
+            device_distance_ns,
+            ..
+        } = settings.overheads;
+        if device_ns > 0 {
+            self.line(format_args!("device {device_ns} {device_distance_ns}"));
         }
         if let Some((cluster, clusters)) = place {
             self.line(format_args!("cluster {cluster} {clusters}"));

@@ -59,6 +59,12 @@
 //!
 //! In the equations all cores are busy for so long. The workloads of the DAGs do not grow by
 //! it.
+//!
+//! A *device* has a burst as well: its interrupt keeps one core for `C` at most, and the next one
+//! begins `d` later or more, so `T = d`, `carry = 0` and the burst is `C`. Whatever stands still
+//! meanwhile may be of any core: an instance, a section and its turn, a release, the scheduler's
+//! step. All that the other terms say holds in the rest of the window. With `C >= d` no equation
+//! has a solution.
 
 use alloc::vec::Vec;
 
@@ -320,11 +326,12 @@ impl WorkloadBursts {
         dags: impl Iterator<Item = (&'a Dag, bool)>,
         settings: &AnalysisSettings,
     ) -> Self {
+        let overheads = &settings.overheads;
         let mut bursts = Self {
-            move_ns: settings.overheads.of_a_move_ns(settings.preemption),
+            move_ns: overheads.of_a_move_ns(settings.preemption),
             ..Self::default()
         };
-        let ready_ns = u128::from(settings.overheads.ready_ns);
+        let ready_ns = u128::from(overheads.ready_ns);
         for (place, (dag, falls_behind)) in dags.filter(|_| ready_ns > 0).enumerate() {
             let ids = (0..).map(SubtaskId).take(dag.subtasks().len());
             let beyond = ids.map(|id| dag.successors(id).len().saturating_sub(WIDE));
@@ -348,11 +355,15 @@ impl WorkloadBursts {
                 bursts.add(period, carry, count as u128 * ready_ns);
             }
         }
-        let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption);
+        let has_long_steps = !bursts.repeated.is_empty();
+        // Without a distance there is no end to it, as with the least one.
+        let distance_ns = overheads.device_distance_ns.max(1);
+        bursts.add(distance_ns.into(), 0, overheads.device_ns.into());
+        let charge_ns = overheads.of_an_instance_ns(settings.preemption);
         let late_ns = charge_ns.and_then(|charge_ns| bursts.after(charge_ns));
         // If lateness has no end, each window counts as full of bursts, and nothing is proven.
         bursts.late_ns = match late_ns.filter(|_| bursts.endless.is_none()) {
-            _ if bursts.are_none() => 0,
+            _ if !has_long_steps => 0,
             late_ns => late_ns.unwrap_or(u64::MAX),
         };
         bursts
@@ -368,8 +379,9 @@ impl WorkloadBursts {
         }
     }
 
-    pub(super) fn are_none(&self) -> bool {
-        self.repeated.is_empty()
+    /// Reports whether no step is long.
+    pub(super) const fn are_none(&self) -> bool {
+        self.late_ns == 0
     }
 
     /// Returns `E` of a window.

@@ -247,6 +247,11 @@ fn what_is_wrong_is_said_by_the_guest_with_its_line() {
         ),
         (
             GOOD,
+            "overheads_ns=0,0,0,0,4000,0",
+            "`overheads_ns` has a device interrupt as long as its distance, which leaves a core no time",
+        ),
+        (
+            GOOD,
             "overheads_margin=5",
             "add `overheads=measured`, or leave it out",
         ),

@@ -50,6 +50,7 @@ fn commit() -> Commit {
         move_ns: 7,
         answers: vec!["dag `fast` takes at most 7ns".into()],
         locks: vec![(0, 1, "seen".into(), Some(9), 2)],
+        device_ns: [4, 100],
         ..Commit::default()
     }
 }
@@ -234,7 +235,7 @@ fn foreign_and_newer_files_are_told() {
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
     assert_eq!(
         said(&of_version(VERSION + 1, &recording())),
-        "at byte 8: expected version 1 to 8 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 9 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);
@@ -293,13 +294,17 @@ fn a_recording_of_the_version_before_is_read() {
 }
 
 #[test]
-fn a_commit_of_a_version_before_has_no_waits_pins_or_answers() {
+fn a_commit_of_a_version_before_has_no_waits_pins_answers_or_device() {
     let commit = Commit {
         cores: 2,
         ..Commit::default()
     };
-    // Versions 5, 6 and 7 end it before the numbers of these, and no version elsewhere.
-    for (lacks, is_one) in [(28, true), (24, true), (8, true), (12, false), (17, false)] {
+    // Versions 5 to 8 end it before the numbers of these, and no version elsewhere.
+    let are_one = [44, 40, 24, 16].map(|lacks| (lacks, true));
+    for (lacks, is_one) in are_one
+        .into_iter()
+        .chain([(8, false), (28, false), (33, false)])
+    {
         let mut bytes = Stream::begin(Vec::new()).end();
         let end = bytes.split_off(10);
         let payload = to_bytes(&commit);

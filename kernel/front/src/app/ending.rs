@@ -353,7 +353,8 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
     };
     for (dag, model) in (0..).map(DagId).zip(set.dags()) {
         let shares = |other: &&Dag| other.cluster() == model.cluster();
-        let overheads = overheads.among(set.dags().iter().filter(shares), run.options().cores);
+        let mut here = set.dags().iter().filter(shares);
+        let overheads = overheads.among(&mut here, run.options().cores);
         let overhead_ns = overheads.of_an_instance_ns(run.options().preemption);
         for (subtask, of_subtask) in (0..).map(SubtaskId).zip(model.subtasks()) {
             let Some(wcet_ns) = of_subtask.wcet_ns() else {
@@ -363,10 +364,11 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
             let counted = counts.subtask(set.vertex(Instance { dag, job, subtask }));
             let times = counted.execution_time.distribution();
             let (calls, longest_ns) = (times.count(), times.max());
+            let without_device_ns = longest_ns.saturating_sub(overheads.of_device_ns(longest_ns));
             // What does not fit into 64 bits is charged as well, and no call takes longer.
             let charged_ns =
                 overhead_ns.and_then(|of_segment_ns| of_subtask.charged_ns(of_segment_ns));
-            if charged_ns.is_none_or(|charged_ns| longest_ns <= charged_ns) {
+            if charged_ns.is_none_or(|charged_ns| without_device_ns <= charged_ns) {
                 continue;
             }
             crate::println!(

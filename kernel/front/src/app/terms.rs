@@ -100,5 +100,12 @@ fn overheads(options: &CommandLine<'_>) -> Result<Overheads, UsageError> {
             )));
         }
     }
-    Ok(Overheads::of_terms_ns(terms_ns))
+    let overheads = Overheads::of_terms_ns(terms_ns);
+    if !overheads.device_leaves_time() {
+        return Err(UsageError::new(
+            "`overheads_ns` has a device interrupt as long as its distance, which leaves a core no \
+             time; state a longer distance",
+        ));
+    }
+    Ok(overheads)
 }

@@ -11,8 +11,8 @@
 //! stretch in which the core is busy, every deadline is met. Of these `t` it looks at those that
 //! can be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last one down.
 //!
-//! The time for which long steps keep the core (bursts, in `workload`) is added: in the stretch, and
-//! in each `t`, as they fall into it.
+//! The time for which long steps keep the core and a device's interrupts keep the core (bursts, in
+//! `workload`) is added: in the stretch, and in each `t`, as they fall into it.
 //!
 //! The proof is about all DAGs together. Under EDF each of them may delay every other, so what
 //! enters one enters all.
@@ -35,7 +35,7 @@ pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::Demand],
     covers: covers!(
         BY_DEADLINE ONE_CORE PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES LATE_DEADLINES OVERHEADS
-        BURSTS SPORADIC
+        BURSTS DEVICE SPORADIC
     ),
     jobs,
     sinks,

@@ -32,7 +32,7 @@ pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::Owner, SchedulabilityTest::Member],
     covers: covers!(
         RANKED BY_DEADLINE ANY_ORDER ONE_CORE CORES PREEMPTION SINK_DEADLINES INTERLEAVED PINS
-        OVERHEADS BURSTS SPORADIC
+        OVERHEADS BURSTS DEVICE SPORADIC
     ),
     jobs,
     sinks,

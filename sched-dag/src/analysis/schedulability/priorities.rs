@@ -11,7 +11,7 @@ use crate::order::sorted_by_key;
 pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::IntraTask],
     covers: covers!(
-        RANKED CORES PREEMPTION INTERLEAVED LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
+        RANKED CORES PREEMPTION INTERLEAVED LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS DEVICE SPORADIC
     ),
     jobs,
     ..BoundTest::NONE
@@ -48,7 +48,7 @@ fn by_priorities(case: &AnalysisInput<'_>, dag: usize) -> Option<u64> {
     let others = multi_path::alone(task, &case.set.shapes[dag].left, cores, Rounding::Up)?;
     let limit = task.relative_deadline_ns().min(task.period_ns());
     let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
-    // Long steps of the scheduler are in no equation of this test, so they are added to it.
+    // Long steps and a device's interrupts are in no equation of this test, so they are added to it.
     let bound = bound.and_then(|bound_ns| case.set.bursts.after(bound_ns));
     bound.filter(|&bound_ns| bound_ns <= limit)
 }

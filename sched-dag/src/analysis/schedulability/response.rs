@@ -19,7 +19,8 @@
 //! is no carry-in: at the stretch's begin nothing is pending. Where S is no more than what may
 //! outrank the DAG itself, and nothing blocks, all releases at once take that long.
 //!
-//! The time for which long steps keep the core in the stretch (bursts, in `workload`) is added.
+//! The time for which long steps and a device's interrupts keep the core in the stretch (bursts, in
+//! `workload`) is added.
 //!
 //! Assumes: releases at least `T` apart; WCETs above 0. The order of equal priorities is fixed.
 //! A subtask that is never preempted counts as if others preempted it, too.
@@ -39,7 +40,7 @@ pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::OneCore],
     covers: covers!(
         RANKED ONE_CORE PREEMPTION ALL_KEEP SOME_KEEP INTERLEAVED LATE_DEADLINES FEW_IN_FLIGHT
-        OVERHEADS BURSTS SPORADIC
+        OVERHEADS BURSTS DEVICE SPORADIC
     ),
     jobs,
     ..BoundTest::NONE

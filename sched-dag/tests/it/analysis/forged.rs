@@ -142,7 +142,7 @@ fn ranks(text: &str) -> impl Fn(&str) -> u32 {
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
 fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let (rank, mut dags) = (ranks(text), Vec::<DagSpec>::new());
-    let (mut machine, mut ready_ns, mut move_ns) = ((0, Policy::Edf, 0), 0, 0);
+    let (mut machine, mut overheads) = ((0, Policy::Edf), Overheads::default());
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
@@ -152,10 +152,15 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
             ("machine", _) => {
                 // `any` is the word of no policy, but the order of most.
                 let policy = Policy::of_word(words[2]).unwrap_or(Policy::Fifo);
-                machine = (small(1), policy, number(3));
+                machine = (small(1), policy);
+                overheads.dispatch_ns = number(3);
             }
-            ("bursts", _) => ready_ns = number(1),
-            ("moves", _) => move_ns = number(1),
+            ("bursts", _) => overheads.ready_ns = number(1),
+            ("moves", _) => overheads.interrupt_ns = number(1),
+            ("device", _) => {
+                overheads.device_ns = number(1);
+                overheads.device_distance_ns = number(2);
+            }
             ("queue", Some(dag)) if number(1) == 0 => dag.overrun = OverrunPolicy::Skip,
             ("queue", Some(dag)) => dag.overrun = OverrunPolicy::Abort,
             ("dag", _) => dags.push(DagSpec {
@@ -196,11 +201,8 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     // Only a shared state makes a sink precede another subtask.
     let task_set = sample.task_set()?;
     let mut settings = sample.settings();
-    settings.overheads = Overheads {
-        dispatch_ns: machine.2 - move_ns,
-        interrupt_ns: move_ns,
-        ready_ns,
-        ..Overheads::default()
-    };
+    // What a move takes is a part of the charge.
+    overheads.dispatch_ns -= overheads.interrupt_ns;
+    settings.overheads = overheads;
     Some((task_set, settings))
 }

@@ -13,6 +13,7 @@ mod waits;
 mod witnesses;
 mod worked;
 
+use ::random::Random;
 use sched_dag::analysis::{
     AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError,
     answer, fix_orders,
@@ -22,6 +23,7 @@ use sched_dag::{
     Policy, Preemption, SubtaskId, SubtaskOrder, verify,
 };
 
+use self::random::sample_with;
 use simulate::{commit, responses, spec};
 
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
@@ -234,6 +236,92 @@ fn overheads_beside_pinned_subtasks_count_in_each_bound() {
     assert_eq!(both(&member, 0, 0), [3, 5 + 3].map(Some));
     // Releases are 2 late, and so is the owner: at 12 it may come for the second time in 14.
     assert_eq!(both(&member, 1, 0), [3 + 2, 5 + 2 * 3 + 3].map(Some));
+}
+
+/// Returns settings with a device that may keep a core for so long at such a distance.
+fn with_device(of: AnalysisSettings, device_ns: u64, device_distance_ns: u64) -> AnalysisSettings {
+    AnalysisSettings {
+        overheads: Overheads {
+            device_ns,
+            device_distance_ns,
+            ..of.overheads
+        },
+        ..of
+    }
+}
+
+#[test]
+fn a_device_counts_in_each_window_and_is_not_divided_among_cores() {
+    let on = |policy, cores, specs: &[DagSpec], [takes, distance]: [u64; 2]| {
+        let with = with_device(
+            settings((policy, Preemption::Enabled), cores),
+            takes,
+            distance,
+        );
+        bounds(&answered(specs, &with))
+    };
+    let two = [0, 1].map(|priority| spec(100, 100, &[10], &[], priority));
+    // 3 interrupts within 13, and 6 within 26.
+    assert_eq!(on(FP.0, 1, &two, [1, 5]), [Some(13), Some(26)]);
+    assert_eq!(on(FP.0, 2, &two, [1, 5]), [Some(13), Some(19)]);
+    // It comes twice within 340, however long the core is busy with more, and 4 times within 940.
+    let by_demand = [
+        spec(600, 340, &[300], &[], 0),
+        spec(900, 900, &[300], &[], 1),
+    ];
+    let of_demand = |takes| on(Policy::Edf, 1, &by_demand, [takes, 300]);
+    assert_eq!(of_demand(10), [Some(340), Some(900)]);
+    assert_eq!(of_demand(11), [None, None]);
+    // An owner is late by it, and so its member.
+    let mut owned = [spec(20, 20, &[3], &[], 0), spec(40, 40, &[5], &[], 1)];
+    owned[0].subtasks[0].core = Some(0);
+    owned[1].affinity = vec![0];
+    assert_eq!(on(FP.0, 2, &owned, [0, 9]), [Some(3), Some(8)]);
+    assert_eq!(on(FP.0, 2, &owned, [1, 9]), [Some(4), Some(10)]);
+}
+
+#[test]
+fn more_of_a_device_makes_no_bound_shorter_and_too_much_leaves_none() {
+    // With each of these whatever was before is the less.
+    const DEVICES: [[u64; 2]; 7] = [
+        [1, 200],
+        [1, 50],
+        [2, 50],
+        [7, 30],
+        [29, 30],
+        [30, 30],
+        [1, 0],
+    ];
+    let mut proven = [0; DEVICES.len()];
+    for number in 0..2_000 {
+        let sample = sample_with(0, &mut Random::new(number));
+        let Some(task_set) = sample.task_set() else {
+            continue;
+        };
+        let mut before = answer(&task_set, &sample.settings());
+        // Without interrupts their distance says nothing.
+        let none = with_device(sample.settings(), 0, number % 3);
+        assert_eq!(answer(&task_set, &none), before);
+        for ([takes, distance], proven) in DEVICES.into_iter().zip(&mut proven) {
+            let after = answer(&task_set, &with_device(sample.settings(), takes, distance));
+            let all = |of: &AnalysisResult| {
+                let sinks = of.sinks_ns.iter().flatten().copied();
+                let all = bounds(of).into_iter().chain(sinks);
+                all.map(|ns| ns.unwrap_or(u64::MAX)).collect::<Vec<_>>()
+            };
+            let (less, more) = (all(&before), all(&after));
+            let is_more = less.iter().zip(&more).all(|(less, more)| less <= more);
+            assert!(
+                is_more,
+                "{number}, {takes} of {distance}: {sample:?} {before:?} {after:?}"
+            );
+            *proven += after.bounds.iter().flatten().count();
+            before = after;
+        }
+    }
+    let [first, .., most, full, without_distance] = proven;
+    assert!(first > 1_000 && most > 0, "{proven:?}");
+    assert_eq!([full, without_distance], [0, 0]);
 }
 
 #[test]

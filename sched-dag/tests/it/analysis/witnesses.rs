@@ -47,6 +47,10 @@ fn drawn(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
     let mut settings = sample.settings();
     settings.overheads.interrupt_ns = u64::from(number % 4 == 1);
     settings.overheads.ready_ns = u64::from(number % 4 == 2);
+    if number % 4 == 3 || number % 16 == 2 {
+        settings.overheads.device_ns = number % 3 + 1;
+        settings.overheads.device_distance_ns = 20 + number % 7;
+    }
     Some((sample.task_set()?, settings))
 }
 

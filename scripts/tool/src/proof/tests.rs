@@ -193,7 +193,7 @@ fn the_longest_waits_of_a_run_are_what_is_charged() {
     let word = |margin| observed::overheads_word(&measured, margin);
     assert_eq!(
         [word(0), word(50)],
-        ["overheads_ns=0,9,7,0", "overheads_ns=0,14,11,0"]
+        ["overheads_ns=0,9,7,0,0,0", "overheads_ns=0,14,11,0,0,0"]
     );
     let nothing = observed::measure(&[]).unwrap_err();
     assert_eq!(nothing, "the guest has run nothing");

@@ -430,7 +430,7 @@ impl Committed {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
-            // The record has three numbers only, which is all that the analysis derives from
+            // The record has these numbers only, which is all that the analysis derives from
             // overheads.
             overheads: Overheads {
                 // `None` is a charge without an end: no bound must come out here either.
@@ -438,6 +438,8 @@ impl Committed {
                     .map_or(u64::MAX, |ns| ns.saturating_sub(self.told.move_ns)),
                 interrupt_ns: self.told.move_ns,
                 ready_ns: self.told.ready_ns,
+                device_ns: self.told.device_ns[0],
+                device_distance_ns: self.told.device_ns[1],
                 ..Overheads::default()
             },
         }
