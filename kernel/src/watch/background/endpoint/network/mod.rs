@@ -30,7 +30,8 @@ use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
-use fass::platform::{Buffer, SetOnce};
+use executive::run::platform::KERNEL;
+use fass::platform::{Buffer, Platform as _, SetOnce};
 use fass::shared::Wire;
 use front::app::ending::AppError;
 use front::json;
@@ -50,6 +51,43 @@ struct Law {
     /// The least time from one interrupt to the next, in nanoseconds.
     distance_ns: u64,
 }
+
+impl Law {
+    /// Takes the words, and charges the commits to come, unless `overheads_ns` states a device.
+    ///
+    /// The charge is of the longest interrupt in instructions, each a nanosecond: with its entry and
+    /// exit, the release of a DAG, and the packet that a heartbeat sends. What a core sends behind a
+    /// completion is charged as a part of the dispatch.
+    fn charged(options: &CommandLine<'static>) -> Result<Self, UsageError> {
+        let most = options.number("net_packets", 1..=16, 2)?;
+        let distance_us = options.number("net_us", 10..=1_000_000, 140)?;
+        let mut overheads = KERNEL.terms().overheads;
+        if overheads.device_ns == 0 {
+            overheads.device_ns = RELEASE_NS + most * FRAME_NS + SENT_NS;
+            overheads.device_distance_ns = distance_us * 1_000;
+            overheads.dispatch_ns += BELL_NS + most * SENT_NS;
+        }
+        if !overheads.device_leaves_time() {
+            let line = format!(
+                "`net_us={distance_us}`: {most} packets may take longer; give a longer distance, or \
+                 fewer by `net_packets=`"
+            );
+            return Err(UsageError::new(line));
+        }
+        KERNEL.change(|terms| terms.overheads = overheads);
+        Ok(Self {
+            most,
+            distance_ns: overheads.device_distance_ns,
+        })
+    }
+}
+
+/// What an interrupt of the card takes besides its frames, a frame of the longest ones, and a packet
+/// that is sent; and what the interrupt takes by which a core sends.
+const RELEASE_NS: u64 = 2_400;
+const FRAME_NS: u64 = 1_500;
+const SENT_NS: u64 = 1_300;
+const BELL_NS: u64 = 400;
 
 pub(super) struct Network {
     mac: Mac,
@@ -91,8 +129,7 @@ pub(super) fn open(
         return Ok(network);
     }
     let address = address(options)?;
-    let most = options.number("net_packets", 1..=16, 4)?;
-    let distance_us = options.number("net_us", 10..=1_000_000, 100)?;
+    let law = Law::charged(options)?;
     let space = ecam::configuration().map_err(|why| failure(wire, &format!("finds that {why}")))?;
     let mut opened = None;
     pci::find(space, &mut |function| {
@@ -107,14 +144,7 @@ pub(super) fn open(
     };
     let card = card.map_err(|why| AppError::Failure(format!("{why}")))?;
     let message = card.message;
-    NETWORK.set(Network::new(
-        card,
-        address,
-        Law {
-            most,
-            distance_ns: distance_us * 1_000,
-        },
-    ));
+    NETWORK.set(Network::new(card, address, law));
     let network = NETWORK.get();
     let network = network.ok_or_else(|| failure(wire, "finds the network being opened"))?;
     let line_error = |why| AppError::Failure(format!("network card at {} {why}", function.place));
@@ -172,7 +202,7 @@ impl DeviceLine for SendLine {
         if let Some(network) = NETWORK.get() {
             // At the begin of a run there may be frames already.
             network.unmask(this_core::get(), now_ns);
-            network.send();
+            network.send(network.law.most);
         }
     }
 }
@@ -231,7 +261,7 @@ impl Network {
         self.is_run.store(false, Ordering::Relaxed);
         self.unmask_ns.store(u64::MAX, Ordering::Relaxed);
         self.receiver.lock().set_interrupt(false);
-        while self.send() {}
+        while self.send(self.law.most) {}
     }
 
     /// Takes the frames of an interrupt, and masks the card until the next one.
@@ -304,16 +334,16 @@ impl Network {
         }
     }
 
-    /// Sends what is to go, as much as an interrupt does. Reports whether something has gone.
-    fn send(&self) -> bool {
+    /// Sends what is to go, so many packets at most. Reports whether something has gone.
+    fn send(&self, most: u64) -> bool {
         let mut sender = self.sender.lock();
-        let mut left = self.law.most;
+        let mut left = most;
         for wire in self.wires.iter() {
             while left > 0 && wire.send(|packet, port, to| sender.send(packet, port, to)) {
                 left -= 1;
             }
         }
-        let has_gone = left < self.law.most;
+        let has_gone = left < most;
         if has_gone {
             sender.transmitter.ring();
         }
@@ -343,8 +373,8 @@ impl Network {
             let wires = self.wires.iter();
             wires.for_each(|wire| wire.end.set_link(is_linked && has_address));
         }
-        // What found no room, or no address, and what was more than an interrupt sends.
-        self.send();
+        // What found no room, or no address, and what was more than a bell sends.
+        self.send(1);
     }
 
     /// Tells of the run that has ended.
