@@ -16,7 +16,7 @@ const fn ms(ms: u64) -> Duration {
 fn the_car_follows_fresh_gaps_and_stops_without() {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    // What a network card may take of a core.
+    // The most that a network card takes of a core.
     let machine = machine.overheads(Overheads {
         device_ns: 4_000,
         device_distance_ns: 100_000,

@@ -17,7 +17,7 @@ const WORKLOAD: Workload = Workload {
     survived: 0,
 };
 
-/// What a network card may take of a core.
+/// The most that a network card takes of a core.
 const NETWORK: Overheads = Overheads {
     device_ns: 4_000,
     device_distance_ns: 100_000,

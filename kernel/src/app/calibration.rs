@@ -55,7 +55,17 @@ const LEAD_NS: u64 = 100_000;
 /// Measures, and has the commits to come charge it with this margin.
 pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
     let costs = run()?;
-    let overheads = Overheads::measured(&costs, margin_percent, AT_ONCE);
+    // A device's term is that of its law, whatever came meanwhile.
+    let Overheads {
+        device_ns,
+        device_distance_ns,
+        ..
+    } = KERNEL.terms().overheads;
+    let overheads = Overheads {
+        device_ns,
+        device_distance_ns,
+        ..Overheads::measured(&costs, margin_percent, AT_ONCE)
+    };
     KERNEL.change(|terms| {
         terms.overheads = overheads;
         terms.overhead_source = OverheadSource::Measured {

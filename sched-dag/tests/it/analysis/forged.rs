@@ -142,7 +142,7 @@ fn ranks(text: &str) -> impl Fn(&str) -> u32 {
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
 fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let (rank, mut dags) = (ranks(text), Vec::<DagSpec>::new());
-    let (mut machine, mut overheads) = ((0, Policy::Edf), Overheads::default());
+    let (mut machine, mut costs) = ((0, Policy::Edf), Overheads::default());
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
@@ -153,14 +153,11 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
                 // `any` is the word of no policy, but the order of most.
                 let policy = Policy::of_word(words[2]).unwrap_or(Policy::Fifo);
                 machine = (small(1), policy);
-                overheads.dispatch_ns = number(3);
+                costs.dispatch_ns = number(3);
             }
-            ("bursts", _) => overheads.ready_ns = number(1),
-            ("moves", _) => overheads.interrupt_ns = number(1),
-            ("device", _) => {
-                overheads.device_ns = number(1);
-                overheads.device_distance_ns = number(2);
-            }
+            ("bursts", _) => costs.ready_ns = number(1),
+            ("moves", _) => costs.interrupt_ns = number(1),
+            ("device", _) => [costs.device_ns, costs.device_distance_ns] = [1, 2].map(number),
             ("queue", Some(dag)) if number(1) == 0 => dag.overrun = OverrunPolicy::Skip,
             ("queue", Some(dag)) => dag.overrun = OverrunPolicy::Abort,
             ("dag", _) => dags.push(DagSpec {
@@ -202,7 +199,7 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let task_set = sample.task_set()?;
     let mut settings = sample.settings();
     // What a move takes is a part of the charge.
-    overheads.dispatch_ns -= overheads.interrupt_ns;
-    settings.overheads = overheads;
+    costs.dispatch_ns -= costs.interrupt_ns;
+    settings.overheads = costs;
     Some((task_set, settings))
 }

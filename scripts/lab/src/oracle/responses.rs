@@ -304,7 +304,7 @@ struct Device {
     core: usize,
     /// Whether the other cores stand still, too.
     holds_all: bool,
-    /// What it waits for once it may interrupt again: nothing, the next release, or a step.
+    /// The event that it waits for once it may interrupt again: 0 none, 1 the next release, 2 a step.
     waits_for: usize,
     /// When it may interrupt again, and when its last interrupt ends.
     from_ns: u64,
