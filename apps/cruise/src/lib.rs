@@ -105,24 +105,30 @@ pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
     let following = modes.mode("following", &[&cruise]);
     let lost = modes.mode("lost", &[&brake]);
     let watch = create_dag();
-    watch.name("watch").jobs(jobs).relative_deadline(PERIOD);
+    watch.name("watch").jobs(jobs);
+    watch
+        .period(PERIOD)
+        .using(wire.link().reading())
+        .source(|is_up: bool| (is_up,))
+        .writes(&["link"])
+        .register(taking("look", 50));
     let mut was_up = true;
-    type Around<'a> = (bool, ModeSwitch<'a>, ModeSwitch<'a>);
-    let look = move |(is_up, mut following, mut lost): Around<'_>| {
+    // Not in the source, which a replay leaves out.
+    let decide = move |modes: (ModeSwitch<'_>, ModeSwitch<'_>), (is_up,): (bool,)| {
+        let (mut following, mut lost) = modes;
         match (was_up, is_up) {
             (true, false) => lost.at_once(),
             (false, true) => following.at_once(),
             _ => {}
         }
         was_up = is_up;
-        (is_up,)
     };
     watch
-        .period(PERIOD)
-        .using((wire.link().reading(), following.entering(), lost.entering()))
-        .source(look)
-        .writes(&["link"])
-        .register(taking("look", 50));
+        .using((following.entering(), lost.entering()))
+        .subtask(decide)
+        .reads(&["link"])
+        .due(PERIOD)
+        .register(taking("decide", 50));
     watch.record::<bool>("link");
     [cruise, brake, watch]
 }
