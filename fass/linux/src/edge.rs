@@ -81,7 +81,7 @@ impl Sink for File {
     }
 }
 
-pub(crate) fn unpoisoned<T>(lock: &'static Mutex<T>) -> MutexGuard<'static, T> {
+pub(crate) fn unpoisoned<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
     lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

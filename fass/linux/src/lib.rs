@@ -55,6 +55,7 @@ mod state;
 )]
 mod sys;
 mod team;
+mod udp;
 mod worker;
 
 pub use blocking::{blocking, next_question};
@@ -64,3 +65,4 @@ pub use machine::{Connection, Linux, Mechanism, StartError, now_ns, own_core, pr
 pub use platform::{Counts, Run};
 pub use state::Fault;
 pub use team::is_of_run;
+pub use udp::UdpConnection;

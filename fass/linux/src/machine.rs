@@ -538,13 +538,7 @@ impl Linux {
         input: impl Read + Send + 'static,
         output: impl Write + Send + 'static,
     ) -> io::Result<Connection> {
-        let Some(end) = DeviceEnd::of(wire).map(Arc::new) else {
-            let why = format!(
-                "wire `{}` has a device already; connect it once",
-                wire.name()
-            );
-            return Err(io::Error::new(ErrorKind::AlreadyExists, why));
-        };
+        let end = Arc::new(end_of(wire)?);
         let has_ended = Arc::new(AtomicBool::new(false));
         let (own, ended) = (Arc::clone(&end), Arc::clone(&has_ended));
         let writer = thread::Builder::new().spawn(move || send(&own, output, &ended))?;
@@ -557,6 +551,16 @@ impl Linux {
         thread::Builder::new().spawn(move || receive(&end, input, &ended))?;
         Ok(connection)
     }
+}
+
+/// Takes the device's end of a wire.
+pub(crate) fn end_of(wire: &Wire) -> io::Result<DeviceEnd> {
+    let why = || {
+        let line = "has a device already; connect it once";
+        let line = format!("wire `{}` {line}", wire.name());
+        io::Error::new(ErrorKind::AlreadyExists, line)
+    };
+    DeviceEnd::of(wire).ok_or_else(why)
 }
 
 /// Lets arrive what can be read.

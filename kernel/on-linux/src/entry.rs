@@ -9,8 +9,9 @@
 //! | `mechanism=fifo\|sched_ext\|normal\|poll` | by which class of Linux's threads run | `fifo` |
 //! | `module=FILE` | a file for the app | |
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
-//! | `input=-` | what comes on standard input arrives on the app's wire | |
-//! | `output=FILE` | what the app sends on its wire goes there | |
+//! | `wire.NAME=udp://[ADDRESS]:PORT` | that wire hears everyone on this port, or this peer alone | |
+//! | `input=-` | what comes on standard input arrives on the app's other wire | |
+//! | `output=FILE` | what the app sends on that goes there | |
 //! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
 //! | `keep=FILE` | the record of the run is written there, also while it goes on | |
 //! | `events=FILE\|on` | without `keep`: its commits, events and times are, when a run is over; `on` is for lines of the output | |
@@ -106,7 +107,7 @@ fn run(
     }
     let system = LinuxSystem {
         linux,
-        wire: RefCell::new(None),
+        wires: RefCell::default(),
         refusal: RefCell::new(None),
         signals,
         has_console: options.choice("console", &[("off", false), ("on", true)])?,
@@ -119,7 +120,7 @@ fn run(
 }
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
-const FOREIGN: [(&str, &str); 12] = [
+const FOREIGN: [(&str, &str); 13] = [
     ("trace_events", "the journal takes what memory it needs"),
     ("measure", "interrupts are Linux's"),
     ("idle", "idle cores are Linux's"),
@@ -131,6 +132,7 @@ const FOREIGN: [(&str, &str); 12] = [
     ("avx", "Linux saves all registers"),
     ("x2apic", "interrupts are Linux's"),
     ("smt", "processors are Linux's"),
+    ("net", "the network is Linux's"),
     ("latest", "a run is recorded from its begin, by `keep=FILE`"),
 ];
 

@@ -8,6 +8,7 @@ use std::cell::{Cell, RefCell};
 use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Write};
+use std::net::SocketAddrV4;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
@@ -17,11 +18,12 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use fass::platform::RunConfig;
 use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
+use front::app::endpoint::{EndpointWord, word_of};
 use front::app::machine::System;
 use front::options::{CommandLine, UsageError};
 use front::report::{self, HeapUsage, tell_log};
 use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, ShellSession};
-use linux::{Connection, Control, EndSignals, Linux};
+use linux::{Control, EndSignals, Linux};
 use sched_dag::engine::Run;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, SchedulerQuery, TaskSet};
@@ -35,7 +37,7 @@ pub type Machine = front::app::machine::Machine<LinuxSystem>;
 #[derive(Debug)]
 pub struct LinuxSystem {
     pub(crate) linux: Linux,
-    pub(crate) wire: RefCell<Option<WireEnds>>,
+    pub(crate) wires: RefCell<Vec<WireEnds>>,
     /// The refusal of a request that Linux cannot serve.
     pub(crate) refusal: RefCell<Option<UsageError>>,
     /// The reasons that end a run before its time.
@@ -46,24 +48,40 @@ pub struct LinuxSystem {
     pub(crate) is_closed: Cell<bool>,
 }
 
-/// The ends of an app's wire: where bytes come from, and where they go.
+/// An app's wire, and what it is connected to.
 #[derive(Clone, Debug)]
 pub(crate) struct WireEnds {
     wire: Wire,
-    /// Whether bytes come on standard input.
-    is_live: bool,
-    /// The file that bytes go to.
-    output: Option<&'static str>,
+    ends: Ends,
+}
+
+#[derive(Clone, Debug)]
+enum Ends {
+    /// Bytes come on standard input, if `is_live`, and go to the file.
+    Bytes {
+        is_live: bool,
+        output: Option<&'static str>,
+    },
+    /// Datagrams to an own port, and of one peer alone, if there is one.
+    Udp(u16, Option<SocketAddrV4>),
 }
 
 impl WireEnds {
-    /// Connects them for a run that is committed.
-    fn connect(&self, machine: &Linux) -> Result<Connection, AppError> {
-        let input: Box<dyn Read + Send> = match self.is_live {
+    /// Connects them for a run that is committed, until what it returns is dropped.
+    fn connect(&self, machine: &Linux) -> Result<Box<dyn fmt::Debug>, AppError> {
+        let failure = |why| AppError::Failure(format!("wire `{}`: {why}", self.wire.name()));
+        let (is_live, output) = match self.ends {
+            Ends::Udp(port, peer) => {
+                let connected = machine.connect_udp(&self.wire, port, peer);
+                return Ok(Box::new(connected.map_err(failure)?));
+            }
+            Ends::Bytes { is_live, output } => (is_live, output),
+        };
+        let input: Box<dyn Read + Send> = match is_live {
             true => Box::new(io::stdin()),
             false => Box::new(io::empty()),
         };
-        let output: Box<dyn Write + Send> = match self.output {
+        let output: Box<dyn Write + Send> = match output {
             Some(path) => Box::new(
                 File::create(path)
                     .map_err(|why| UsageError::new(format!("`output={path}`: {why}")))?,
@@ -71,9 +89,35 @@ impl WireEnds {
             None => Box::new(io::sink()),
         };
         let connected = machine.connect(&self.wire, input, output);
-        connected.map_err(|why| AppError::Failure(format!("wire `{}`: {why}", self.wire.name())))
+        Ok(Box::new(connected.map_err(failure)?))
     }
 }
+
+impl LinuxSystem {
+    /// Returns standard input and a file as the ends of a wire, of which one has them.
+    fn bytes(&self, wire: &Wire, options: &CommandLine<'static>) -> Result<Ends, UsageError> {
+        let name = wire.name();
+        let (input, output) = (options.text("input"), options.text("output"));
+        let is_taken = |ends: &WireEnds| matches!(ends.ends, Ends::Bytes { .. });
+        let line = if input.is_some_and(|input| input != "-") {
+            SCRIPT.into()
+        } else if input.is_some() && self.has_console {
+            "`input=-` and `console=on` both take standard input; give one".into()
+        } else if input.is_none() && output.is_none() {
+            let line = "has no ends; give --input - or --output FILE, or";
+            format!("wire `{name}` {line} `wire.{name}=udp://:PORT`")
+        } else if self.wires.borrow().iter().any(is_taken) {
+            let line = "finds standard input and output taken by another wire; connect this one by";
+            format!("wire `{name}` {line} `wire.{name}=udp://:PORT`")
+        } else {
+            let is_live = input.is_some();
+            return Ok(Ends::Bytes { is_live, output });
+        };
+        Err(UsageError::new(line))
+    }
+}
+
+const SCRIPT: &str = "`input`: a script of times is for the machine; on Linux give `input=-`";
 
 impl System for LinuxSystem {
     type Run = LinuxRun;
@@ -102,9 +146,9 @@ impl System for LinuxSystem {
             return Err(refusal.into());
         }
         let failure = |why: String| AppError::Failure(why);
-        let ends = self.wire.borrow();
-        let connection = ends.as_ref().map(|ends| ends.connect(&self.linux));
-        let connection = connection.transpose()?;
+        let wires = self.wires.borrow();
+        let connected = wires.iter().map(|ends| ends.connect(&self.linux));
+        let connected = connected.collect::<Result<Vec<_>, _>>()?;
         // What a person says at the console is no event.
         if let Some(signal) = input.filter(|_| !self.has_console) {
             match self.linux.raise_on_input(signal, &io::stdin()) {
@@ -126,7 +170,7 @@ impl System for LinuxSystem {
         let (run, is_closed) = talk_during(self.has_console, run);
         self.is_closed.set(is_closed);
         let run = run.map_err(|why| failure(why.to_string()))?;
-        drop(connection);
+        drop(connected);
         report::tell_log(|| Some(Arc::clone(run.task_set())));
         tell_faults(&run);
         let crossed = self.linux.end_recording(!self.is_shut_down());
@@ -136,9 +180,7 @@ impl System for LinuxSystem {
         if let Some(drained) = &crossed.1 {
             report::recorded(drained);
         }
-        if let Some(ends) = &*ends {
-            report::tell_wire(&ends.wire);
-        }
+        wires.iter().for_each(|ends| report::tell_wire(&ends.wire));
         Ok(run.into_run())
     }
 
@@ -152,32 +194,15 @@ impl System for LinuxSystem {
         options: &CommandLine<'static>,
         _module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError> {
-        let input = options.text("input");
-        let output = options.text("output");
-        if input.is_some_and(|input| input != "-") {
-            let line = "`input`: a script of times is for the machine; on Linux give `input=-`";
-            return Err(UsageError::new(line).into());
-        }
-        if input.is_some() && self.has_console {
-            let line = "`input=-` and `console=on` both take standard input; give one";
-            return Err(UsageError::new(line).into());
-        }
-        if input.is_none() && output.is_none() {
-            let line = "has no ends; give --input - or --output FILE";
-            return Err(UsageError::new(format!("wire `{}` {line}", wire.name())).into());
-        }
-        let ends = WireEnds {
-            wire: wire.clone(),
-            is_live: input.is_some(),
-            output,
+        let ends = match word_of(wire, options)? {
+            Some(EndpointWord::Port(port)) => Ends::Udp(port, None),
+            Some(EndpointWord::Peer(peer)) => Ends::Udp(0, Some(peer)),
+            Some(EndpointWord::File) => return Err(UsageError::new(SCRIPT).into()),
+            Some(EndpointWord::Serial) | None => self.bytes(wire, options)?,
         };
-        match self.wire.replace(Some(ends)) {
-            None => Ok(()),
-            Some(_) => Err(AppError::Failure(format!(
-                "wire `{}` finds its ends taken; connect one wire",
-                wire.name()
-            ))),
-        }
+        let wire = wire.clone();
+        self.wires.borrow_mut().push(WireEnds { wire, ends });
+        Ok(())
     }
 
     fn unix_ns() -> Option<u64> {

@@ -1,4 +1,4 @@
-//! The machine on Linux: runs by each mechanism, their ends, recordings and wires.
+//! The machine on Linux: runs by each mechanism, their ends, recordings, wires and UDP.
 
 mod ends;
 mod lives;
@@ -7,5 +7,6 @@ mod panics;
 mod recordings;
 #[path = "../support/mod.rs"]
 mod support;
+mod udp;
 mod waits;
 mod wires;
