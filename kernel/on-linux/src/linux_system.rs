@@ -55,13 +55,10 @@ pub(crate) struct WireEnds {
     ends: Ends,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 enum Ends {
-    /// Bytes come on standard input, if `is_live`, and go to the file.
-    Bytes {
-        is_live: bool,
-        output: Option<&'static str>,
-    },
+    /// Whether bytes come on standard input, and the file that they go to.
+    Bytes(bool, Option<&'static str>),
     /// Datagrams to an own port, and of one peer alone, if there is one.
     Udp(u16, Option<SocketAddrV4>),
 }
@@ -69,55 +66,28 @@ enum Ends {
 impl WireEnds {
     /// Connects them for a run that is committed, until what it returns is dropped.
     fn connect(&self, machine: &Linux) -> Result<Box<dyn fmt::Debug>, AppError> {
-        let failure = |why| AppError::Failure(format!("wire `{}`: {why}", self.wire.name()));
-        let (is_live, output) = match self.ends {
-            Ends::Udp(port, peer) => {
-                let connected = machine.connect_udp(&self.wire, port, peer);
-                return Ok(Box::new(connected.map_err(failure)?));
+        let connected: io::Result<Box<dyn fmt::Debug>> = match self.ends {
+            Ends::Udp(port, peer) => (machine.connect_udp(&self.wire, port, peer))
+                .map(|connection| Box::new(connection) as _),
+            Ends::Bytes(is_live, output) => {
+                let input: Box<dyn Read + Send> = match is_live {
+                    true => Box::new(io::stdin()),
+                    false => Box::new(io::empty()),
+                };
+                let output: Box<dyn Write + Send> = match output {
+                    Some(path) => Box::new(
+                        File::create(path)
+                            .map_err(|why| UsageError::new(format!("`output={path}`: {why}")))?,
+                    ),
+                    None => Box::new(io::sink()),
+                };
+                (machine.connect(&self.wire, input, output))
+                    .map(|connection| Box::new(connection) as _)
             }
-            Ends::Bytes { is_live, output } => (is_live, output),
         };
-        let input: Box<dyn Read + Send> = match is_live {
-            true => Box::new(io::stdin()),
-            false => Box::new(io::empty()),
-        };
-        let output: Box<dyn Write + Send> = match output {
-            Some(path) => Box::new(
-                File::create(path)
-                    .map_err(|why| UsageError::new(format!("`output={path}`: {why}")))?,
-            ),
-            None => Box::new(io::sink()),
-        };
-        let connected = machine.connect(&self.wire, input, output);
-        Ok(Box::new(connected.map_err(failure)?))
+        connected.map_err(|why| AppError::Failure(format!("wire `{}`: {why}", self.wire.name())))
     }
 }
-
-impl LinuxSystem {
-    /// Returns standard input and a file as the ends of a wire, of which one has them.
-    fn bytes(&self, wire: &Wire, options: &CommandLine<'static>) -> Result<Ends, UsageError> {
-        let name = wire.name();
-        let (input, output) = (options.text("input"), options.text("output"));
-        let is_taken = |ends: &WireEnds| matches!(ends.ends, Ends::Bytes { .. });
-        let line = if input.is_some_and(|input| input != "-") {
-            SCRIPT.into()
-        } else if input.is_some() && self.has_console {
-            "`input=-` and `console=on` both take standard input; give one".into()
-        } else if input.is_none() && output.is_none() {
-            let line = "has no ends; give --input - or --output FILE, or";
-            format!("wire `{name}` {line} `wire.{name}=udp://:PORT`")
-        } else if self.wires.borrow().iter().any(is_taken) {
-            let line = "finds standard input and output taken by another wire; connect this one by";
-            format!("wire `{name}` {line} `wire.{name}=udp://:PORT`")
-        } else {
-            let is_live = input.is_some();
-            return Ok(Ends::Bytes { is_live, output });
-        };
-        Err(UsageError::new(line))
-    }
-}
-
-const SCRIPT: &str = "`input`: a script of times is for the machine; on Linux give `input=-`";
 
 impl System for LinuxSystem {
     type Run = LinuxRun;
@@ -194,14 +164,45 @@ impl System for LinuxSystem {
         options: &CommandLine<'static>,
         _module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError> {
-        let ends = match word_of(wire, options)? {
+        let (name, word) = (wire.name(), word_of(wire, options)?);
+        let refused = |line: String| Err(UsageError::new(line).into());
+        let ends = match word {
             Some(EndpointWord::Port(port)) => Ends::Udp(port, None),
             Some(EndpointWord::Peer(peer)) => Ends::Udp(0, Some(peer)),
-            Some(EndpointWord::File) => return Err(UsageError::new(SCRIPT).into()),
-            Some(EndpointWord::Serial) | None => self.bytes(wire, options)?,
+            Some(EndpointWord::File) => {
+                let line = "a script of times is for the machine; on Linux give udp://:PORT";
+                return refused(format!("`wire.{name}=file`: {line}"));
+            }
+            Some(EndpointWord::Serial) | None => {
+                Ends::Bytes(options.text("input").is_some(), options.text("output"))
+            }
         };
-        let wire = wire.clone();
-        self.wires.borrow_mut().push(WireEnds { wire, ends });
+        let mut wires = self.wires.borrow_mut();
+        if let Ends::Bytes(is_live, output) = ends {
+            let are_taken = |other: &WireEnds| matches!(other.ends, Ends::Bytes(..));
+            if options.text("input").is_some_and(|input| input != "-") {
+                let line = "`input`: a script of times is for the machine; on Linux give `input=-`";
+                return refused(line.into());
+            }
+            if is_live && self.has_console {
+                let line = "`input=-` and `console=on` both take standard input; give one";
+                return refused(line.into());
+            }
+            let lack = match (is_live || output.is_some(), wires.iter().any(are_taken)) {
+                (false, _) => Some("has no ends; give --input -, --output FILE"),
+                (true, true) => {
+                    Some("finds its ends taken by another wire; give it others, such as")
+                }
+                (true, false) => None,
+            };
+            if let Some(lack) = lack {
+                return refused(format!("wire `{name}` {lack} or `wire.{name}=udp://:PORT`"));
+            }
+        }
+        wires.push(WireEnds {
+            wire: wire.clone(),
+            ends,
+        });
         Ok(())
     }
 

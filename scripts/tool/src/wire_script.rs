@@ -1,16 +1,21 @@
 //! Bytes with their times, in the form of a file for `run --input`.
 //!
-//! Each line is a time of the run and bytes, as text in quotation marks or as hexadecimal pairs:
+//! Each line is a time of the run and bytes, as text in quotation marks or as hexadecimal pairs.
+//! Before the bytes it may name their wire, and, if they are a packet, whom it is from:
 //!
 //! ```text
 //! # A radar says how far the car ahead is.
 //! 4ms "gap 2350\n"
 //! 1500us 67 61 70 0a
+//! 5ms wire.commands 10.0.2.2:7 "stop"
 //! ```
 //!
-//! In quotation marks `\n`, `\r`, `\t`, `\0`, `\"` and `\\` stand for bytes, and `\x` with two
+//! In quotation marks `\n`, `\r`, `\t`, `\0`, `\"`, `\'` and `\\` stand for bytes, and `\x` with two
 //! hexadecimal digits for any byte. Lines that begin with `#`, and empty lines, are ignored. Times
-//! must not decrease. The guest gets entries: a time in nanoseconds, a length, and the bytes.
+//! must not decrease. The guest gets entries, whose form is in
+//! `kernel/src/watch/background/endpoint/script.rs`.
+
+use std::net::{Ipv4Addr, SocketAddrV4};
 
 use fass_dag_file::time::parse_ns;
 use text::visible;
@@ -18,8 +23,23 @@ use text::visible;
 /// The most bytes of a line: the guest takes them in one interrupt.
 const MOST_BYTES: usize = 1024;
 
-/// Bytes, and the time of the run at which they arrive.
-pub type Entry = (u64, Vec<u8>);
+/// The most bytes of a packet: a frame of Ethernet has room for them.
+const MOST_OF_PACKET: usize = 1472;
+
+/// What arrives at once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// The number of its line.
+    pub line: usize,
+    /// The time of the run.
+    pub at_ns: u64,
+    /// The name of the wire; `None`: the first one that has the file.
+    pub wire: Option<String>,
+    /// Whom the packet is from; `None`: the bytes are of a port.
+    pub from: Option<SocketAddrV4>,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
 
 /// Reads the text of such a file.
 ///
@@ -33,9 +53,9 @@ pub fn read(text: &str) -> Result<Vec<Entry>, String> {
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let entry = entry(line).map_err(|why| format!("{number}: {why}"))?;
+        let entry = entry(number, line).map_err(|why| format!("{number}: {why}"))?;
         // The guest delivers them in order, so an earlier time could not be met.
-        if entries.last().is_some_and(|last| last.0 > entry.0) {
+        if entries.last().is_some_and(|last| last.at_ns > entry.at_ns) {
             return Err(format!(
                 "{number}: this is before the line above; put the lines in the order of their times"
             ));
@@ -45,10 +65,22 @@ pub fn read(text: &str) -> Result<Vec<Entry>, String> {
     Ok(entries)
 }
 
-fn entry(line: &str) -> Result<Entry, String> {
-    let (time, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+fn entry(number: usize, line: &str) -> Result<Entry, String> {
+    let (time, rest) = first_word(line);
     let at_ns = parse_ns(time)?;
-    let rest = rest.trim();
+    let (wire, rest) = match rest.strip_prefix("wire.") {
+        Some(named) => {
+            let (name, rest) = first_word(named);
+            (Some(name.to_owned()), rest)
+        }
+        None => (None, rest),
+    };
+    let (from, rest) = match first_word(rest) {
+        (peer, rest) if !peer.starts_with('"') && peer.contains(['.', ':']) => {
+            (Some(read_peer(peer)?), rest)
+        }
+        _ => (None, rest),
+    };
     let bytes = match rest.strip_prefix('"') {
         Some(text) => unescaped(text)?,
         None => rest
@@ -56,16 +88,38 @@ fn entry(line: &str) -> Result<Entry, String> {
             .map(pair)
             .collect::<Result<_, _>>()?,
     };
+    let most = from.map_or(MOST_BYTES, |_| MOST_OF_PACKET);
     match bytes.len() {
         0 => Err(
             "there are no bytes; give a text such as \"on\\n\", or pairs such as 6f 6e 0a".into(),
         ),
-        1..=MOST_BYTES => Ok((at_ns, bytes)),
-        count => Err(format!(
-            "{count} bytes arrive at once, and {MOST_BYTES} is the most; divide them, the time may \
-             be the same"
+        count if count > most => Err(format!(
+            "{count} bytes arrive at once, and {most} is the most; divide them, the time may be the \
+             same"
         )),
+        _ => Ok(Entry {
+            line: number,
+            at_ns,
+            wire,
+            from,
+            bytes,
+        }),
     }
+}
+
+/// Divides a text into its first word and the rest.
+fn first_word(text: &str) -> (&str, &str) {
+    let (word, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    (word, rest.trim())
+}
+
+fn read_peer(word: &str) -> Result<SocketAddrV4, String> {
+    let is_host = |peer: &SocketAddrV4| !peer.ip().is_unspecified() && peer.port() > 0;
+    let peer = word.parse().ok().filter(is_host);
+    peer.ok_or_else(|| {
+        let shown = visible(word);
+        format!("`{shown}` is no peer; write ADDRESS:PORT, such as 10.0.2.2:7")
+    })
 }
 
 /// Reads the text after a quotation mark, up to the closing one.
@@ -92,7 +146,7 @@ fn escaped(rest: &mut std::str::Chars<'_>) -> Result<u8, String> {
         Some('r') => Ok(b'\r'),
         Some('t') => Ok(b'\t'),
         Some('0') => Ok(0),
-        Some(letter @ ('"' | '\\')) => Ok(letter as u8),
+        Some(letter @ ('"' | '\'' | '\\')) => Ok(letter as u8),
         Some('x') => {
             let digits: String = rest.by_ref().take(2).collect();
             pair(&digits)
@@ -118,14 +172,22 @@ fn pair(digits: &str) -> Result<u8, String> {
 }
 
 /// Returns the entries as the guest takes them.
+#[must_use]
 pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
+    let nobody = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
     let mut script = Vec::new();
-    for (at_ns, bytes) in entries {
-        // No entry is longer than 1024 bytes, see `MOST_BYTES`.
-        let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
-        script.extend(at_ns.to_le_bytes());
-        script.extend(length.to_le_bytes());
-        script.extend(bytes);
+    for entry in entries {
+        let (from, wire) = (entry.from.unwrap_or(nobody), entry.wire.as_deref());
+        let wire = wire.unwrap_or_default().as_bytes();
+        script.extend(entry.at_ns.to_le_bytes());
+        script.extend(from.ip().octets());
+        script.extend(from.port().to_le_bytes());
+        for length in [wire.len(), entry.bytes.len()] {
+            // Neither is longer, see `entry`; a command line is shorter than a name of that length.
+            script.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
+        }
+        script.extend(wire);
+        script.extend(&entry.bytes);
     }
     script
 }
@@ -144,12 +206,34 @@ mod tests {
             (4_000_000, b"\0\"\\ \r\t\0\xc3\xa9"),
             (1_000_000_000, b"g\n"),
         ];
-        assert_eq!(
-            entries,
-            expected.map(|(at_ns, bytes)| (at_ns, bytes.to_vec()))
-        );
+        let bytes = entries.iter().map(|entry| (entry.at_ns, &entry.bytes[..]));
+        assert!(bytes.eq(expected));
+        assert!(entries.iter().map(|entry| entry.line).eq(3..6));
         let script = for_guest(&entries[2..]);
-        assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\x02\0g\n");
+        assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\0\0\0\0\0\0\0\0\x02\0g\n");
+    }
+
+    #[test]
+    fn a_line_may_name_its_wire_and_its_peer() {
+        let text = "1ns wire.echo 10.0.2.2:7 \"it\\'s\"\n1ns wire.be ad\n1ns 10.0.2.2:7 ad\n";
+        let entries = read(text).unwrap();
+        let peer = "10.0.2.2:7".parse().ok();
+        let expected = [
+            (Some("echo"), peer, &b"it's"[..]),
+            (Some("be"), None, b"\xad"),
+            (None, peer, b"\xad"),
+        ];
+        let parts = entries
+            .iter()
+            .map(|entry| (entry.wire.as_deref(), entry.from, &entry.bytes[..]));
+        assert!(parts.eq(expected), "{entries:?}");
+        let script = for_guest(&entries[..1]);
+        assert_eq!(
+            script,
+            b"\x01\0\0\0\0\0\0\0\x0a\0\x02\x02\x07\0\x04\0\x04\0echoit's"
+        );
+        let most = format!("1ns 10.0.2.2:7 \"{}\"", "x".repeat(1472));
+        assert_eq!(read(&most).unwrap()[0].bytes.len(), 1472);
     }
 
     /// Texts that are refused, and the reasons.
@@ -163,6 +247,10 @@ mod tests {
 5ms "\x1" | 1: `1"` is no pair of hexadecimal digits; write
 5ms 0a0 | 1: `0a0` is no pair of hexadecimal digits; write
 5ms +1 | 1: `+1` is no pair
+5ms wire.echo | 1: there are no bytes; give a text
+5ms 10.0.2.2 "a" | 1: `10.0.2.2` is no peer; write ADDRESS:PORT
+5ms [::1]:7 "a" | 1: `[::1]:7` is no peer; write ADDRESS:PORT
+5ms 0.0.0.0:7 "a" | 1: `0.0.0.0:7` is no peer
 5ms 0a\n4ms 0a | 2: this is before the line above; put"#;
 
     #[test]
@@ -173,5 +261,7 @@ mod tests {
         }
         let refused = read(&format!("5ms \"{}\"", "x".repeat(1025))).unwrap_err();
         assert!(refused.starts_with("1: 1025 bytes arrive at once"));
+        let refused = read(&format!("5ms 10.0.2.2:7 \"{}\"", "x".repeat(1473))).unwrap_err();
+        assert!(refused.starts_with("1: 1473 bytes arrive at once, and 1472 is the most"));
     }
 }

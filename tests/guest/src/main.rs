@@ -30,6 +30,7 @@ mod storm;
 mod upper_halves;
 mod values;
 mod waits;
+mod wires;
 
 use faults::crimes::{Crime, Unpunished};
 use kernel::{AppError, Machine};
@@ -74,6 +75,7 @@ const TESTS: &[(&str, Test)] = &[
     ("talkative", single::talkative),
     ("unnoticed", single::unnoticed),
     ("values", values::run),
+    ("wires", wires::run),
     ("waits_cost", waits::cost),
     ("waits_wire", waits::wire),
 ];

@@ -21,8 +21,8 @@ fn in_virtual_time(input: &str, releases: Releases) -> (Vec<u8>, WireCounts) {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
     finish_create_dags(&build(&wire, releases, JOBS)).expect("it is sound");
-    for (at_ns, bytes) in wire_script::read(input).expect("it is well written") {
-        machine.arrive_at(&wire, Duration::from_nanos(at_ns), &bytes);
+    for entry in wire_script::read(input).expect("it is well written") {
+        machine.arrive_at(&wire, Duration::from_nanos(entry.at_ns), &entry.bytes);
     }
     machine.run();
     (machine.sent(&wire), wire.counts())

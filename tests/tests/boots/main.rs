@@ -10,6 +10,7 @@ mod debian;
 mod delays;
 mod devices;
 mod drone;
+mod echo;
 mod every_call;
 mod faults;
 mod fork_join;

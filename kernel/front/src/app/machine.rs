@@ -316,21 +316,21 @@ impl<S: System> Machine<S> {
 const MARGIN_PERCENT: u64 = 20;
 
 impl<S: System> Machine<S> {
-    /// Connects a wire to the second serial port (COM2, at I/O port 0x2f8): what is sent goes
-    /// there in the runs to come, and what it gets arrives. If the word `input=` says that the
-    /// end of the loader's module is a script of bytes and times, these arrive instead, in each
-    /// run. To be called before [`CommandLine::finish`](crate::options::CommandLine::finish), which
-    /// otherwise refuses that word, and before [`module`](Self::module).
+    /// Connects a wire to what its [word](super::endpoint) says. Without one it is the second serial
+    /// port (COM2, at I/O port 0x2f8): what is sent goes there in the runs to come, and what the port gets
+    /// arrives. If the word `input=` says that the end of the loader's module is a script, that arrives
+    /// instead, in each run. To be called before
+    /// [`CommandLine::finish`](crate::options::CommandLine::finish), which otherwise refuses these words,
+    /// and before [`module`](Self::module).
     ///
     /// The port is looked at every millisecond. Core 0 sends when it has nothing else to do.
-    /// After each run a line says what the wire has counted. On Linux the wire's ends are standard
-    /// input (`input=-`) and a file (`output=FILE`).
+    /// After each run a line says what the wire has counted. On Linux standard input (`input=-`) and a
+    /// file (`output=FILE`) are in the port's place.
     ///
     /// # Errors
     ///
-    /// [`AppError::Usage`] if there is no such port, or neither end is named;
-    /// [`AppError::Failure`] if
-    /// it has a wire already.
+    /// [`AppError::Usage`] if there is no such port, another wire has it, or neither end is named;
+    /// [`AppError::Failure`] if the wire is connected already.
     ///
     /// ```no_run
     /// use fass::shared::{Received, Wire};

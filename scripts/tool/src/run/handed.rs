@@ -6,12 +6,13 @@
 //! the file, and so prevails.
 //!
 //! `--input` and `--output` belong to the guest's second serial port, which is an app's wire. A
-//! file of bytes with their times goes to the guest with the boot module, so that runs repeat.
+//! file of bytes with their times goes to the guest with the boot module, so that runs repeat; it may
+//! have several wires.
 //! Standard input goes to the port as it comes. The guest's output there goes to a file.
 
 use std::path::{Path, PathBuf};
 
-use text::{quoted, shown};
+use text::{quoted, shown, visible};
 
 use crate::dag_file::Prepared;
 use crate::files::{self, Named, Temporary};
@@ -193,6 +194,19 @@ fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
         let why = format!("`--input {place}`: it has no bytes; write lines such as 4ms \"on\\n\"");
         return Err(Refusal::Usage(why));
     }
+    let append = options.text(name::APPEND).unwrap_or_default();
+    for entry in &entries {
+        let word = entry.wire.as_ref().map(|wire| format!("wire.{wire}=file"));
+        // The guest refuses the word if the app has no such wire.
+        if let Some(word) = word.filter(|word| append.split_whitespace().all(|own| own != word)) {
+            let line = entry.line;
+            let why = format!(
+                "no word gives its wire the file; give --append {}",
+                visible(&word)
+            );
+            return Err(Refusal::Usage(format!("`--input`: {place}:{line}: {why}")));
+        }
+    }
     Ok(wire_script::for_guest(&entries))
 }
 
@@ -231,7 +245,9 @@ pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::{RUN, prepare};
-    use super::{Handed, of_file, pair, second};
+    use super::{Handed, of_file, pair, script, second};
+    use crate::files;
+    use crate::options::Refusal;
     use crate::qemu::Second;
     use crate::run_options::name;
     use crate::system::workspace;
@@ -261,6 +277,22 @@ mod tests {
         }
         // A value may contain `=`.
         assert_eq!(pair("a=b=c").as_deref(), Some("a=b=c"));
+    }
+
+    #[test]
+    fn a_wire_of_the_file_needs_its_word() {
+        let path = std::env::temp_dir().join(format!("{}.wires", std::process::id()));
+        fs::write(&path, "1ms wire.a 0a\n2ms wire.b 0a\n").unwrap();
+        let refused = |words: &str| {
+            let options = right(&RUN, "--jobs 3").with(name::APPEND, words);
+            script(&options.with(name::INPUT, &path)).err()
+        };
+        let place = files::shown_path(&path);
+        let why = "2: no word gives its wire the file; give --append wire.b=file";
+        let why = Refusal::Usage(format!("`--input`: {place}:{why}"));
+        assert_eq!(refused("wire.a=file wire.b=serial"), Some(why));
+        assert_eq!(refused("wire.a=file wire.b=file"), None);
+        fs::remove_file(path).unwrap();
     }
 
     #[test]

@@ -1,90 +1,226 @@
-//! A script: bytes with their times, in place of those that arrive at the port.
+//! A script: what arrives, with its times, in place of what a device would bring.
 //!
-//! Where runs have to repeat, input is a script in the loader's module: each entry is a time
-//! of the run (8 bytes), a length (2 bytes), both with the lowest byte first, and its bytes. They
-//! arrive at their times, by the heartbeat's alarm, as if the port had got them. The host has
-//! made it, and so what is no entry is its end. What is sent goes by the port.
+//! Where runs have to repeat, input is a script in the loader's module. An entry of it is
+//!
+//! | bytes | what |
+//! | --- | --- |
+//! | 8 | a time of the run, in nanoseconds |
+//! | 4, 2 | the address and the port of the peer; the port is 0 where there is none |
+//! | 2, 2 | the lengths of the two that follow |
+//! | | the name of the wire; the first wire of the script may go without |
+//! | | the bytes |
+//!
+//! Numbers have their lowest byte first, and an address the order in which it is written. With a peer
+//! the bytes are a packet. They arrive by the heartbeat's alarm. The host has made the script, and so
+//! what is no entry is its end.
+//!
+//! What is sent goes by the serial port: as it is, of one wire, or, of the wires with the word
+//! `wire.NAME=file`, each packet as a line of text, `wire.NAME PEER "BYTES"`, without a peer if none is
+//! stated.
 
 use alloc::boxed::Box;
 use alloc::format;
+use alloc::string::String;
+use core::fmt::Write as _;
+use core::net::{Ipv4Addr, SocketAddrV4};
+use core::sync::atomic::{AtomicBool, Ordering};
 
+use fass::platform::{Buffer, SetOnce};
 use fass::shared::{DeviceEnd, Wire};
+use net::MOST_PAYLOAD;
 
-use super::serial::SerialEndpoint;
-use super::{Endpoint, EndpointWords, Opened, arrive};
+use super::serial::{self, FIFO_BYTES};
+use super::{Endpoint, EndpointWords, Opened, arrive, end_of};
 use crate::options::UsageError;
+use executive::machine::serial::SECOND;
 use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
 use front::app::endpoint::EndpointWord;
 
+/// The most bytes of a line: those of a packet, its peer, and a name.
+const MOST_OF_LINE: usize = 512 + 4 * MOST_PAYLOAD;
+
+struct Script {
+    entries: &'static [u8],
+    /// Whether it has a wire, and whether a line that goes has the port.
+    has_wire: AtomicBool,
+    has_port: AtomicBool,
+    /// The line that is going, and how much of it has gone. In core 0's background.
+    line: SpinLock<(String, usize)>,
+}
+
+static SCRIPT: SetOnce<Script> = SetOnce::new();
+
 struct ScriptEndpoint {
-    port: SerialEndpoint,
-    script: &'static [u8],
-    /// The entries that are still to arrive in this run.
-    rest: SpinLock<&'static [u8]>,
+    end: DeviceEnd,
+    script: &'static Script,
+    is_first: bool,
+    sends_lines: bool,
+    playing: SpinLock<Playing>,
+}
+
+struct Playing {
+    /// The entries that are still to arrive in this run, those of other wires among them.
+    rest: &'static [u8],
+    /// The packet that arrives next.
+    packet: Buffer,
+}
+
+#[derive(Debug, PartialEq, Eq)]
+struct Entry<'s> {
+    at_ns: u64,
+    from: Option<SocketAddrV4>,
+    wire: &'s [u8],
+    bytes: &'s [u8],
 }
 
 /// Opens the script, if there is one.
 pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
+    if SCRIPT.get().is_none() {
+        SCRIPT.set(cut(words)?);
+    }
+    let is_meant = words.word.is_none_or(|word| word == EndpointWord::File);
+    let script = SCRIPT.get().filter(|script| !script.entries.is_empty());
+    let Some(script) = script.filter(|_| is_meant) else {
+        if words.word == Some(EndpointWord::File) {
+            let line = format!("`wire.{}=file` has no file; give --input FILE", wire.name());
+            return Err(UsageError::new(line).into());
+        }
+        return Ok(None);
+    };
+    let sends_lines = words.word.is_some();
+    if !sends_lines || !script.has_port.swap(true, Ordering::Relaxed) {
+        serial::take_port(wire)?;
+    }
+    let end = end_of(wire)?;
+    if sends_lines {
+        // The background finds what is to go.
+        end.begin_packets(MOST_PAYLOAD, || ());
+    }
+    let playing = SpinLock::new(Playing {
+        rest: &[],
+        packet: Buffer::new(Buffer::LEAST_BYTES),
+    });
+    Ok(Some(Box::new(ScriptEndpoint {
+        end,
+        script,
+        is_first: !script.has_wire.swap(true, Ordering::Relaxed),
+        sends_lines,
+        playing,
+    })))
+}
+
+/// Cuts the script off the module: it stands behind the app's own bytes.
+fn cut(words: &EndpointWords<'_>) -> Result<Script, UsageError> {
     let bytes = words.options.number("input", 0..=1 << 32, 0)?;
     let file = words.module.get().unwrap_or_default();
     let own = usize::try_from(bytes)
         .ok()
         .and_then(|bytes| file.len().checked_sub(bytes));
     let own = own.ok_or_else(|| UsageError::new("`input`: the module is shorter"))?;
-    // The script stands behind the app's own bytes.
-    let (own, script) = file.split_at(own);
+    let (own, entries) = file.split_at(own);
     words.module.set(Some(own).filter(|own| !own.is_empty()));
-    let is_meant = words.word.is_none_or(|word| word == EndpointWord::File);
-    if script.is_empty() || !is_meant {
-        if words.word == Some(EndpointWord::File) {
-            let line = format!("`wire.{}=file` has no file; give --input FILE", wire.name());
-            return Err(UsageError::new(line).into());
-        }
-        return Ok(None);
-    }
-    Ok(Some(Box::new(ScriptEndpoint {
-        port: SerialEndpoint::new(wire)?,
-        script,
-        rest: SpinLock::new(&[]),
-    })))
+    Ok(Script {
+        entries,
+        has_wire: AtomicBool::new(false),
+        has_port: AtomicBool::new(false),
+        line: SpinLock::new((String::with_capacity(MOST_OF_LINE), 0)),
+    })
 }
 
-/// Returns the first entry of a script, its time before its bytes, and the entries after it.
-fn first(script: &[u8]) -> Option<(u64, &[u8], &[u8])> {
+/// Returns the first entry of a script, and the entries after it.
+fn first(script: &[u8]) -> Option<(Entry<'_>, &[u8])> {
     let (at_ns, rest) = script.split_first_chunk()?;
+    let (ip, rest) = rest.split_first_chunk::<4>()?;
+    let (port, rest) = rest.split_first_chunk()?;
+    let (name, rest) = rest.split_first_chunk()?;
     let (length, rest) = rest.split_first_chunk()?;
-    let length = usize::from(u16::from_le_bytes(*length));
-    let (bytes, rest) = rest.split_at_checked(length)?;
-    Some((u64::from_le_bytes(*at_ns), bytes, rest))
+    let (wire, rest) = rest.split_at_checked(u16::from_le_bytes(*name).into())?;
+    let (bytes, rest) = rest.split_at_checked(u16::from_le_bytes(*length).into())?;
+    let from = SocketAddrV4::new(Ipv4Addr::from(*ip), u16::from_le_bytes(*port));
+    let entry = Entry {
+        at_ns: u64::from_le_bytes(*at_ns),
+        from: Some(from).filter(|from| from.port() > 0),
+        wire,
+        bytes,
+    };
+    Some((entry, rest))
 }
 
 impl ScriptEndpoint {
-    /// Takes the bytes that the script has for now. Reports whether there were some; if not, the
-    /// heartbeat comes for the next ones.
+    /// Takes what the script has for now. Reports whether there was an entry; if not, the heartbeat
+    /// comes for the next one.
     fn play(&self, now_ns: u64) -> bool {
-        let mut rest = self.rest.lock();
-        let Some((at_ns, bytes, after)) = first(&rest) else {
+        let mut playing = self.playing.lock();
+        let Playing { rest, packet } = &mut *playing;
+        let Some((entry, after)) = first(rest) else {
             return false;
         };
-        let waits_ns = at_ns.saturating_sub(execution::since_epoch(now_ns));
+        let waits_ns = entry.at_ns.saturating_sub(execution::since_epoch(now_ns));
         if waits_ns > 0 {
             let due_ns = now_ns.saturating_add(waits_ns);
             timer::set_no_later(this_core::get(), Alarm::Heartbeat, due_ns);
             return false;
         }
         *rest = after;
-        drop(rest);
-        arrive(self.end(), bytes, now_ns);
+        let wire = self.end.wire().name().as_bytes();
+        let is_own = entry.wire == wire || entry.wire.is_empty() && self.is_first;
+        let room = Buffer::HEADROOM..Buffer::HEADROOM + entry.bytes.len();
+        match entry.from {
+            _ if !is_own || room.end > packet.whole().len() => {}
+            None => {
+                drop(playing);
+                arrive(&self.end, entry.bytes, now_ns);
+            }
+            Some(from) => {
+                packet.set_range(room);
+                packet.content_mut().copy_from_slice(entry.bytes);
+                let has_come = self.end.swap_in(packet, from, now_ns);
+                drop(playing);
+                if let Some((plan, dag)) = has_come.then(|| self.end.announce()).flatten() {
+                    execution::raise_in_interrupt(plan, dag);
+                }
+            }
+        }
         true
+    }
+
+    /// Sends a part of the line, or of the next one. Reports whether there was one.
+    fn send_line(&self, is_ready: impl Fn() -> bool, send: impl Fn(u8)) -> bool {
+        // Not under the lock, which keeps interrupts away: a line may be long.
+        let (mut line, mut gone) = core::mem::take(&mut *self.script.line.lock());
+        if gone == line.len() {
+            line.clear();
+            gone = 0;
+            let has_gone = self.end.swap_out(|packet, to| {
+                // Writing to a text succeeds.
+                let _ = write!(line, "wire.{} ", self.end.wire().name());
+                let _ = to.map(|to| write!(line, "{to} "));
+                let _ = writeln!(line, "\"{}\"", packet.content().escape_ascii());
+                true
+            });
+            if has_gone {
+                self.end.tell_gone();
+            }
+        }
+        let rest = &line.as_bytes()[gone..];
+        let has_rest = !rest.is_empty();
+        // What takes bytes at once, as QEMU does, is ready again and again.
+        let parts = rest.chunks(FIFO_BYTES).take(64);
+        for part in parts.take_while(|_| is_ready()) {
+            part.iter().copied().for_each(&send);
+            gone += part.len();
+        }
+        *self.script.line.lock() = (line, gone);
+        has_rest
     }
 }
 
 impl Endpoint for ScriptEndpoint {
     fn begin_run(&self, now_ns: u64) {
-        *self.rest.lock() = self.script;
+        self.playing.lock().rest = self.script.entries;
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, now_ns);
     }
 
@@ -94,31 +230,43 @@ impl Endpoint for ScriptEndpoint {
     }
 
     fn step(&self) -> bool {
-        self.port.step()
+        match self.sends_lines {
+            false => serial::step(&self.end),
+            true => self.send_line(|| SECOND.is_ready(), |byte| SECOND.write(byte)),
+        }
     }
 
     fn end_run(&self) {
-        *self.rest.lock() = &[];
-        self.port.end_run();
+        self.playing.lock().rest = &[];
+        while self.sends_lines && self.send_line(|| true, |byte| SECOND.send(byte)) {}
+        serial::send_rest(&self.end);
     }
 
     fn end(&self) -> &DeviceEnd {
-        self.port.end()
+        &self.end
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::first;
+    use super::{Entry, first};
 
     #[test]
     fn a_script_is_read_entry_by_entry_to_its_end() {
-        let script = b"\x07\0\0\0\0\0\0\0\x02\0ab\x00\x01\0\0\0\0\0\0\x01\0c";
-        let (at_ns, bytes, rest) = first(script).unwrap();
-        assert_eq!((at_ns, bytes), (7, &b"ab"[..]));
-        assert_eq!(first(rest), Some((256, &b"c"[..], &b""[..])));
-        for end in 0..11 {
-            assert_eq!(first(&rest[..end.min(rest.len() - 1)]), None);
+        let script = b"\x07\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x02\0ab\
+            \x00\x01\0\0\0\0\0\0\x0a\0\x02\x02\x07\x01\x04\0\x01\0echoc";
+        let entry = |at_ns, from: Option<&str>, wire, bytes| Entry {
+            at_ns,
+            from: from.map(|from| from.parse().unwrap()),
+            wire,
+            bytes,
+        };
+        let (first_one, rest) = first(script).unwrap();
+        assert_eq!(first_one, entry(7, None, b"", b"ab"));
+        let second = entry(256, Some("10.0.2.2:263"), b"echo", b"c");
+        assert_eq!(first(rest), Some((second, &b""[..])));
+        for end in 0..rest.len() {
+            assert_eq!(first(&rest[..end]), None);
         }
     }
 }

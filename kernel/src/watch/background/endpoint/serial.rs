@@ -16,12 +16,11 @@ use crate::options::UsageError;
 use executive::machine::serial::SECOND;
 use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
-use front::app::ending::AppError;
 
 /// The capacity of the port's FIFO, in bytes.
-const FIFO_BYTES: usize = 16;
+pub(super) const FIFO_BYTES: usize = 16;
 
-pub(super) struct SerialEndpoint {
+struct SerialEndpoint {
     end: DeviceEnd,
     /// Whether a run goes on: bytes that come between runs are of none.
     is_run: AtomicBool,
@@ -29,31 +28,46 @@ pub(super) struct SerialEndpoint {
 
 /// Opens the port.
 pub(super) fn open(wire: &Wire, _words: &EndpointWords<'_>) -> Opened {
-    Ok(Some(Box::new(SerialEndpoint::new(wire)?)))
+    take_port(wire)?;
+    let (end, is_run) = (end_of(wire)?, AtomicBool::new(false));
+    Ok(Some(Box::new(SerialEndpoint { end, is_run })))
 }
 
-/// Whether a wire has the port.
-static IS_TAKEN: AtomicBool = AtomicBool::new(false);
-
-impl SerialEndpoint {
-    pub(super) fn new(wire: &Wire) -> Result<Self, AppError> {
-        if !SECOND.is_there() {
-            let name = wire.name();
-            return Err(AppError::Usage(UsageError::new(format!(
-                "wire `{name}` has no device, as there is no second serial port; give --input FILE \
-                 or --output FILE"
-            ))));
-        }
-        if IS_TAKEN.swap(true, Ordering::Relaxed) {
-            return Err(AppError::Usage(UsageError::new(format!(
-                "wire `{0}` finds the serial port taken by another wire; connect this one \
-                 elsewhere, such as by `wire.{0}=udp://:5000`",
-                wire.name()
-            ))));
-        }
-        let (end, is_run) = (end_of(wire)?, AtomicBool::new(false));
-        Ok(Self { end, is_run })
+/// Takes the port for a wire, once.
+pub(super) fn take_port(wire: &Wire) -> Result<(), UsageError> {
+    static IS_TAKEN: AtomicBool = AtomicBool::new(false);
+    let name = wire.name();
+    if !SECOND.is_there() {
+        return Err(UsageError::new(format!(
+            "wire `{name}` has no device, as there is no second serial port; give --input FILE \
+             or --output FILE"
+        )));
     }
+    match IS_TAKEN.swap(true, Ordering::Relaxed) {
+        false => Ok(()),
+        true => Err(UsageError::new(format!(
+            "wire `{name}` finds the serial port taken by another wire; connect this one \
+             elsewhere, such as by `wire.{name}=udp://:5000`"
+        ))),
+    }
+}
+
+/// Sends some of a wire's bytes, and reports whether there were some.
+pub(super) fn step(end: &DeviceEnd) -> bool {
+    if !end.has_bytes_to_go() {
+        return false;
+    }
+    if SECOND.is_ready() {
+        let bytes = core::iter::from_fn(|| end.depart()).take(FIFO_BYTES);
+        bytes.for_each(|byte| SECOND.write(byte));
+    }
+    true
+}
+
+/// Sends the rest of them.
+pub(super) fn send_rest(end: &DeviceEnd) {
+    core::iter::from_fn(|| end.depart()).for_each(|byte| SECOND.send(byte));
+    SECOND.drain();
 }
 
 impl Endpoint for SerialEndpoint {
@@ -78,20 +92,12 @@ impl Endpoint for SerialEndpoint {
     }
 
     fn step(&self) -> bool {
-        if !self.end.has_bytes_to_go() {
-            return false;
-        }
-        if SECOND.is_ready() {
-            let bytes = core::iter::from_fn(|| self.end.depart()).take(FIFO_BYTES);
-            bytes.for_each(|byte| SECOND.write(byte));
-        }
-        true
+        step(&self.end)
     }
 
     fn end_run(&self) {
         self.is_run.store(false, Ordering::Relaxed);
-        core::iter::from_fn(|| self.end.depart()).for_each(|byte| SECOND.send(byte));
-        SECOND.drain();
+        send_rest(&self.end);
     }
 
     fn end(&self) -> &DeviceEnd {
