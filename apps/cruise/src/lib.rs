@@ -51,7 +51,16 @@ fn decode(line: &[u8]) -> Option<i32> {
 
 /// Builds the DAGs. The run ends after `jobs` periods.
 pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
-    let taking = |name, us| SubtaskAttributes::named(name).wcet(Duration::from_micros(us));
+    let (cruise, brake) = (build_cruise(wire, releases, jobs), build_brake(jobs));
+    let watch = build_watch(wire, &cruise, &brake, jobs);
+    [cruise, brake, watch]
+}
+
+fn taking(name: &str, us: u64) -> SubtaskAttributes {
+    SubtaskAttributes::named(name).wcet(Duration::from_micros(us))
+}
+
+fn build_cruise(wire: &Wire, releases: Releases, jobs: u64) -> Dag {
     let cruise = create_dag();
     (cruise.name("cruise").record::<Option<i32>>("gap")).record::<i32>("speed");
     let mut newest = None;
@@ -88,7 +97,10 @@ pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
         .reads(&["speed"])
         .due(PERIOD)
         .register(taking("drive", 100));
+    cruise
+}
 
+fn build_brake(jobs: u64) -> Dag {
     let brake = create_dag();
     brake.name("brake").jobs(jobs).relative_deadline(PERIOD);
     let mut without = 0_u32;
@@ -100,10 +112,14 @@ pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
         .period(PERIOD)
         .source(slow_down)
         .register(taking("slow_down", 100));
+    brake
+}
 
+/// Watches the link, and enters the mode for it.
+fn build_watch(wire: &Wire, cruise: &Dag, brake: &Dag, jobs: u64) -> Dag {
     let modes = Modes::new();
-    let following = modes.mode("following", &[&cruise]);
-    let lost = modes.mode("lost", &[&brake]);
+    let following = modes.mode("following", &[cruise]);
+    let lost = modes.mode("lost", &[brake]);
     let watch = create_dag();
     watch.name("watch").jobs(jobs);
     watch
@@ -130,5 +146,5 @@ pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
         .due(PERIOD)
         .register(taking("decide", 50));
     watch.record::<bool>("link");
-    [cruise, brake, watch]
+    watch
 }

@@ -26,7 +26,7 @@ const MOST_BYTES: usize = 1024;
 /// The most bytes of a packet: a frame of Ethernet has room for them.
 const MOST_OF_PACKET: usize = 1472;
 
-/// What arrives at once.
+/// Bytes that arrive at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
     /// The number of its line.

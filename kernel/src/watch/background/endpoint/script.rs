@@ -14,7 +14,7 @@
 //! the bytes are a packet. They arrive by the heartbeat's alarm. The host has made the script, and so
 //! what is no entry is its end.
 //!
-//! What is sent goes by the serial port: as it is, of one wire, or, of the wires with the word
+//! Sent packets go by the serial port: as bytes, of one wire, or, of the wires with the word
 //! `wire.NAME=file`, each packet as a line of text, `wire.NAME PEER "BYTES"`, without a peer if none is
 //! stated.
 

@@ -82,8 +82,8 @@ impl Law {
     }
 }
 
-/// What an interrupt of the card takes besides its frames, a frame of the longest ones, and a packet
-/// that is sent; and what the interrupt takes by which a core sends.
+/// The times of an interrupt of the card without its frames, of a frame of the longest ones, of a
+/// packet that is sent, and of the interrupt by which a core sends.
 const RELEASE_NS: u64 = 2_400;
 const FRAME_NS: u64 = 1_500;
 const SENT_NS: u64 = 1_300;
