@@ -15,8 +15,9 @@
 //!   of jobs: as one packet, unless it ends [more](Sender::end_packet). Of an instance that fails
 //!   nothing goes.
 //! - Nobody waits, but an async function that [reads or writes](super::wire_waits): not the device
-//!   for the receiver, nor the sender for the device. What finds no room is lost, as a whole packet, or all that an instance has sent, and the newest: those that were there stay. Losses
-//!   are counted ([`Wire::counts`]).
+//!   for the receiver, nor the sender for the device. Packets without room are lost, on the way out
+//!   all those of an instance, and the newest: earlier ones stay. Losses are counted
+//!   ([`Wire::counts`]).
 //! - The decoder runs in the receiver's instance. If it panics, that is contained as if
 //!   the function had.
 //!
@@ -249,8 +250,8 @@ impl Wire {
         );
     }
 
-    /// Returns the state of its link, which a DAG may read as any [`Parameter`]: whether the cable is
-    /// in, and there is an address. A device that cannot tell has one.
+    /// Returns the state of its link, for a DAG to read as any [`Parameter`]: whether the cable is in,
+    /// and there is an address. A serial port always has a link.
     ///
     /// ```
     /// use fass::shared::Wire;
@@ -323,9 +324,9 @@ impl DeviceEnd {
         is_whole.then(|| self.announce()).flatten()
     }
 
-    /// Takes a packet that has arrived in a buffer, from a peer, by swapping that for a buffer of the
-    /// wire's. Reports whether it did: then the packet is to be [announced](Self::announce). A line
-    /// feed at its end is no part of it if the wire's packets are lines.
+    /// Takes a packet in a buffer, from a peer, by swapping the buffer for one of the wire's. Reports
+    /// whether the packet is there, to be [announced](Self::announce). Where packets are lines, a line
+    /// feed at the end is no part of the packet.
     ///
     /// See [`arrive`](Self::arrive).
     #[must_use]
@@ -346,14 +347,14 @@ impl DeviceEnd {
         self.released()
     }
 
-    /// Reports whether there is a packet that is to go, or the rest of one.
+    /// Reports whether there is a packet to go, or the rest of a packet.
     #[must_use]
     pub fn has_bytes_to_go(&self) -> bool {
         !self.0.shared.outgoing.is_empty()
     }
 
-    /// Begins as a device of packets: none that is sent may have more bytes than that, and `ready` is
-    /// called when there are some to go, in the completion of the instance that has sent them. It
+    /// Begins as a device of packets, of so many bytes at most. `ready` is called when there are some
+    /// to go, in the completion of the sending instance. It
     /// must not block.
     ///
     /// See [`swap_out`](Self::swap_out).
@@ -377,9 +378,9 @@ impl DeviceEnd {
         let _ = self.0.shared.link.set(is_up);
     }
 
-    /// Hands over the oldest packet that is to go, and whom it is to. `send` may swap its buffer for
-    /// another one; the packet has gone if `send` says so. Reports whether it did. Behind it the end
-    /// of the wait for that is [told](Self::tell_gone).
+    /// Hands over the oldest packet to go, and its addressee. `send` may swap the buffer, and reports
+    /// whether the packet has gone, as does this. Behind that the end of the wait is
+    /// [told](Self::tell_gone).
     ///
     /// See [`depart`](Self::depart).
     pub fn swap_out(&self, send: impl FnOnce(&mut Buffer, Option<SocketAddrV4>) -> bool) -> bool {
@@ -491,8 +492,8 @@ impl<T> Iterator for Received<'_, T> {
 }
 
 impl<T> Received<'_, T> {
-    /// Has `look` see the bytes of the next packet where they are, with the time at which it was
-    /// whole and whom it is from: nothing is decoded, or copied. `None` if there is no more.
+    /// Has `look` see the bytes of the next packet in their place, with the packet's time and sender:
+    /// nothing is decoded, or copied. `None` if there is no more.
     ///
     /// ```
     /// use fass::shared::Received;
@@ -520,16 +521,16 @@ impl Sender<'_> {
         self.0.shared.outgoing.stage(bytes);
     }
 
-    /// Ends the packet: what is sent from now on is another one. Without that all that an instance
-    /// sends is one packet. To a device of bytes it makes no difference.
+    /// Ends the packet: later bytes are another packet's. Otherwise all bytes of an instance are one
+    /// packet. To a device of bytes there is no difference.
     ///
     /// See [`Sender::to`].
     pub fn end_packet(&mut self) {
         self.0.shared.outgoing.end_packet();
     }
 
-    /// Says whom this packet is to, and those after it. Without that it is up to the device: to the
-    /// peer that is stated, or else to the one that has sent last.
+    /// Addresses this packet, and those after. Without an address the device decides: for the stated
+    /// peer, or else for the last sender.
     ///
     /// ```
     /// use fass::shared::{Packet, Sender};

@@ -1,13 +1,13 @@
 //! The fifth cell: places that two sides use in turn, a putter and a taker.
 //!
-//! A value stays in its place. The putter changes the places that are its own, and *shows* them to
-//! the taker, all at once; the taker gives each back. So a value is never moved, and a side that a
-//! fault ends in the middle has as many places as before.
+//! A value stays in its place. The putter changes its own places, and *shows* them to the taker, all
+//! at once; the taker gives each back. So no value is ever moved, and a side has as many places as
+//! before even if a fault ends an instance in the middle.
 //!
 //! > **Place invariant.** The places from `read` on up to `written` are the taker's; all others are
 //! > the putter's. Only the putter moves `written`, only the taker moves `read`, both by `Release`
-//! > and over places that were their own; each looks at the other's by `Acquire`. There is one
-//! > putter and one taker, whose doings take `&mut self`.
+//! > and over places of their own; each looks at the other's by `Acquire`. There is a single
+//! > putter and a single taker, whose doings take `&mut self`.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -22,14 +22,14 @@ struct Places<T> {
     read: AtomicUsize,
 }
 
-// SAFETY: by the place invariant a place is one thread's at a time, and `T: Send` goes from one to
+// SAFETY: by the place invariant a place is a single thread's at a time, and `T: Send` goes from one to
 // another.
 unsafe impl<T: Send> Sync for Places<T> {}
 
-/// The end that fills places. There is one, and it cannot be cloned.
+/// The end for filling places. There is no second, and no clone.
 pub(crate) struct Putter<T>(Arc<Places<T>>);
 
-/// The end that empties them. There is one, and it cannot be cloned.
+/// The end for emptying places. There is no second, and no clone.
 pub(crate) struct Taker<T>(Arc<Places<T>>);
 
 /// Says how many places are the taker's, to anybody.
@@ -59,7 +59,7 @@ impl<T> Places<T> {
 }
 
 impl<T> Putter<T> {
-    /// Returns the place that is so many behind those that were shown, unless it is the taker's.
+    /// Returns the place so many behind the shown ones, unless that is the taker's.
     #[inline]
     pub(crate) fn place(&mut self, ahead: usize) -> Option<&mut T> {
         let places = &*self.0;
@@ -69,16 +69,16 @@ impl<T> Putter<T> {
             return None;
         }
         let place = places.place(written.wrapping_add(ahead)).get();
-        // SAFETY: by the place invariant it is the putter's, which we are, and `&mut self` keeps us
+        // SAFETY: by the place invariant the place is the putter's, and `&mut self` keeps us
         // from giving out another reference meanwhile.
         Some(unsafe { &mut *place })
     }
 
-    /// Shows the next places to the taker, which must be the putter's.
+    /// Shows the putter's next places to the taker.
     ///
     /// # Panics
     ///
-    /// If they are not.
+    /// If they are not the putter's.
     #[inline]
     pub(crate) fn show(&mut self, count: usize) {
         if count > 0 {
@@ -90,13 +90,13 @@ impl<T> Putter<T> {
 }
 
 impl<T> Taker<T> {
-    /// Returns a mark between the places that were shown and those that come later.
+    /// Returns a mark between the shown places and later ones.
     #[inline]
     pub(crate) fn mark(&self) -> usize {
         self.0.written.load(Ordering::Acquire)
     }
 
-    /// Returns the oldest place that was shown before the mark.
+    /// Returns the oldest place shown before the mark.
     #[inline]
     pub(crate) fn front(&mut self, mark: usize) -> Option<&mut T> {
         let places = &*self.0;
@@ -104,7 +104,7 @@ impl<T> Taker<T> {
         if read == mark || read == self.mark() {
             return None;
         }
-        // SAFETY: by the place invariant it is the taker's, which we are, and `&mut self` keeps us
+        // SAFETY: by the place invariant the place is the taker's, and `&mut self` keeps us
         // from giving out another reference meanwhile.
         Some(unsafe { &mut *places.place(read).get() })
     }

@@ -6,19 +6,19 @@
 //!
 //! # The way in
 //!
-//! A device of packets swaps the buffer that it has filled for one of the wire's. From a device of
+//! A device of packets swaps a filled buffer for a buffer of the wire's. From a device of
 //! bytes packets are put together in their place. A packet is shown when it is whole, so the
-//! receiver finds whole packets only. One that finds no place is lost, however many there are when
-//! its end comes: the packets before it stay.
+//! receiver finds whole packets only. A packet without a place is lost, even if there are places when
+//! its end comes: the packets before stay.
 //!
-//! The receiver looks at a packet in its place. The receiver notes that, so that an instance that a
-//! fault ends there costs no place: it comes back at the next instance's start.
+//! The receiver looks at a packet in its place, and notes the look: if a fault ends the instance
+//! there, the place comes back at the next instance's start.
 //!
 //! # The way out
 //!
-//! The packets that an instance sends go when it is complete, all or none. The function puts its
-//! bytes into places ahead; the completion shows them, which is one store however many they are. If
-//! one of them finds no place, or is too long, all that the instance sent is lost.
+//! The packets of an instance go at its completion, all or none. The function puts its
+//! bytes into places ahead; the completion shows them, by a single store however many they are. If
+//! a packet finds no place, or is too long, all of them are lost.
 
 use alloc::sync::Arc;
 use core::net::SocketAddrV4;
@@ -91,7 +91,7 @@ impl PacketInPlace {
         }
     }
 
-    /// Takes a byte away from the packet's end, if it ends with that. Returns how many it took.
+    /// Takes this byte away from the packet's end, if there. Returns the number of bytes taken.
     fn strip(&mut self, last: u8) -> usize {
         let is_there = self.buffer.content().last() == Some(&last);
         let range = self.buffer.range();
@@ -100,7 +100,7 @@ impl PacketInPlace {
         count
     }
 
-    /// Appends bytes to the packet, which has so many. Reports whether there was room.
+    /// Appends bytes to a packet of so many. Reports whether there was room.
     fn append(&mut self, after: usize, bytes: &[u8]) -> bool {
         let start = Buffer::HEADROOM;
         let (from, end) = (start + after, start + after + bytes.len());
@@ -117,7 +117,7 @@ impl PacketInPlace {
 pub(crate) struct WireInput {
     framing: Framing,
     longest: usize,
-    /// The device's end, and the packet that is arriving.
+    /// The device's end, and the arriving packet.
     arrivals: ExclusiveCell<(Putter<PacketInPlace>, OpenPacket)>,
     /// The receiver's end, until the receiver has it.
     taker: ExclusiveCell<Option<PacketTaker>>,
@@ -147,7 +147,7 @@ struct OpenPacket {
 }
 
 impl WireInput {
-    /// Makes one with places for so many packets.
+    /// Makes a way in with places for so many packets.
     pub(crate) fn new(framing: Framing, longest: usize, count: usize) -> Self {
         let longest = match framing {
             // A fixed length is the longest packet, whatever the options say.
@@ -199,8 +199,8 @@ impl WireInput {
         is_whole
     }
 
-    /// Takes a packet, which has arrived in a buffer, by swapping that for one of the wire's.
-    /// Reports whether it did.
+    /// Takes a packet in a buffer, by swapping the buffer for a place's. Reports whether the packet
+    /// is there.
     pub(crate) fn swap(
         &self,
         packet: &mut Buffer,
@@ -310,7 +310,7 @@ impl WireInput {
         self.level.is_empty()
     }
 
-    /// Counts a packet that the decoder has refused.
+    /// Counts a packet refused by the decoder.
     pub(crate) fn refuse(&self) {
         self.refused.add(1);
     }
@@ -329,8 +329,8 @@ impl PacketTaker {
         self.taker.mark()
     }
 
-    /// Looks at the oldest packet before the mark, which is given back then. Up to the mark only:
-    /// what comes while the instance runs is for a later one.
+    /// Looks at the oldest packet before the mark, and gives the packet back. Up to the mark only:
+    /// later packets are for a later instance.
     pub(crate) fn take<R>(
         &mut self,
         mark: usize,
@@ -344,7 +344,7 @@ impl PacketTaker {
         Some(seen)
     }
 
-    /// Gives back the packet that an instance held.
+    /// Gives back the packet held by an instance.
     pub(crate) fn give_back(&mut self) {
         if core::mem::take(&mut self.is_held) {
             self.taker.give_back();
@@ -352,7 +352,7 @@ impl PacketTaker {
     }
 }
 
-/// The receiver's end, where handles that may outlive an instance use it in its turns.
+/// The receiver's end for handles that may outlive an instance.
 #[doc(hidden)]
 pub struct SharedTaker(ExclusiveCell<PacketTaker>);
 
@@ -368,13 +368,13 @@ impl SharedTaker {
         taker.take(mark, look)
     }
 
-    /// Begins an instance, which has no claim yet.
+    /// Begins an instance.
     pub(crate) fn begin_instance(&self) {
         forget_claim(&self.0);
     }
 }
 
-/// Forgets what an instance that a fault has ended has left of a wire's end.
+/// Forgets the claim of an instance ended by a fault.
 fn forget_claim<T>(end: &ExclusiveCell<T>) {
     // SAFETY: an end is claimed in turns of its subtask and by their completions only, which is
     // checked where a handle may outlive an instance; the subtask begins an instance now, and so the
@@ -397,14 +397,14 @@ pub(crate) struct WireOutput {
     pub(crate) lost: EventCounter,
 }
 
-/// The packets of an instance that is not complete yet.
+/// The packets of an instance before its completion.
 struct Staging {
     putter: Putter<PacketInPlace>,
-    /// How many packets are whole, how many bytes the one behind them has, and all of them.
+    /// The numbers of whole packets, of bytes of the packet behind them, and of all bytes.
     packets: usize,
     open: usize,
     bytes: usize,
-    /// Whether one of these bytes found no room.
+    /// Whether a byte found no room.
     is_lost: bool,
     peer: Option<SocketAddrV4>,
 }
@@ -417,7 +417,7 @@ struct Leaving {
 }
 
 impl Staging {
-    /// Ends the packet that is open, if it has a byte.
+    /// Ends the open packet, if not empty.
     fn end_packet(&mut self) {
         if core::mem::take(&mut self.open) > 0 && !self.is_lost {
             if let Some(place) = self.putter.place(self.packets) {
@@ -455,7 +455,7 @@ impl WireOutput {
         self.ready.set(ready);
     }
 
-    /// Begins an instance, which has sent nothing yet.
+    /// Begins an instance, with nothing sent.
     pub(crate) fn begin_instance(&self) {
         forget_claim(&self.staging);
         self.show(|_| false);
@@ -478,7 +478,7 @@ impl WireOutput {
         !staging.is_lost
     }
 
-    /// Ends the packet that the instance sends.
+    /// Ends the instance's open packet.
     pub(crate) fn end_packet(&self) {
         if let Some(mut staging) = self.staging.change() {
             staging.end_packet();
@@ -492,7 +492,7 @@ impl WireOutput {
         }
     }
 
-    /// Shows what the instance has sent, if it `is_complete`, or loses it.
+    /// Shows the instance's packets, if it `is_complete`, or loses them.
     fn show(&self, is_complete: impl FnOnce(&Staging) -> bool) {
         let Some(mut staging) = self.staging.change() else {
             return;
@@ -511,7 +511,7 @@ impl WireOutput {
         }
     }
 
-    /// Shows what the complete instance has sent, or loses it where there was no room.
+    /// Shows the complete instance's packets, or loses them where there was no room.
     fn show_staged(&self) {
         self.show(|staging| {
             let count = if staging.is_lost {
@@ -538,8 +538,8 @@ impl WireOutput {
         byte
     }
 
-    /// Hands over the oldest packet that is to go, which `send` may swap for another buffer, and
-    /// takes it away if `send` says so. Reports whether it did.
+    /// Hands over the oldest packet to go. `send` may swap its buffer, and reports whether the packet
+    /// has gone, as does this.
     pub(crate) fn take_packet(&self, send: impl FnOnce(&mut PacketInPlace) -> bool) -> bool {
         let Some(mut leaving) = self.leaving.change() else {
             return false;
