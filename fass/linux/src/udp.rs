@@ -1,8 +1,8 @@
-//! Datagrams: what a wire sends goes to a peer, and what peers send to its port arrives on it.
+//! Datagrams: packets of a wire go to a peer, and those of peers to its port arrive.
 //!
-//! Each wire has a socket, bound to all addresses of this computer, and a thread that waits for
-//! datagrams. One thread sends for all wires. A completion wakes it, by one exchange and, while it
-//! sleeps, one call of the kernel. Neither thread has a level, as with bytes.
+//! Each wire has a socket, bound to all addresses of this computer, and a thread waiting for
+//! datagrams. Another thread sends for all wires. A completion wakes the sender, by an exchange and,
+//! while the sender sleeps, a call of the kernel. Neither thread has a level, as with bytes.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
@@ -18,13 +18,13 @@ use crate::edge::unpoisoned;
 use crate::machine::{Linux, end_of};
 use crate::platform::HOST;
 
-/// The most bytes of a packet that is sent: a frame of Ethernet has room for them.
+/// The most bytes of a packet to send: a frame of Ethernet has room for them.
 const MOST_BYTES: usize = 1472;
 
 /// The most bytes of a datagram.
 const MOST_RECEIVED: usize = 65_536;
 
-/// A wire that is connected to UDP, until this is dropped, which sends what is left to go.
+/// A wire's connection to UDP. Dropping this sends the rest, and ends the connection.
 ///
 /// See [`Linux::connect_udp`].
 #[derive(Debug)]
@@ -38,25 +38,24 @@ struct UdpWire {
     end: DeviceEnd,
     socket: UdpSocket,
     peer: Option<SocketAddrV4>,
-    /// The peer that has sent last.
+    /// The latest peer.
     last: Mutex<Option<SocketAddrV4>>,
     has_ended: AtomicBool,
 }
 
-/// The wires that are connected. Who sends on one holds them.
+/// The connected wires, locked while sending.
 static WIRES: Mutex<Vec<Arc<UdpWire>>> = Mutex::new(Vec::new());
 
-/// The thread that sends, once there is a wire.
+/// The sending thread, once there is a wire.
 static SENDER: OnceLock<Thread> = OnceLock::new();
 
 impl Linux {
-    /// Connects a wire to UDP, from a port of this computer; 0 is any that is free. With a peer the
-    /// wire hears that peer alone. Without one it hears everyone, and answers whom an instance
-    /// [says](fass::shared::Sender::to), or else who has sent last. To be called after the commit and
+    /// Connects a wire to UDP, from a port of this computer; 0 is any free port. A wire with a peer
+    /// hears nobody else. Without a peer the wire hears everyone, and answers whom an instance
+    /// [says](fass::shared::Sender::to), or else the latest peer. To be called after the commit and
     /// once a wire.
     ///
-    /// A packet that is sent has at most 1,472 bytes. The wire's link is up as long as it is
-    /// connected.
+    /// A packet goes with 1,472 bytes at most. The wire's link is up during the connection.
     ///
     /// ```
     /// use std::time::Duration;
@@ -119,7 +118,7 @@ impl Linux {
     }
 }
 
-/// Sends what is to go, again and again.
+/// Sends packets of all wires, again and again.
 fn send() {
     loop {
         unpoisoned(&WIRES).iter().for_each(|wire| wire.send());
@@ -128,12 +127,12 @@ fn send() {
 }
 
 impl UdpWire {
-    /// Sends what is to go.
+    /// Sends all packets.
     fn send(&self) {
         let send = |packet: &mut Buffer, to: Option<SocketAddrV4>| {
             let last = || *unpoisoned(&self.last);
-            // Without a peer there is nobody whom it could be for. What the kernel refuses is lost, as
-            // it may be on any way.
+            // Without a peer the packet is for nobody. If the kernel refuses a packet, that is lost, as
+            // on any way.
             if let Some(to) = to.or(self.peer).or_else(last) {
                 let _ = self.socket.send_to(packet.content(), to);
             }
@@ -144,10 +143,10 @@ impl UdpWire {
         }
     }
 
-    /// Lets arrive what comes, until the end.
+    /// Lets datagrams arrive, until the end.
     fn receive(&self) {
-        // Behind the headroom each buffer has room for the wire's longest packet. From one byte before
-        // that on a longer one, though it is cut, is too long all the same, and counted.
+        // Behind the headroom each buffer has room for the wire's longest packet. With a byte more, a
+        // longer datagram, though cut, is too long all the same, and counted.
         const START: usize = Buffer::HEADROOM - 1;
         let mut buffer = Buffer::new(START + MOST_RECEIVED);
         loop {
@@ -155,7 +154,7 @@ impl UdpWire {
             if self.has_ended.load(Ordering::Acquire) {
                 return;
             }
-            // An error is the limit of the wait, or an interrupted one.
+            // An error ends a wait, at the limit or by a signal.
             if let Ok((count, SocketAddr::V4(from))) = received
                 && self.peer.is_none_or(|peer| peer == from)
             {
@@ -172,7 +171,7 @@ impl UdpWire {
 }
 
 impl UdpConnection {
-    /// Returns the port of this computer that the wire has.
+    /// Returns the wire's port of this computer.
     #[must_use]
     pub fn port(&self) -> u16 {
         let address = self.wire.socket.local_addr();
@@ -190,7 +189,7 @@ impl Drop for UdpConnection {
         wire.end.set_link(false);
         wire.has_ended.store(true, Ordering::Release);
         let _ = wire.socket.send_to(&[], (Ipv4Addr::LOCALHOST, self.port()));
-        // Then the port is free. It does not panic.
+        // Then the port is free. The thread does not panic.
         let _ = self.receiver.take().map(JoinHandle::join);
     }
 }

@@ -1,6 +1,6 @@
-//! Wires that are connected to UDP, with their peers on loopback.
+//! Wires connected to UDP, with their peers on loopback.
 
-use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::thread;
 use std::time::Duration;
 
@@ -8,7 +8,16 @@ use crate::support::{alone, every, mechanisms, ms};
 use fass::shared::{Framing, Received, Sender, Wire, WireOptions};
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 
-/// A DAG that sends back what comes: to whom, the packet says, if the DAG `answers`, or else the device.
+fn wire(name: &str) -> Wire {
+    let options = WireOptions {
+        framing: Framing::Chunks,
+        longest_bytes: 3_000,
+        room: 16,
+    };
+    Wire::with(name, options)
+}
+
+/// A DAG that sends packets back: to their peers, if the DAG `answers`, or as the device has it.
 fn echoing(wire: &Wire, answers: bool) -> Dag {
     let dag = create_dag();
     dag.name(wire.name()).relative_deadline(ms(50));
@@ -51,27 +60,20 @@ fn hear(socket: &UdpSocket) -> Vec<u8> {
 fn each_wire_hears_its_peers_and_counts_what_is_too_long() {
     for mechanism in mechanisms() {
         let alone = alone(2, mechanism);
-        let options = WireOptions {
-            framing: Framing::Chunks,
-            longest_bytes: 3_000,
-            room: 16,
-        };
-        let [open, closed] = ["open", "closed"].map(|name| Wire::with(name, options));
+        let [open, closed] = ["open", "closed"].map(wire);
         let dags = [
             echoing(&open, true),
             echoing(&closed, false),
             every(ms(10), "clock"),
         ];
-        // It keeps the run going until it is closed.
+        // The run goes on until it is closed.
         dags[2].register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
         finish_create_dags(&dags).expect("they are sound");
         let control = alone.machine.control().expect("it is committed");
         let peers = [peer(), peer(), peer()];
-        let only = match peers[2].local_addr().expect("it is bound") {
-            SocketAddr::V4(address) => Some(address),
-            SocketAddr::V6(_) => None,
-        };
-        let connections = [(&open, None), (&closed, only)].map(|(wire, peer)| {
+        let only = peers[2].local_addr().expect("it is bound").port();
+        let only = SocketAddrV4::new(Ipv4Addr::LOCALHOST, only);
+        let connections = [(&open, None), (&closed, Some(only))].map(|(wire, peer)| {
             let connected = alone.machine.connect_udp(wire, 0, peer);
             connected.expect("there is a port")
         });
@@ -80,7 +82,6 @@ fn each_wire_hears_its_peers_and_counts_what_is_too_long() {
         let own = closed.clone();
         let talker = thread::spawn(move || {
             for number in 1..=30_u8 {
-                // Each of them asks before one is answered.
                 let ways = [(&peers[0], first), (&peers[1], first), (&peers[2], second)];
                 for (peer, port) in ways {
                     say(peer, port, &[number; 50]);
@@ -90,7 +91,7 @@ fn each_wire_hears_its_peers_and_counts_what_is_too_long() {
                 }
             }
             say(&peers[0], second, b"stop");
-            // The one that is heard is too long to go back. In its place there is a buffer of the
+            // The second is heard, and too long to go back. In its place there is a buffer of the
             // wire now.
             for length in [3_001, 3_000, 9_000] {
                 say(&peers[2], second, &vec![7; length]);
