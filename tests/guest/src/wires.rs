@@ -1,4 +1,4 @@
-//! Two wires that cross: what comes on one goes out on the other, a packet for each.
+//! Two wires that cross: packets of each go out on the other.
 
 use core::fmt::Write;
 use core::time::Duration;

@@ -1,4 +1,4 @@
-//! Packets that go back to whom they came from: by a script on the machine, over loopback on Linux.
+//! Packets that go back to their peers: by a script on the machine, over loopback on Linux.
 
 use std::io::Write;
 use std::net::{Ipv4Addr, UdpSocket};
@@ -9,8 +9,8 @@ use harness::{Guest, Members, Said};
 use tool::image;
 use tool::protocol::Transcript;
 
-/// Several packets at once and more than a job takes, the last one as long as can be; half of the
-/// lines name their wire.
+/// Several packets at once and more than a job takes, the last as long as can be; half of the lines
+/// name their wire.
 #[test]
 fn the_packets_of_a_script_go_back_as_the_same_bytes_in_every_run_on_any_cores() {
     let (mut script, mut wanted) = (String::new(), String::new());
@@ -55,7 +55,7 @@ fn two_wires_of_a_script_have_their_own_packets_and_lines() {
         .succeed_sending();
     let wanted = "wire.two \"a!\"\nwire.two \"b!\"\nwire.one \"c!\"\n";
     assert_eq!(String::from_utf8_lossy(&sent), wanted);
-    // Bytes without a word go as they are, by a port that one wire has.
+    // Bytes without a word go as they are, so no second wire has the port.
     let guest = Guest::test("wires").input("1ms \"a\\n\"\n");
     let refused = guest
         .altered(
@@ -70,7 +70,7 @@ fn two_wires_of_a_script_have_their_own_packets_and_lines() {
     assert_eq!(refused, "`wire.echo=file` has no file; give --input FILE");
 }
 
-/// The program of Linux, with these words.
+/// Linux' program, with these words.
 fn on_linux(words: &str) -> Command {
     let mut command = Command::new(image::build_linux("echo", None).expect("it is built"));
     command.args(["cores=1", "mechanism=normal", "budget_factor=0"]);
@@ -99,7 +99,7 @@ fn on_linux_200_packets_go_back_in_their_order() {
         let count = socket.recv(&mut bytes).ok()?;
         Some(bytes[..count].to_vec())
     };
-    // It is up when it answers. What comes before is lost, and some may be answered late.
+    // The program is up when there is an answer. Earlier questions are lost, or answered late.
     let answers = || {
         say(b"up?");
         hear(100)

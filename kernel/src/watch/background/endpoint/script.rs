@@ -1,8 +1,8 @@
-//! A script: what arrives, with its times, in place of what a device would bring.
+//! A script: bytes with their times, which arrive in place of a device's.
 //!
 //! Where runs have to repeat, input is a script in the loader's module. An entry of it is
 //!
-//! | bytes | what |
+//! | bytes | meaning |
 //! | --- | --- |
 //! | 8 | a time of the run, in nanoseconds |
 //! | 4, 2 | the address and the port of the peer; the port is 0 where there is none |
@@ -14,7 +14,7 @@
 //! the bytes are a packet. They arrive by the heartbeat's alarm. The host has made the script, and so
 //! what is no entry is its end.
 //!
-//! Sent packets go by the serial port: as bytes, of one wire, or, of the wires with the word
+//! Sent bytes go by the serial port: of one wire, as they are, or, of wires with the word
 //! `wire.NAME=file`, each packet as a line of text, `wire.NAME PEER "BYTES"`, without a peer if none is
 //! stated.
 
