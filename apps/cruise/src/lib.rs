@@ -53,7 +53,8 @@ fn decode(line: &[u8]) -> Option<i32> {
 pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
     let (cruise, brake) = (build_cruise(wire, releases, jobs), build_brake(jobs));
     let watch = build_watch(wire, &cruise, &brake, jobs);
-    [cruise, brake, watch]
+    // Next to each other in a cluster are the two of the modes, where there are two clusters.
+    [cruise, watch, brake]
 }
 
 fn taking(name: &str, us: u64) -> SubtaskAttributes {

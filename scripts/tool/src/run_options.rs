@@ -84,7 +84,7 @@ options! {
     MECHANISM: Takes::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
     /// On debian: so many programs next to it.
     BUSY: Takes::Number(0, 64);
-    /// The order of instances; see docs/guide.md.
+    /// Order of instances.
     POLICY in "rules": Takes::OneOf(Policy::WORDS);
     /// Whether instances may lose their cores.
     PREEMPTION: Takes::OneOf(&["on", "off"]);
@@ -124,7 +124,7 @@ options! {
     DOT: Takes::File("FILE");
     /// Measure, commit, and compare; docs/proving.md.
     PROVE in "bounds": Takes::Nothing;
-    /// --prove: per cent above the longest call; 20.
+    /// --prove: per cent more; 20.
     MARGIN: Takes::Number(0, 1_000);
     /// --prove: measure so many seeds; 1.
     SEEDS: Takes::Number(1, 1_000);
