@@ -260,10 +260,14 @@ impl<B: AsMut<[u8]>> Interface<B> {
         // The answer has no options, so its message may move to the front.
         let start = ipv4::START + ipv4::LENGTH;
         let end = start + packet.payload.len();
-        frame.copy_within(packet.payload.clone(), start);
+        if packet.payload.start != start {
+            frame.copy_within(packet.payload.clone(), start);
+        }
+        // The sum grows by what the first word loses, so the rest is not added once more.
         let message = &mut frame[start..end];
+        let check = u16_at(message, 2)?;
         put(message, 0, &[0; 4]);
-        let check = check_sum(sum(message, 0));
+        let check = !check_sum(u64::from(check) + 0x0800);
         put(message, 2, &check.to_be_bytes());
         self.write_ipv4(&mut frame[..end], ipv4::ICMP, packet.from);
         self.write_ethernet(frame, to, TYPE_IPV4);

@@ -24,7 +24,7 @@ fn next(client: &mut Client) -> u8 {
 }
 
 /// Returns the answer of a server to a message.
-fn answer(to: &[u8], kind: u8, seconds: u32) -> Vec<u8> {
+pub(super) fn answer(to: &[u8], kind: u8, seconds: u32) -> Vec<u8> {
     let mut answer = to.to_vec();
     answer[0] = 2;
     answer[16..20].copy_from_slice(&IP.octets());

@@ -2,6 +2,7 @@
 
 use core::net::Ipv4Addr;
 
+use crate::mutation::{mend, ping, vectors};
 use net::{Address, Counts, HEADERS, Heard, Interface, MOST_PAYLOAD, Mac, Peer, Route};
 
 pub(super) const MAC: Mac = Mac([0x52, 0x54, 0, 0x12, 0x34, 0x56]);
@@ -22,13 +23,6 @@ pub(super) fn interface() -> Interface<Vec<u8>> {
 
 fn peer(ip: Ipv4Addr, port: u16) -> Peer {
     Peer { ip, port }
-}
-
-/// Frames that QEMU's user network and a raw socket have sent.
-pub(super) fn vectors() -> Vec<Vec<u8>> {
-    let byte = |pair: &[u8]| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap();
-    let frame = |line: &str| line.as_bytes().chunks(2).map(byte).collect();
-    include_str!("frames.hex").lines().map(frame).collect()
 }
 
 /// Returns a frame with a datagram, and the way it goes.
@@ -62,6 +56,30 @@ fn frames_of_others_are_understood() {
         }
     }
     assert_eq!(interface.counts().malformed + interface.counts().foreign, 0);
+}
+
+#[test]
+fn an_echo_is_answered_with_the_right_sum() {
+    let mut payloads = vec![vec![0; 56], vec![0xff; 56], vec![7; 1472]];
+    payloads.extend((0..=255).map(|byte| vec![byte, 0xf7, byte]));
+    for payload in payloads {
+        for identifier in [0, 0xf7ff, 0xffff_u16] {
+            let mut frame = ping(&payload);
+            frame[38..40].copy_from_slice(&identifier.to_be_bytes());
+            mend(&mut frame);
+            let (mut here, mut right) = (interface(), frame.clone());
+            let Heard::Answer { length, .. } = here.hear(&mut frame) else {
+                panic!("no answer");
+            };
+            right[34] = 0;
+            mend(&mut right);
+            // 0 is the same as 0xffff, but for a sum of nothing but zeros.
+            let sums =
+                [&frame, &right].map(|frame| u16::from_be_bytes([frame[36], frame[37]]) % 0xffff);
+            assert!(sums[0] == sums[1] && length == right.len());
+            assert!(frame[36..40] != [0; 4] || payload.iter().any(|byte| *byte > 0));
+        }
+    }
 }
 
 #[test]
@@ -213,17 +231,4 @@ fn what_is_not_ours_or_not_whole_is_counted() {
     for edits in malformed {
         assert_eq!(counted(&mut here, edited(edits)), (1, 0), "{edits:?}");
     }
-}
-
-/// Mends the check sum of the header, and leaves that of a datagram out.
-pub(super) fn mend(frame: &mut [u8]) {
-    frame[24..26].fill(0);
-    let words = frame[14..34].chunks(2);
-    let sum: u32 = words
-        .map(|word| u32::from(word[0]) << 8 | u32::from(word[1]))
-        .sum();
-    let sum = (sum & 0xffff) + (sum >> 16);
-    let check = !u16::try_from((sum & 0xffff) + (sum >> 16)).unwrap();
-    frame[24..26].copy_from_slice(&check.to_be_bytes());
-    frame[40..42].fill(0);
 }

@@ -5,3 +5,4 @@
 mod dhcp;
 mod frames;
 mod mutated;
+mod mutation;
