@@ -102,6 +102,8 @@ pub(super) struct Network {
     is_run: AtomicBool,
     is_linked: AtomicBool,
     interrupts: AtomicU64,
+    /// Those that have come to another core.
+    elsewhere: AtomicU64,
     longest_ns: AtomicU64,
     /// Datagrams to no wire.
     unheard: AtomicU64,
@@ -232,6 +234,7 @@ impl Network {
             is_run: AtomicBool::new(false),
             is_linked: AtomicBool::new(false),
             interrupts: AtomicU64::new(0),
+            elsewhere: AtomicU64::new(0),
             longest_ns: AtomicU64::new(0),
             unheard: AtomicU64::new(0),
         }
@@ -285,6 +288,9 @@ impl Network {
         let took_ns = clock::now_ns().saturating_sub(now_ns);
         self.longest_ns.fetch_max(took_ns, Ordering::Relaxed);
         self.interrupts.fetch_add(1, Ordering::Relaxed);
+        let is_elsewhere = this_core::get().index != self.core.load(Ordering::Relaxed);
+        self.elsewhere
+            .fetch_add(is_elsewhere.into(), Ordering::Relaxed);
     }
 
     /// Lets the card interrupt this core again, when the distance has passed.
@@ -404,6 +410,8 @@ impl Network {
                 .number("datagrams", counts.datagrams)
                 .number("unheard", unheard)
                 .number("interrupts", interrupts)
+                .number("core", self.core.load(Ordering::Relaxed))
+                .number("elsewhere", self.elsewhere.load(Ordering::Relaxed))
                 .number("most_packets", self.law.most)
                 .number("distance_ns", self.law.distance_ns)
                 .number("longest_ns", longest_ns);
