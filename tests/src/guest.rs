@@ -13,20 +13,22 @@
 //! Any failure ends in a panic that shows the end of the serial log
 //! and where all of it lies. A good run's log is removed.
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
+use std::panic;
 use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
+use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 use std::time::Duration;
 
 use tool::image;
 use tool::install;
 use tool::outcome::{Outcome, boot_with_input};
 use tool::protocol::Status;
-use tool::qemu::{Loader, Machine, Mode, Qemu, Second};
+use tool::qemu::{Loader, Machine, Mode, Network, Qemu, Second};
 use tool::{system, wire_script};
 
 use crate::Said;
@@ -149,6 +151,17 @@ impl Guest {
         self.altered(&[("#max", model)], "")
     }
 
+    /// Puts a card of that name in a network, given by QEMU's words. It is in a q35.
+    #[must_use]
+    pub fn network(mut self, card: &'static str, words: &str) -> Guest {
+        self.qemu.network = Some(Network {
+            words: words.into(),
+            card,
+            traffic: None,
+        });
+        self.machine(Machine::Q35)
+    }
+
     /// Leaves a file in the guest's memory.
     #[must_use]
     pub fn module(mut self, file: &Path) -> Guest {
@@ -241,6 +254,52 @@ impl Guest {
     /// Panics if QEMU or the image is missing and cannot be had.
     #[must_use]
     pub fn boot(&self) -> Outcome {
+        let pipe = Mutex::new(None);
+        let mut left = self.conversation.iter().peekable();
+        self.boot_hearing(&pipe, |line| {
+            let answers = |(text, _): &&(String, String)| line.contains(text);
+            if let Some((_, answer)) = left.next_if(answers) {
+                say(&pipe, &format!("{answer}\n"));
+            }
+        })
+    }
+
+    /// Boots the guest, which must succeed, next to a peer, which gets the guest's lines. When the
+    /// peer is done the guest is ended by ctrl-C.
+    ///
+    /// # Panics
+    ///
+    /// As [`succeed`](Self::succeed), and if the peer does.
+    pub fn succeed_beside<T: Send>(
+        self,
+        peer: impl FnOnce(&Receiver<String>) -> T + Send,
+    ) -> (Outcome, T) {
+        let mut guest = self.word("console=stop");
+        guest.qemu.has_input = true;
+        // The peer does not wait for a compiler.
+        let _ = built(&guest.package);
+        let pipe = Mutex::new(None);
+        let (tell, lines) = mpsc::channel();
+        thread::scope(|scope| {
+            let peer = scope.spawn(move || peer(&lines));
+            let pipe = &pipe;
+            let peer = scope.spawn(move || {
+                let found = peer.join();
+                say(pipe, "\x03");
+                found
+            });
+            let outcome = guest.boot_hearing(pipe, |line| drop(tell.send(line.into())));
+            drop(tell);
+            let found = peer.join().flatten();
+            let found = found.unwrap_or_else(|why| {
+                eprintln!("{}", outcome.tail());
+                panic::resume_unwind(why)
+            });
+            (judged(outcome), found)
+        })
+    }
+
+    fn boot_hearing(&self, pipe: &Mutex<Option<ChildStdin>>, hear: impl FnMut(&str)) -> Outcome {
         let run = || {
             let image = match &self.image {
                 Some(file) => install::ensure_qemu().map(|()| file.clone())?,
@@ -252,19 +311,7 @@ impl Guest {
             let mode = format!("mode={}", qemu.mode);
             let words = std::iter::once(&mode).chain(&self.words);
             qemu.guest_words = words.cloned().collect::<Vec<_>>().join(" ");
-            let pipe: RefCell<Option<ChildStdin>> = RefCell::new(None);
-            let mut left = self.conversation.iter().peekable();
-            let hear = |line: &str| {
-                let mut pipe = pipe.borrow_mut();
-                let answers = |(text, _): &&(String, String)| line.contains(text);
-                if let Some(pipe) = pipe.as_mut()
-                    && let Some((_, answer)) = left.next_if(answers)
-                {
-                    // If the guest is gone, its outcome says so.
-                    let _ = writeln!(pipe, "{answer}");
-                }
-            };
-            let connect = |input| *pipe.borrow_mut() = input;
+            let connect = |input| *pipe.lock().expect("nobody panics with it") = input;
             boot_with_input(&qemu, &image, &log, self.limit, connect, hear)
         };
         run().unwrap_or_else(|error: String| panic!("`{}` did not boot: {error}", self.package))
@@ -277,12 +324,7 @@ impl Guest {
     /// Panics with the serial log's end if it does not.
     #[must_use]
     pub fn succeed(&self) -> Outcome {
-        let outcome = self.boot();
-        if let Err(fault) = outcome.judge() {
-            panic!("{}\n{}", fault.reason, outcome.tail());
-        }
-        let _ = fs::remove_file(&outcome.log);
-        outcome
+        judged(self.boot())
     }
 
     /// Boots the guest, which must end with this status and say so in both
@@ -313,6 +355,23 @@ impl Guest {
     pub fn refusal(&self) -> String {
         self.end_in(Status::Usage).reason()
     }
+}
+
+/// Says something to a guest. If it is gone, its outcome says so.
+fn say(pipe: &Mutex<Option<ChildStdin>>, words: &str) {
+    if let Some(pipe) = pipe.lock().expect("nobody panics with it").as_mut() {
+        let _ = pipe.write_all(words.as_bytes());
+    }
+}
+
+/// Returns an outcome, which must be a success, and removes its log.
+#[track_caller]
+fn judged(outcome: Outcome) -> Outcome {
+    if let Err(fault) = outcome.judge() {
+        panic!("{}\n{}", fault.reason, outcome.tail());
+    }
+    let _ = fs::remove_file(&outcome.log);
+    outcome
 }
 
 /// Builds each image once in the life of a test binary.

@@ -17,6 +17,7 @@ mod input;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
+mod network;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -58,6 +59,7 @@ const TESTS: &[(&str, Test)] = &[
     ("exceeded", single::exceeded),
     ("input", input::run),
     ("large", large::run),
+    ("network", network::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("stamped", recorded::stamped),

@@ -20,6 +20,7 @@ mod input;
 mod join_latency;
 mod kernel;
 mod module;
+mod network;
 mod new_app;
 mod on_screen;
 mod oracle_in_kernel;
