@@ -50,6 +50,9 @@ with the command that runs its round again.
 With --jobs, random sets with all features of DAGs together are first run in
 virtual time, each run varied towards a response beyond its bound; then it
 prints how many of those jobs each pair of features had.
+With --frames, and nothing else, so many frames of a network with wrong bytes are
+heard on the host, and a tenth of them on the machine, with as large a flood of
+right ones, next to a control loop that may miss nothing.
 
 exit codes: 0 no round failed; 1 some did; 2 a refused command line
 ",
@@ -62,6 +65,8 @@ options! {
     CORES: Takes::Number(1, MOST_CORES), or "4";
     /// Jobs of random sets to simulate on the host first, which takes minutes for 10^8.
     JOBS: Takes::Number(1, 1_000_000_000_000);
+    /// Frames with wrong bytes to hear, instead of rounds.
+    FRAMES: Takes::Number(1, 1_000_000_000_000);
     /// The first round.
     FIRST: Takes::Number(0, 1_000_000), or "0";
     /// How many rounds, that is sets of DAGs; 84, with --short 16.
@@ -82,6 +87,9 @@ options! {
 /// Runs the subcommand with the words after its name.
 pub fn soak(words: &[OsString]) -> ExitCode {
     SOAK.carry_out(words, |options| {
+        if let Some(frames) = options.number(name::FRAMES) {
+            return Ok(hear(frames, options.number(name::SEED).unwrap_or(1))?);
+        }
         let are_kept = options.number(name::JOBS).map_or(Ok(true), simulate)?;
         let plan = plan(options);
         let rounds = plan.rounds.end - plan.rounds.start;
@@ -102,15 +110,42 @@ pub fn soak(words: &[OsString]) -> ExitCode {
 /// Runs the property that holds bounds against virtual time, for so many jobs, as fast as it can
 /// be. Reports whether it holds.
 fn simulate(jobs: u64) -> Result<bool, String> {
+    let test = ["sched-dag", "it", "bounds_hold_whatever"];
+    hold(test, &[("ANALYSIS_JOBS", jobs)])
+}
+
+/// Has the network's protocols hear so many frames with wrong bytes, and the machine a tenth.
+fn hear(frames: u64, seed: u64) -> Result<ExitCode, String> {
+    let mut are_heard = true;
+    for (test, count) in [
+        (["net", "it", "no_mutated_frame"], frames),
+        (
+            ["harness", "boots", "no_storm_of_frames"],
+            frames.div_ceil(10),
+        ),
+    ] {
+        are_heard &= hold(test, &[("FRAMES", count), ("SEED", seed)])?;
+    }
+    Ok(ExitCode::from(u8::from(!are_heard)))
+}
+
+/// Runs a test of a package, given by its target and name, with these numbers in its environment,
+/// and reports whether it passes. The package is as fast as it can be.
+fn hold([package, target, test]: [&str; 3], numbers: &[(&str, u64)]) -> Result<bool, String> {
     let mut cargo = system::cargo();
-    for package in ["sched-dag", "random"] {
+    for package in [package, "random"] {
         cargo.arg(format!(
             "--config=profile.dev.package.{package}.opt-level=3"
         ));
     }
-    cargo.args(["test", "--quiet", "--package=sched-dag", "--test=it"]);
-    cargo.args(["bounds_hold_whatever", "--", "--nocapture"]);
-    let status = cargo.env("ANALYSIS_JOBS", jobs.to_string()).status();
+    cargo.args(["test", "--quiet", "--package", package, "--test", target]);
+    cargo.args([test, "--", "--nocapture"]);
+    cargo.envs(
+        numbers
+            .iter()
+            .map(|(name, number)| (name, number.to_string())),
+    );
+    let status = cargo.status();
     Ok(status
         .map_err(|error| format!("cannot start cargo: {error}"))?
         .success())
