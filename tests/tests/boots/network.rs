@@ -119,10 +119,6 @@ fn a_machine_without_a_card_and_wrong_words_are_refused_with_a_remedy() {
         assert_eq!(guest.end_in(Status::Failure).reason(), reason);
     }
     assert_eq!(
-        Guest::new("echo").word("wire.echo=tcp://:1").refusal(),
-        "`wire.echo=tcp://:1`: allowed are udp://:PORT, udp://ADDRESS:PORT, serial and file"
-    );
-    assert_eq!(
         echo.word("net=10.0.2.15").refusal(),
         "`net=10.0.2.15`: allowed are dhcp, ADDRESS/PREFIX and ADDRESS/PREFIX,GATEWAY, such as \
          10.0.2.15/24,10.0.2.2"

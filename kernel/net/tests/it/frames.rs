@@ -58,27 +58,20 @@ fn frames_of_others_are_understood() {
     assert_eq!(interface.counts().malformed + interface.counts().foreign, 0);
 }
 
+// 0 is the same sum as 0xffff, but for nothing but zeros.
 #[test]
 fn an_echo_is_answered_with_the_right_sum() {
-    let mut payloads = vec![vec![0; 56], vec![0xff; 56], vec![7; 1472]];
-    payloads.extend((0..=255).map(|byte| vec![byte, 0xf7, byte]));
-    for payload in payloads {
-        for identifier in [0, 0xf7ff, 0xffff_u16] {
-            let mut frame = ping(&payload);
-            frame[38..40].copy_from_slice(&identifier.to_be_bytes());
-            mend(&mut frame);
-            let (mut here, mut right) = (interface(), frame.clone());
-            let Heard::Answer { length, .. } = here.hear(&mut frame) else {
-                panic!("no answer");
-            };
-            right[34] = 0;
-            mend(&mut right);
-            // 0 is the same as 0xffff, but for a sum of nothing but zeros.
-            let sums =
-                [&frame, &right].map(|frame| u16::from_be_bytes([frame[36], frame[37]]) % 0xffff);
-            assert!(sums[0] == sums[1] && length == right.len());
-            assert!(frame[36..40] != [0; 4] || payload.iter().any(|byte| *byte > 0));
-        }
+    for byte in 0..=255 {
+        let mut frame = ping(&[byte; 3]);
+        frame[38..42].fill(byte);
+        mend(&mut frame);
+        let mut right = frame.clone();
+        assert!(matches!(interface().hear(&mut frame), Heard::Answer { .. }));
+        right[34] = 0;
+        mend(&mut right);
+        let sum = |frame: &[u8]| u16::from_be_bytes([frame[36], frame[37]]);
+        assert_eq!(sum(&frame) % 0xffff, sum(&right) % 0xffff);
+        assert!(byte > 0 || sum(&frame) > 0);
     }
 }
 
