@@ -206,7 +206,8 @@ fn take_zeroed(frames: &mut FreeFrames) -> Option<u64> {
 ///
 /// [`MapError::AlreadyMapped`] where memory or something else is.
 pub fn map_registers(range: Range<u64>) -> Result<(), MapError> {
-    let pages = range.start / PAGE * PAGE..range.end.next_multiple_of(PAGE);
+    let end = range.end.checked_next_multiple_of(PAGE);
+    let pages = range.start / PAGE * PAGE..end.unwrap_or(u64::MAX);
     if pages.start == 0 || pages.end > STACK_WINDOW {
         return Err(MapError::AlreadyMapped);
     }
@@ -274,6 +275,12 @@ mod tests {
     use super::*;
 
     const MIB: u64 = 1 << 20;
+
+    #[test]
+    fn registers_at_the_end_of_all_addresses_are_refused() {
+        let end = u64::MAX - 0xfff;
+        assert_eq!(map_registers(end..end + 16), Err(MapError::AlreadyMapped));
+    }
 
     #[test]
     fn processors_start_at_the_highest_low_page_that_is_free() {
