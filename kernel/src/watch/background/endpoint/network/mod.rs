@@ -427,6 +427,8 @@ impl NetworkSender {
             .address_datagram(packet.content_mut(), port, to)
         {
             Route::Ready if self.transmitter.send(packet) => Sent::Gone,
+            // It has no way, and would keep those behind it.
+            Route::None if !self.interface.address().ip.is_unspecified() => Sent::Gone,
             Route::Ready | Route::None => Sent::Waits,
             Route::Unresolved(neighbour) => {
                 self.interface.keep(neighbour, packet);
@@ -480,5 +482,53 @@ impl NetworkSender {
             let address = client.lease().map_or(Address::NONE, |lease| lease.address);
             self.interface.set_address(address);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Free;
+
+    impl Transmit for Free {
+        fn send(&mut self, _frame: &mut Buffer) -> bool {
+            true
+        }
+
+        fn ring(&mut self) {}
+    }
+
+    #[test]
+    fn a_packet_without_a_way_waits_for_an_address_only() {
+        let room = || Buffer::new(Buffer::LEAST_BYTES);
+        let mut sender = NetworkSender {
+            transmitter: Box::new(Free),
+            interface: Interface::new(Mac([2; 6]), Address::NONE, room),
+            dhcp: None,
+            own: room(),
+        };
+        let ip = [10, 0, 2, 15].into();
+        let own = Address {
+            ip,
+            prefix: 24,
+            gateway: None,
+        };
+        let has_gone = |sender: &mut NetworkSender, ip: [u8; 4]| {
+            let mut packet = Buffer::from(&[0; net::HEADERS + 1][..]);
+            let peer = Peer {
+                ip: ip.into(),
+                port: 7,
+            };
+            matches!(sender.send(&mut packet, 5000, peer), Sent::Gone)
+        };
+        assert!(!has_gone(&mut sender, [1, 2, 3, 4]));
+        sender.interface.set_address(own);
+        assert!(
+            has_gone(&mut sender, [10, 0, 2, 2]),
+            "its neighbour is asked"
+        );
+        // Whoever names such a peer would else silence the wire for good.
+        assert!(has_gone(&mut sender, [1, 2, 3, 4]), "nobody leads there");
     }
 }
