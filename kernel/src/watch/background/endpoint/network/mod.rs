@@ -284,7 +284,7 @@ impl Network {
             }
         }
         drop(receiver);
-        self.wires.iter().for_each(UdpWire::tell);
+        self.wires.iter().for_each(UdpWire::tell_come);
         let took_ns = clock::now_ns().saturating_sub(now_ns);
         self.longest_ns.fetch_max(took_ns, Ordering::Relaxed);
         self.interrupts.fetch_add(1, Ordering::Relaxed);
@@ -355,7 +355,7 @@ impl Network {
         }
         drop(sender);
         if has_gone {
-            self.wires.iter().for_each(UdpWire::tell);
+            self.wires.iter().for_each(UdpWire::tell_gone);
         }
         has_gone
     }

@@ -91,13 +91,17 @@ impl UdpWire {
         (bits > 0).then(|| SocketAddrV4::new(ip, u16::from_be_bytes([high, low])))
     }
 
-    /// Tells the app's functions of what has come, and those that wait of what has gone.
-    pub(super) fn tell(&self) {
+    /// Tells the app's functions of what has come. In the card's interrupt, as it may release a DAG.
+    pub(super) fn tell_come(&self) {
         if self.has_come.swap(false, Ordering::Relaxed)
             && let Some((plan, dag)) = self.end.announce()
         {
             execution::raise_in_interrupt(plan, dag);
         }
+    }
+
+    /// Tells those that wait of what has gone.
+    pub(super) fn tell_gone(&self) {
         if self.has_gone.swap(false, Ordering::Relaxed) {
             self.end.tell_gone();
         }
