@@ -110,7 +110,7 @@ pub fn tie(
     let function_error = |error| LineError::Range(RangeError::Function(error));
     let entry = function.send(number, line.message(core)?);
     if let Some(entry) = entry.map_err(function_error)? {
-        let table = Registers::of(function, entry.bar).map_err(LineError::Range)?;
+        let table = Registers::in_bar(function, entry.bar).map_err(LineError::Range)?;
         line.entry = Some((table, entry.offset));
         line.route(core)?;
     }

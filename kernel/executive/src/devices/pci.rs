@@ -201,6 +201,11 @@ impl<'c> Function<'c> {
         self.command(command::MEMORY | command::MASTER | command::NO_LINE);
     }
 
+    /// Reports whether it may reach memory.
+    pub(super) fn reaches(&self) -> bool {
+        self.read(offset::COMMAND) & command::MASTER != 0
+    }
+
     fn command(&self, bits: u32) {
         // The status above is cleared by ones.
         let kept = self.read(offset::COMMAND) & 0xffff & !command::MASTER;
@@ -307,6 +312,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::devices::registers::{RangeError, Registers};
 
     /// The words of a function, and the sizes of its ranges, whose bits below stay 0.
     type Words = ([u32; 64], [u32; 6]);
@@ -440,6 +446,16 @@ mod tests {
             range(0, 0xfebf_1000, 0, [3 * KIB; 6]),
             Err(PciError::MalformedRange(0))
         );
+    }
+
+    #[test]
+    fn registers_of_a_function_that_may_reach_memory_are_not_given_out() {
+        let words = [(1, command::MASTER), (4, 0xfebf_1000)];
+        let fake = Fake::default().with(8, &words, [4096; 6]);
+        let given = Registers::of(&fake.first(), 0);
+        assert_eq!(given.err(), Some(RangeError::Driven));
+        fake.first().enable();
+        assert!(!fake.first().reaches());
     }
 
     const MESSAGE: Message = Message {

@@ -22,12 +22,17 @@ pub enum RangeError {
     Function(PciError),
     /// There is memory, or something else, at its addresses.
     Taken(u8),
+    /// The function may reach memory: it has a driver, or the firmware has left it so.
+    Driven,
 }
 
 impl core::fmt::Display for RangeError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Function(error) => error.fmt(f),
+            Self::Driven => f.write_str(
+                "may reach memory already: use it by its driver, or stop it by `Function::enable`",
+            ),
             Self::Taken(bar) => write!(
                 f,
                 "has BAR {bar} where memory or another device is; update the firmware"
@@ -69,12 +74,21 @@ macro_rules! access {
 }
 
 impl Registers {
-    /// Maps a range of a function.
+    /// Maps a range of a function, before this is let [reach memory](Function::enable_reach): later
+    /// whoever had its registers could have it write anywhere.
     ///
     /// # Errors
     ///
     /// [`RangeError`].
     pub fn of(function: &Function<'_>, bar: u8) -> Result<Self, RangeError> {
+        match function.reaches() {
+            true => Err(RangeError::Driven),
+            false => Self::in_bar(function, bar),
+        }
+    }
+
+    /// Maps a range of a function, whatever that may reach.
+    pub(super) fn in_bar(function: &Function<'_>, bar: u8) -> Result<Self, RangeError> {
         let range = function.range(bar).map_err(RangeError::Function)?;
         Self::map(range).ok_or(RangeError::Taken(bar))
     }
