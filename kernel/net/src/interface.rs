@@ -200,7 +200,8 @@ impl<B: AsMut<[u8]>> Interface<B> {
         if mac.is_group() || !is_host(ip) {
             return Some(Heard::Nothing);
         }
-        let asks_us = packet.is_question && packet.to.1 == self.address.ip;
+        let asks_us =
+            packet.is_question && packet.to.1 == self.address.ip && is_host(self.address.ip);
         let resolved = self.neighbours.learn(packet.from, asks_us).map(Kept);
         if let Some(frame) = resolved {
             put(self.kept(frame).as_mut(), 0, &mac.0);
@@ -222,8 +223,12 @@ impl<B: AsMut<[u8]>> Interface<B> {
         let packet = Ipv4Packet::read(frame)?;
         let is_ours = packet.to == self.address.ip && !packet.to.is_unspecified();
         let is_for_all = self.address.is_for_all(packet.to);
+        let from = packet.from;
+        // What is answered in the name of no host, or of all, would go to all.
+        let is_from_host =
+            is_host(from) && !self.address.is_for_all(from) && from != self.address.ip;
         match packet.protocol {
-            _ if packet.is_fragment => {}
+            _ if packet.is_fragment || !is_from_host => {}
             ipv4::UDP if is_ours || is_for_all => {
                 let (from, port, payload) = udp::read(frame, &packet)?;
                 self.counts.datagrams += 1;
@@ -251,23 +256,20 @@ impl<B: AsMut<[u8]>> Interface<B> {
             return None;
         }
         let to = mac_at(frame, 6)?;
-        // A question in the name of a group would have the whole group answered.
-        if message[..2] != [8, 0] || to.is_group() || !is_host(packet.from) {
+        // A question in the name of a group would have the whole group answered, and one with options
+        // would have to move for an answer without them.
+        let has_options = packet.payload.start > ipv4::START + ipv4::LENGTH;
+        if message[..2] != [8, 0] || to.is_group() || has_options {
             self.counts.foreign += 1;
             return Some(Heard::Nothing);
         }
         self.counts.echoes += 1;
-        // The answer has no options, so its message may move to the front.
-        let start = ipv4::START + ipv4::LENGTH;
-        let end = start + packet.payload.len();
-        if packet.payload.start != start {
-            frame.copy_within(packet.payload.clone(), start);
-        }
-        // The sum grows by what the first word loses, so the rest is not added once more.
-        let message = &mut frame[start..end];
-        let check = u16_at(message, 2)?;
-        put(message, 0, &[0; 4]);
-        let check = !check_sum(u64::from(check) + 0x0800);
+        let end = packet.payload.end;
+        // The kind becomes 0, and the check sum follows it (RFC 1624): a sum of all would cost as much
+        // as the first one.
+        let check = !check_sum(u64::from(u16_at(message, 2)?) + 0x0800);
+        let message = &mut frame[packet.payload.clone()];
+        message[0] = 0;
         put(message, 2, &check.to_be_bytes());
         self.write_ipv4(&mut frame[..end], ipv4::ICMP, packet.from);
         self.write_ethernet(frame, to, TYPE_IPV4);

@@ -50,6 +50,9 @@ fn frames_of_others_are_understood() {
             (Heard::Answer { length, .. }, 0, 1) => {
                 assert_eq!(length, before.len());
                 assert_eq!((frame[34], &frame[38..]), (0, &before[38..]));
+                let words = frame[34..].chunks(2);
+                let words = words.map(|word| u32::from(word[0]) << 8 | u32::from(word[1]));
+                assert_eq!(words.sum::<u32>() % 0xffff, 0, "the check sum");
                 assert_eq!(frame[26..34], [&before[30..34], &before[26..30]].concat());
             }
             other => panic!("{other:?} of {before:02x?}"),
@@ -204,16 +207,32 @@ fn what_is_not_ours_or_not_whole_is_counted() {
         mend(&mut frame);
         frame
     };
-    let foreign: [&[(usize, u8)]; 5] = [
+    let foreign: [&[(usize, u8)]; 10] = [
         &[(0, 2)],                 // another card
         &[(12, 0x86), (13, 0xdd)], // IPv6
         &[(20, 0x20)],             // a fragment with more to come
         &[(23, 6)],                // TCP
         &[(33, 16)],               // another address
+        // From nobody, a group, all, all of this network, and this address.
+        &[(26, 0), (28, 0), (29, 0)],
+        &[(26, 224)],
+        &[(26, 255), (27, 255), (28, 255), (29, 255)],
+        &[(29, 255)],
+        &[(29, 15)],
     ];
     for edits in foreign {
         assert_eq!(counted(&mut here, edited(edits)), (0, 1), "{edits:?}");
     }
+    let mut frames = vectors().into_iter();
+    let mut with_options = frames.find(|frame| frame[23] == 1).unwrap();
+    (with_options[14], with_options[17]) = (0x46, with_options[17] + 4);
+    with_options.splice(34..34, [0; 4]);
+    mend(&mut with_options);
+    assert_eq!(counted(&mut here, with_options), (0, 1));
+    let mut nameless = interface();
+    nameless.set_address(Address::NONE);
+    let asked_for_nobody = [&vectors()[0][..38], &[0; 4]].concat();
+    assert_eq!(counted(&mut nameless, asked_for_nobody), (0, 0));
     let malformed: [&[(usize, u8)]; 5] = [
         &[(14, 0x65)], // version 6
         &[(14, 0x44)], // a header of 16 bytes
