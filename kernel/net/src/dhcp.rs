@@ -213,7 +213,7 @@ impl Client {
                     options = after;
                     match option {
                         1 => mask = u32_at(value, 0),
-                        3 => gateway = ip_at(value, 0),
+                        3 => gateway = ip_at(value, 0).filter(|ip| is_host(*ip)),
                         51 => seconds = u32_at(value, 0),
                         53 => kind = value.first().copied(),
                         54 => server = ip_at(value, 0),
@@ -226,13 +226,15 @@ impl Client {
             let (mask, seconds) = (mask?, seconds?);
             let is_network = mask.leading_ones() + mask.trailing_zeros() == 32;
             // What is shorter than two seconds would be asked for without an end.
-            let is_whole = is_network && is_host(ip) && seconds >= 2;
+            let prefix = u8::try_from(mask.leading_ones()).ok()?;
+            let address = Address {
+                ip,
+                prefix,
+                gateway,
+            };
+            let is_whole = is_network && address.is_of_a_host() && seconds >= 2;
             is_whole.then_some(Lease {
-                address: Address {
-                    ip,
-                    prefix: u8::try_from(mask.leading_ones()).ok()?,
-                    gateway,
-                },
+                address,
                 server: server?,
                 seconds,
             })

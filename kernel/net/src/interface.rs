@@ -36,6 +36,13 @@ impl Address {
         gateway: None,
     };
 
+    /// Returns whether it may be that of one host, by a router that may be one.
+    #[must_use]
+    pub fn is_of_a_host(&self) -> bool {
+        let mut ips = [Some(self.ip), self.gateway].into_iter().flatten();
+        ips.all(|ip| is_host(ip) && !self.is_for_all(ip))
+    }
+
     fn host_bits(&self) -> u32 {
         u32::MAX.checked_shr(self.prefix.into()).unwrap_or(0)
     }

@@ -129,12 +129,13 @@ fn an_offer_that_is_taken_back_is_given_up() {
 
 #[test]
 fn an_answer_that_is_not_whole_or_not_ours_gives_no_address() {
-    let edits: [(usize, u8); 7] = [
+    let edits: [(usize, u8); 8] = [
         (0, 1),    // a question
         (5, 9),    // another transaction
         (33, 9),   // another card
         (236, 0),  // no cookie
         (16, 224), // the address of a group
+        (19, 255), // the address of all
         (259, 1),  // a mask with a hole
         (241, 99), // an option longer than the message
     ];

@@ -183,6 +183,23 @@ fn an_address_leads_to_a_neighbour_the_gateway_all_or_nobody() {
 }
 
 #[test]
+fn an_address_of_nobody_or_of_all_is_none_of_a_host() {
+    let is_one = |ip: [u8; 4], gateway: [u8; 4]| {
+        let gateway = Some(gateway.into());
+        Address {
+            gateway,
+            ..address(ip.into())
+        }
+        .is_of_a_host()
+    };
+    assert!(is_one([10, 0, 2, 15], [10, 0, 2, 2]));
+    for none in [[0; 4], [255; 4], [224, 0, 0, 1], [10, 0, 2, 255]] {
+        assert!(!is_one(none, [10, 0, 2, 2]), "{none:?}");
+        assert!(!is_one([10, 0, 2, 15], none), "{none:?}");
+    }
+}
+
+#[test]
 fn what_is_not_ours_or_not_whole_is_counted() {
     let mut here = interface();
     let (_, datagram) = (vectors().remove(0), vectors().remove(1));

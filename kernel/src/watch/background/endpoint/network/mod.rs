@@ -166,11 +166,12 @@ fn address(options: &CommandLine<'static>) -> Result<Option<Address>, UsageError
             None => (value, None),
         };
         let (ip, prefix) = place.split_once('/')?;
-        Some(Address {
+        let address = Address {
             ip: ip.parse().ok()?,
             prefix: prefix.parse().ok().filter(|prefix| *prefix <= 32)?,
             gateway,
-        })
+        };
+        Some(address).filter(Address::is_of_a_host)
     };
     read().map(Some).ok_or_else(|| {
         let allowed = "allowed are dhcp, ADDRESS/PREFIX and ADDRESS/PREFIX,GATEWAY, such as";
@@ -497,6 +498,22 @@ mod tests {
         }
 
         fn ring(&mut self) {}
+    }
+
+    #[test]
+    fn an_address_that_can_be_no_hosts_is_refused() {
+        let address = |line| address(&CommandLine::parse(line).unwrap());
+        assert_eq!(address("net=dhcp"), Ok(None));
+        assert!(address("net=10.0.2.15/24,10.0.2.2").is_ok_and(|address| address.is_some()));
+        for value in [
+            "0.0.0.0/0",
+            "10.0.2.255/24",
+            "255.255.255.255/32",
+            "10.0.2.15/24,0.0.0.0",
+        ] {
+            let line = std::format!("net={value}");
+            assert!(address(Box::leak(line.into())).is_err(), "{value}");
+        }
     }
 
     #[test]
