@@ -9,6 +9,9 @@ use crate::{Address, Mac, Peer};
 /// The bytes of a message that is sent: with fewer some relays drop it (RFC 1542, 2.1).
 const LENGTH: usize = 300;
 
+/// The most options that are read, padding among them: an interrupt is not to be longer by it.
+const MOST_OPTIONS: usize = 64;
+
 const COOKIE_AT: usize = 236;
 const COOKIE: [u8; 4] = [99, 130, 83, 99];
 
@@ -203,7 +206,10 @@ impl Client {
         let (mut kind, mut mask, mut gateway, mut seconds, mut server) =
             (None, None, None, None, None);
         let mut options = message.get(240..)?;
-        while let [option, rest @ ..] = options {
+        for _ in 0..MOST_OPTIONS {
+            let [option, rest @ ..] = options else {
+                break;
+            };
             match option {
                 0 => options = rest,
                 255 => break,
