@@ -55,16 +55,14 @@ const LEAD_NS: u64 = 100_000;
 /// Measures, and has the commits to come charge it with this margin.
 pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
     let costs = run()?;
-    // A device's term is that of its law, whatever came meanwhile.
-    let Overheads {
-        device_ns,
-        device_distance_ns,
-        ..
-    } = KERNEL.terms().overheads;
+    let measured = Overheads::measured(&costs, margin_percent, AT_ONCE);
+    // What a network is charged stays, whatever came meanwhile: nothing else is charged before.
+    let before = KERNEL.terms().overheads;
     let overheads = Overheads {
-        device_ns,
-        device_distance_ns,
-        ..Overheads::measured(&costs, margin_percent, AT_ONCE)
+        device_ns: before.device_ns,
+        device_distance_ns: before.device_distance_ns,
+        dispatch_ns: measured.dispatch_ns.saturating_add(before.dispatch_ns),
+        ..measured
     };
     KERNEL.change(|terms| {
         terms.overheads = overheads;
