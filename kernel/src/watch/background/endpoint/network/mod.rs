@@ -31,6 +31,7 @@ use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
 use executive::run::platform::KERNEL;
+use fass::commit::Overheads;
 use fass::platform::{Buffer, Platform as _, SetOnce};
 use fass::shared::Wire;
 use front::app::ending::AppError;
@@ -50,41 +51,65 @@ struct Law {
     most: u64,
     /// The least time from one interrupt to the next, in nanoseconds.
     distance_ns: u64,
+    /// Whether the app's words state the charge.
+    is_stated: bool,
 }
 
 impl Law {
     /// Takes the words, and charges the commits to come, unless `overheads_ns` states a device.
     ///
     /// The charge is of the longest interrupt in instructions, each a nanosecond: with its entry and
-    /// exit, the release of a DAG, and the packet that a heartbeat sends. What a core sends behind a
-    /// completion is charged as a part of the dispatch.
+    /// exit, the release of a DAG, the alarm, and the packet that a heartbeat sends. What a core sends
+    /// behind a completion is charged as a part of the dispatch. What cores wait for each other, where
+    /// they have the card at once, is not charged.
     fn charged(options: &CommandLine<'static>) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
-        let distance_us = options.number("net_us", 10..=1_000_000, 140)?;
+        // Not beyond a heartbeat, which sends as well.
+        let distance_us = options.number("net_us", 10..=1_000, 140)?;
         let mut overheads = KERNEL.terms().overheads;
-        if overheads.device_ns == 0 {
+        let is_stated = overheads.device_ns > 0;
+        if !is_stated {
             overheads.device_ns = RELEASE_NS + most * FRAME_NS + SENT_NS;
             overheads.device_distance_ns = distance_us * 1_000;
             overheads.dispatch_ns += BELL_NS + most * SENT_NS;
         }
+        let law = Self {
+            most,
+            distance_ns: overheads.device_distance_ns,
+            is_stated,
+        };
+        law.charge(overheads)?;
+        Ok(law)
+    }
+
+    /// Charges one more wire, as so many others have been: each of an interrupt's packets may release
+    /// another DAG.
+    fn charge_wire(&self, others: usize) -> Result<(), UsageError> {
+        let mut overheads = KERNEL.terms().overheads;
+        if !self.is_stated && (others as u64) < self.most {
+            overheads.device_ns += WIRE_NS;
+        }
+        self.charge(overheads)
+    }
+
+    fn charge(&self, overheads: Overheads) -> Result<(), UsageError> {
         if !overheads.device_leaves_time() {
+            let (us, most) = (self.distance_ns / 1_000, self.most);
             let line = format!(
-                "`net_us={distance_us}`: {most} packets may take longer; give a longer distance, or \
-                 fewer by `net_packets=`"
+                "`net_us={us}`: {most} packets may take longer; give a longer distance, or fewer by \
+                 `net_packets=`"
             );
             return Err(UsageError::new(line));
         }
         KERNEL.change(|terms| terms.overheads = overheads);
-        Ok(Self {
-            most,
-            distance_ns: overheads.device_distance_ns,
-        })
+        Ok(())
     }
 }
 
-/// The times of an interrupt of the card without its frames, of a frame of the longest ones, of a
-/// packet that is sent, and of the interrupt by which a core sends.
-const RELEASE_NS: u64 = 2_400;
+/// The times of an interrupt of the card without its frames, of the release by another wire, of a
+/// frame of the longest ones, of a packet that is sent, and of the interrupt by which a core sends.
+const RELEASE_NS: u64 = 2_600;
+const WIRE_NS: u64 = 2_300;
 const FRAME_NS: u64 = 1_500;
 const SENT_NS: u64 = 1_300;
 const BELL_NS: u64 = 400;
@@ -128,6 +153,7 @@ pub(super) fn open(
     options: &CommandLine<'static>,
 ) -> Result<&'static Network, AppError> {
     if let Some(network) = NETWORK.get() {
+        network.law.charge_wire(network.wires.iter().count())?;
         return Ok(network);
     }
     let address = address(options)?;
@@ -369,7 +395,7 @@ impl Network {
         }
         let is_linked = self.receiver.lock().is_linked();
         let mut sender = self.sender.lock();
-        sender.ask_server(now_ns);
+        let has_asked = sender.ask_server(now_ns);
         let has_address = !sender.interface.address().ip.is_unspecified();
         drop(sender);
         if self
@@ -381,7 +407,9 @@ impl Network {
             wires.for_each(|wire| wire.end.set_link(is_linked && has_address));
         }
         // What found no room, or no address, and what was more than a bell sends.
-        self.send(1);
+        if !has_asked {
+            self.send(1);
+        }
     }
 
     /// Tells of the run that has ended.
@@ -452,14 +480,14 @@ impl NetworkSender {
         self.transmitter.ring();
     }
 
-    /// Sends the message to the server of addresses that is due, if one is.
-    fn ask_server(&mut self, now_ns: u64) {
+    /// Sends the message to the server of addresses that is due, and reports whether one was.
+    fn ask_server(&mut self, now_ns: u64) -> bool {
         let Some(client) = self
             .dhcp
             .as_mut()
             .filter(|client| client.due_ns() <= now_ns)
         else {
-            return;
+            return false;
         };
         let start = Buffer::HEADROOM;
         let sent = client.send(now_ns, &mut self.own.whole()[start..]);
@@ -473,6 +501,7 @@ impl NetworkSender {
             self.own = own;
             self.transmitter.ring();
         }
+        true
     }
 
     /// Takes a message of a server of addresses.
