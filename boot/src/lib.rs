@@ -85,7 +85,6 @@ pub struct Framebuffer {
 
 impl Framebuffer {
     /// Returns the memory that it takes.
-    #[must_use]
     pub fn range(&self) -> core::ops::Range<u64> {
         let bytes = u64::from(self.pitch) * u64::from(self.height);
         self.start..self.start.saturating_add(bytes)
@@ -106,7 +105,6 @@ pub struct Module {
 impl BootInfo {
     /// Creates what is known without a loader's help: when Rust code began to run, in ticks
     /// of the time stamp counter.
-    #[must_use]
     pub const fn new(entry_tsc: u64) -> Self {
         Self {
             command_line: List::new(0),
@@ -163,7 +161,6 @@ impl BootInfo {
 
     /// Returns the value of the word `key=value`, if the command line has it. It takes no
     /// memory, so it can be asked before there is any.
-    #[must_use]
     pub fn value(&self, key: &str) -> Option<&str> {
         let mut words = self.command_line().ok()?.split_whitespace();
         words.find_map(|word| word.strip_prefix(key)?.strip_prefix('='))

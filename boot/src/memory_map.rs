@@ -46,7 +46,6 @@ impl MemoryMap {
     }
 
     /// Returns the ranges.
-    #[must_use]
     pub fn as_slice(&self) -> &[MemoryRegion] {
         self.regions.as_slice()
     }

@@ -89,7 +89,6 @@ impl AppNote {
     /// # Panics
     ///
     /// While the app is compiled, if the name is longer than 64 bytes.
-    #[must_use]
     pub const fn new(app: &str) -> AppNote {
         assert!(app.len() <= 64, "an app's name has 64 bytes at most");
         let mut content = [0; 64];

@@ -85,7 +85,6 @@ pub use sched_dag::engine::Run;
 /// // a run
 /// kernel::println!("{} timer interrupts", kernel::timer_interrupts() - before);
 /// ```
-#[must_use]
 pub fn timer_interrupts() -> u64 {
     executive::interrupts::timer_interrupts()
 }
@@ -112,7 +111,6 @@ pub fn timer_interrupts() -> u64 {
 ///     }
 /// }
 /// ```
-#[must_use]
 pub fn has_avx() -> bool {
     executive::machine::avx::is_on()
 }

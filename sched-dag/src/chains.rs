@@ -124,7 +124,6 @@ pub struct Chain {
 
 impl Chain {
     /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
-    #[must_use]
     pub fn find(task_set: &TaskSet, name: &str) -> Option<SubtaskRef> {
         // Names may have a `/` in them.
         let splits = name
@@ -237,7 +236,6 @@ const MOST: usize = 1000;
 impl Chain {
     /// Finds the chains that cross DAGs and are part of no longer one: from a source that samples
     /// nothing to a sink that no DAG samples. At most 1000.
-    #[must_use]
     pub fn all(task_set: &TaskSet, samplings: &[SampledEdge]) -> Vec<Chain> {
         let mut search = ChainSearch::new(task_set, samplings);
         for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
@@ -258,7 +256,6 @@ impl Chain {
 
     /// Finds the chains from a subtask to another one, of the same DAG or of another, at most
     /// 1000. None, if nothing leads there.
-    #[must_use]
     pub fn between(
         task_set: &TaskSet,
         samplings: &[SampledEdge],
@@ -353,7 +350,6 @@ pub struct ChainLatencies {
 
 impl Chain {
     /// Measures the chain in the events of a run, which are in the order of the journal.
-    #[must_use]
     pub fn latencies(
         &self,
         task_set: &TaskSet,
@@ -493,7 +489,6 @@ pub struct SampledJobs {
 
 impl SampledJobs {
     /// Follows the events of a run, in the order of the journal.
-    #[must_use]
     pub fn new(samplings: &[SampledEdge], events: impl Iterator<Item = Event>) -> Self {
         let mut readers: BTreeMap<SubtaskRef, Vec<SubtaskRef>> = BTreeMap::new();
         // Of the writers: the last job that is complete.
@@ -530,7 +525,6 @@ impl SampledJobs {
 
     /// Returns the job whose value an instance has sampled of a writer; `None`: it has not
     /// started, or found nothing.
-    #[must_use]
     pub fn job(&self, reader: Instance, writer: SubtaskRef) -> Option<u64> {
         self.jobs.get(&(reader, writer)).copied()
     }

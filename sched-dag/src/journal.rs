@@ -57,7 +57,6 @@ const ID: u64 = (1 << 20) - 1;
 impl EventSubject {
     /// Packs an instance.
     #[inline]
-    #[must_use]
     pub const fn of(instance: Instance) -> Self {
         let Instance { dag, job, subtask } = instance;
         Self {
@@ -67,7 +66,6 @@ impl EventSubject {
     }
 
     /// Packs a whole job.
-    #[must_use]
     pub const fn of_job(dag: DagId, job: u64) -> Self {
         Self {
             ids: (dag.0 as u64) << DAG,
@@ -90,7 +88,6 @@ impl EventSubject {
 impl Event {
     /// Returns the words of something that happened: time, job, and the rest.
     #[inline]
-    #[must_use]
     pub const fn words(
         time_ns: u64,
         what: EventKind,
@@ -102,7 +99,6 @@ impl Event {
     }
 
     /// Returns the words of an event whose core counts from another one, modulo 2^16.
-    #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "a part of a word is meant")]
     pub(crate) const fn on_core_from([time_ns, job, rest]: [u64; 3], first: u32) -> [u64; 3] {
         let core = ((rest >> CORE) as u16).wrapping_add(first as u16);
@@ -111,7 +107,6 @@ impl Event {
     }
 
     /// Unpacks an event, `None` if the words are of none.
-    #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "parts of a word are meant")]
     pub fn unpack([time_ns, job, rest]: [u64; 3]) -> Option<Self> {
         let what = EventKind::from_number(rest as u8)?;
@@ -127,7 +122,6 @@ impl Event {
     }
 
     /// Returns the instance, if it happened to one.
-    #[must_use]
     pub fn instance(&self) -> Option<Instance> {
         let Self { dag, job, .. } = *self;
         self.subtask.map(|subtask| Instance { dag, job, subtask })
@@ -233,7 +227,6 @@ pub struct UnknownWord;
 
 impl EventKind {
     /// Returns the kind with a number; the inverse of `as u8`.
-    #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
         EVENTS.get(usize::from(number)).map(|(what, ..)| *what)
     }

@@ -113,7 +113,6 @@ impl TaskSet {
     /// If there is no such DAG.
     ///
     /// See [`DagKey`].
-    #[must_use]
     #[track_caller]
     pub fn find(&self, dag: impl DagKey) -> DagId {
         dag.find_in(self)
@@ -128,7 +127,6 @@ impl Dag {
     /// If there is no such subtask.
     ///
     /// See [`DagKey`].
-    #[must_use]
     #[track_caller]
     pub fn find(&self, subtask: impl SubtaskKey) -> SubtaskId {
         subtask.find_in(self)

@@ -133,7 +133,6 @@ pub struct PendingRequests {
 
 impl PendingRequests {
     /// Takes room for the requests of a plan of so many DAGs.
-    #[must_use]
     pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
         let room = lifecycle.as_ref().map(|lifecycle| lifecycle.room());
         let (others, changes) = room.unwrap_or_default();
@@ -158,7 +157,6 @@ impl PendingRequests {
 
     /// Reports whether none is on its way: then a completion may be all of a step.
     #[inline]
-    #[must_use]
     pub const fn are_none(&self) -> bool {
         self.kept.is_empty()
     }
@@ -317,7 +315,6 @@ pub struct LifecyclePlan {
 
 impl LifecyclePlan {
     /// Makes it for a plan of so many DAGs.
-    #[must_use]
     pub fn new(dags: u32, may_shut_down: bool) -> Self {
         Self {
             dags: (0..dags).map(DagId).collect(),

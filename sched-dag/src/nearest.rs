@@ -20,7 +20,6 @@ type Row = [u8; LONGEST + 1];
 /// assert_eq!(sched_dag::nearest("lidra", &["camera", "lidar"]), Some("lidar"));
 /// assert_eq!(sched_dag::nearest("sonar", &["camera", "lidar"]), None);
 /// ```
-#[must_use]
 pub fn nearest<'n>(word: &str, allowed: &[&'n str]) -> Option<&'n str> {
     nearest_of(word, &mut allowed.iter().copied())
 }

@@ -130,7 +130,6 @@ pub enum CoreDivision {
 
 impl CoreDivision {
     /// Returns the cores of each cluster, nothing if they are not divided.
-    #[must_use]
     pub fn sizes(&self) -> &[u32] {
         match self {
             Self::Undivided => &[],

@@ -61,7 +61,6 @@ impl DagSpec {
     /// A job that meets its deadline is in flight for at most D, so at most
     /// ceil(D / T) of them are at any time; with one more a late job can end while
     /// the next one is released. Where subtasks share a state, jobs take turns.
-    #[must_use]
     pub fn most_in_flight(&self) -> u64 {
         let jobs = self.jobs.unwrap_or(u64::MAX);
         if let Some(given) = self.in_flight {

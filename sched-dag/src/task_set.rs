@@ -152,7 +152,6 @@ impl TaskSet {
     }
 
     /// Returns the DAGs in the order of the commit.
-    #[must_use]
     pub fn dags(&self) -> &[Dag] {
         &self.dags
     }
@@ -162,13 +161,11 @@ impl TaskSet {
     /// # Panics
     ///
     /// If `dag` is not of this task set.
-    #[must_use]
     pub fn dag(&self, dag: DagId) -> &Dag {
         &self.dags[dag.index()]
     }
 
     /// Returns the number of all DAGs' subtasks, which are the vertices from 0 on.
-    #[must_use]
     pub const fn vertices(&self) -> usize {
         self.vertices
     }
@@ -179,7 +176,6 @@ impl TaskSet {
     ///
     /// If there is no such DAG.
     #[inline]
-    #[must_use]
     pub fn vertex(&self, instance: Instance) -> Vertex {
         Vertex(self.first_vertex(instance.dag) + instance.subtask.0)
     }
@@ -192,33 +188,28 @@ impl TaskSet {
 
 impl Dag {
     /// Returns the name.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Returns the hash of the names and edges that were registered.
-    #[must_use]
     pub const fn graph_hash(&self) -> u64 {
         self.graph_hash
     }
 
     /// Reports whether signals release the jobs, rather than the clock.
-    #[must_use]
     pub const fn is_sporadic(&self) -> bool {
         matches!(self.activation, Activation::Sporadic)
     }
 
     /// Returns the time between two nominal releases, of a sporadic DAG the
     /// minimum inter-arrival time; never 0.
-    #[must_use]
     pub const fn period_ns(&self) -> u64 {
         self.period_ns
     }
 
     /// Returns the time after a release by which the job shall be complete, the largest
     /// of its sinks' deadlines, never 0.
-    #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
     }
@@ -231,14 +222,12 @@ impl Dag {
 
     /// Returns the time of the first nominal release, of a sporadic DAG the
     /// earliest one.
-    #[must_use]
     pub const fn offset_ns(&self) -> u64 {
         self.offset_ns
     }
 
     /// Returns the nominal release O + kT of a periodic DAG's job `job`, at most the
     /// last time there is.
-    #[must_use]
     pub const fn grid_ns(&self, job: u64) -> u64 {
         job.saturating_mul(self.period_ns)
             .saturating_add(self.offset_ns)
@@ -253,7 +242,6 @@ impl Dag {
     }
 
     /// Returns the most jobs that may be in flight, never 0.
-    #[must_use]
     pub const fn in_flight(&self) -> u32 {
         self.in_flight
     }
@@ -265,20 +253,17 @@ impl Dag {
     }
 
     /// Returns the policy for a release beyond [`in_flight`](Self::in_flight).
-    #[must_use]
     pub const fn overrun(&self) -> OverrunPolicy {
         self.overrun
     }
 
     /// Returns the cost of a fault of an instance.
-    #[must_use]
     pub const fn on_fault(&self) -> OnFault {
         self.on_fault
     }
 
     /// Returns the longest time between the nominal releases of two jobs of a periodic DAG that
     /// follow each other and are not lost by faults that it survives, while it is not paused.
-    #[must_use]
     pub fn renewal_ns(&self) -> u64 {
         let lost_in_a_row = match self.on_fault {
             OnFault::EndDag => 0,
@@ -292,19 +277,16 @@ impl Dag {
     }
 
     /// Returns the first job to release: 0, but in a replay that begins later.
-    #[must_use]
     pub const fn first_job(&self) -> u64 {
         self.first_job
     }
 
     /// Returns the number of jobs to release, counted from job 0 on, or `None` if there is no end.
-    #[must_use]
     pub const fn jobs(&self) -> Option<u64> {
         self.jobs
     }
 
     /// Returns the subtasks in the order of registration, never empty.
-    #[must_use]
     pub fn subtasks(&self) -> &[Subtask] {
         &self.subtasks
     }
@@ -314,7 +296,6 @@ impl Dag {
     /// # Panics
     ///
     /// If `subtask` is not of this DAG.
-    #[must_use]
     pub fn subtask(&self, subtask: SubtaskId) -> &Subtask {
         &self.subtasks[subtask.index()]
     }
@@ -330,58 +311,49 @@ impl Dag {
     }
 
     /// Returns the subtasks without predecessor, ascending, never empty.
-    #[must_use]
     pub fn sources(&self) -> &[SubtaskId] {
         &self.graph.sources
     }
 
     /// Returns the subtasks without successor, ascending, never empty; also those that
     /// state a deadline and precede another sink only because of a shared state.
-    #[must_use]
     pub fn sinks(&self) -> &[SubtaskId] {
         &self.graph.sinks
     }
 
     /// Returns the direct predecessors of a subtask, each once, ascending.
-    #[must_use]
     pub fn predecessors(&self, subtask: SubtaskId) -> &[SubtaskId] {
         self.graph.predecessors.neighbours(subtask)
     }
 
     /// Returns the direct successors of a subtask, each once, ascending.
-    #[must_use]
     pub fn successors(&self, subtask: SubtaskId) -> &[SubtaskId] {
         self.graph.successors.neighbours(subtask)
     }
 
     /// Returns the topics, in the order of their writers. Edges that were stated
     /// without a topic have none.
-    #[must_use]
     pub fn topics(&self) -> &[Topic] {
         &self.topics
     }
 
     /// Returns the subtasks in an order in which every predecessor comes first.
-    #[must_use]
     pub fn topological_order(&self) -> &[SubtaskId] {
         &self.graph.topological_order
     }
 
     /// Returns the edges that follow from shared states. They are among the
     /// predecessors and successors; there may be another reason for one, too.
-    #[must_use]
     pub fn state_precedences(&self) -> &[StatePrecedence] {
         &self.state_precedences
     }
 
     /// Returns the uses of locks.
-    #[must_use]
     pub fn locks(&self) -> &[LockUse] {
         &self.locks
     }
 
     /// Returns the first use of a lock of which no longest section is stated.
-    #[must_use]
     pub fn unbounded_lock(&self) -> Option<&LockUse> {
         self.locks.iter().find(|of| of.longest_ns.is_none())
     }
@@ -389,31 +361,26 @@ impl Dag {
 
 impl Subtask {
     /// Returns the name.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Returns the worst-case execution time, if the app gave one.
-    #[must_use]
     pub const fn wcet_ns(&self) -> Option<u64> {
         self.wcet_ns
     }
 
     /// Returns its waits, in order.
-    #[must_use]
     pub const fn waits(&self) -> &[Wait] {
         &self.waits
     }
 
     /// Returns the sum of its waits' limits.
-    #[must_use]
     pub fn waiting_ns(&self) -> u64 {
         self.waits().iter().map(|wait| wait.limit_ns).sum()
     }
 
     /// Returns the WCETs of its segments, if they are known; that of a subtask without waits is one.
-    #[must_use]
     pub fn segments_ns(&self) -> Option<Vec<u64>> {
         let later = self.waits().iter().map(|wait| wait.segment_ns);
         let later = later.collect::<Option<Vec<u64>>>()?;
@@ -435,7 +402,6 @@ impl Subtask {
 
     /// Returns a time that none of its segments exceeds, waits for locks included: that of the
     /// longest one, or of all together if that is all that is known.
-    #[must_use]
     pub fn longest_segment_ns(&self) -> Option<u64> {
         let segments = self.locking_segments_ns();
         segments.map_or(self.locking_wcet_ns(), |segments| {
@@ -445,27 +411,23 @@ impl Subtask {
 
     /// Returns its WCET with what each of its segments is charged, `None` if there is none or the
     /// sum overflows.
-    #[must_use]
     pub fn charged_ns(&self, of_segment_ns: u64) -> Option<u64> {
         let charge_ns = of_segment_ns.checked_mul(1 + self.waits.len() as u64)?;
         self.locking_wcet_ns()?.checked_add(charge_ns)
     }
 
     /// Returns the stack that it needs, in bytes, if the app stated one.
-    #[must_use]
     pub const fn stack_bytes(&self) -> Option<u64> {
         self.stack_bytes
     }
 
     /// Returns where the WCET is from.
-    #[must_use]
     pub const fn wcet_source(&self) -> WcetSource {
         self.wcet_source
     }
 
     /// Returns how long an instance may execute for, `u64::MAX` if there is no limit: its
     /// budget, else so many WCETs, or no limit if that is 0.
-    #[must_use]
     pub fn most_execution_ns(&self, wcets: u64) -> u64 {
         let wcet_ns = self.wcet_ns.filter(|_| wcets > 0);
         let limit_ns = wcet_ns.map(|wcet_ns| wcet_ns.saturating_mul(wcets));
@@ -473,26 +435,22 @@ impl Subtask {
     }
 
     /// Returns the core of its cluster that alone executes it, counted from 0; `None`: any.
-    #[must_use]
     pub const fn core(&self) -> Option<u32> {
         self.core
     }
 
     /// Returns the static priority, given or derived from the graph.
-    #[must_use]
     pub const fn priority(&self) -> Priority {
         self.priority
     }
 
     /// Reports whether a started instance keeps its core until it finishes.
-    #[must_use]
     pub const fn is_non_preemptive(&self) -> bool {
         self.non_preemptive
     }
 
     /// Returns the time after a release by which the most urgent of the sinks that it
     /// reaches shall have finished; a sink reaches itself. Never 0.
-    #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
     }
@@ -501,7 +459,6 @@ impl Subtask {
 impl TaskSet {
     /// Returns the sum of [`Dag::most_suspended`].
     #[inline(never)]
-    #[must_use]
     pub fn most_suspended(&self) -> usize {
         self.dags().iter().map(Dag::most_suspended).sum()
     }
@@ -509,7 +466,6 @@ impl TaskSet {
     /// Returns the size of a stack that every subtask can run on, if those that state none need
     /// so many bytes.
     #[inline(never)]
-    #[must_use]
     pub fn largest_stack_bytes(&self, unstated: u64) -> u64 {
         let subtasks = self.dags().iter().flat_map(Dag::subtasks);
         let bytes = subtasks.map(|subtask| subtask.stack_bytes().unwrap_or(unstated));
@@ -520,7 +476,6 @@ impl TaskSet {
 impl Dag {
     /// Returns a number of instances, of all jobs, that is never exceeded by those that are
     /// suspended at once where started instances may lose their cores.
-    #[must_use]
     pub fn most_suspended(&self) -> usize {
         let may_be = self.subtasks.iter().filter(|of| !of.is_non_preemptive());
         let may_be = may_be.count();
@@ -565,7 +520,6 @@ impl TaskSet {
     }
 
     /// Returns the cores that may execute a DAG, ascending, on a machine of `all`.
-    #[must_use]
     pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
         let dag = self.dag(dag);
         let cluster = self.cores_of(dag.cluster(), all);
@@ -581,7 +535,6 @@ impl TaskSet {
     }
 
     /// Reports whether the cores are divided into clusters.
-    #[must_use]
     pub const fn is_divided(&self) -> bool {
         !self.clusters.is_empty()
     }
@@ -596,7 +549,6 @@ impl TaskSet {
     /// # Panics
     ///
     /// If there is no such cluster.
-    #[must_use]
     #[inline(never)]
     pub fn cores_of(&self, cluster: ClusterId, all: u32) -> Range<u32> {
         if !self.is_divided() {
@@ -618,26 +570,22 @@ impl TaskSet {
 
 impl Dag {
     /// Returns the cluster whose cores run it; if the cores are not divided, cluster 0.
-    #[must_use]
     pub fn cluster(&self) -> ClusterId {
         self.cluster.unwrap_or_default()
     }
 
     /// Returns why the commit has chosen that; `None` if it has not.
-    #[must_use]
     pub const fn why_there(&self) -> Option<AssignmentReason> {
         self.why_there
     }
 
     /// Returns the cores of its cluster that execute those of its subtasks that are not pinned,
     /// ascending, counted from 0; empty: all.
-    #[must_use]
     pub const fn affinity(&self) -> &[u32] {
         &self.affinity
     }
 
     /// Reports whether a cluster is stated, or chosen.
-    #[must_use]
     pub const fn states_cluster(&self) -> bool {
         self.cluster.is_some()
     }

@@ -88,7 +88,6 @@ pub enum RunOutcome {
 impl VirtualTime {
     /// Makes a driver for a task set on the machine that the options describe, and allocates all
     /// that it will need.
-    #[must_use]
     pub fn new(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
         Self::of_bodies(task_set, options, instances(task_set), &[])
     }
@@ -182,7 +181,6 @@ impl<B: SubtaskBody> VirtualTime<B> {
     }
 
     /// Returns the events so far, of all clusters.
-    #[must_use]
     pub fn events(&self) -> Vec<Event> {
         self.run_so_far().journal().events().collect()
     }
@@ -235,7 +233,6 @@ impl<B: SubtaskBody> VirtualTime<B> {
     }
 
     /// Returns the time of the last event, in nanoseconds.
-    #[must_use]
     pub const fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -245,13 +242,11 @@ impl<B: SubtaskBody> VirtualTime<B> {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn scheduler_of(&self, dag: DagId) -> &Scheduler {
         &self.clusters[self.cluster_index(dag)].engine.scheduler
     }
 
     /// Reports whether every DAG is over.
-    #[must_use]
     pub fn is_finished(&self) -> bool {
         let mut clusters = self.clusters.iter();
         clusters.all(|cluster| cluster.engine.scheduler.is_finished())

@@ -48,7 +48,6 @@ macro_rules! worded {
             pub const MEANINGS: &'static [&'static str] = &[$(concat!($($doc),+),)+];
 
             /// Returns the kind as a stable word in snake case.
-            #[must_use]
             #[allow(unused_variables, reason = "few codes depend on a field")]
             pub fn code(&self) -> &'static str {
                 match self {

@@ -17,7 +17,6 @@ const PAGE: &str = "docs/errors.md";
 /// # Panics
 ///
 /// Panics if the page has no entries, or if one lacks a part or stands there twice.
-#[must_use]
 pub fn documented_faults() -> BTreeMap<String, String> {
     read(&page(PAGE)).unwrap_or_else(|why| panic!("{PAGE}: {why}"))
 }
@@ -28,7 +27,6 @@ pub fn documented_faults() -> BTreeMap<String, String> {
 /// # Panics
 ///
 /// Panics if the page has no such table.
-#[must_use]
 pub fn table(head: &str) -> Vec<String> {
     let page = page(PAGE);
     let rows = page.split(head).nth(1).expect(head);
@@ -40,7 +38,6 @@ pub fn table(head: &str) -> Vec<String> {
 }
 
 /// Whether a text is what a pattern with `...` says.
-#[must_use]
 pub fn is_said_by(text: &str, pattern: &str) -> bool {
     let mut rest = text;
     for part in pattern.split("...") {
@@ -68,7 +65,6 @@ pub fn assert_is(fault: &str, text: &str, now: &str) {
 }
 
 /// Returns a fault's text with the names, in backquotes, that another text has.
-#[must_use]
 pub fn with_names_of(other: &str, text: &str) -> String {
     let mut names = other.split('`').skip(1).step_by(2);
     let parts = text

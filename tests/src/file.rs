@@ -15,7 +15,6 @@ impl File {
     /// # Panics
     ///
     /// Panics if the folder for it cannot be made.
-    #[must_use]
     pub fn new(name: &str, kind: &str) -> File {
         let log = system::new_log(name).expect("a folder for logs");
         File(log.with_extension(kind))
@@ -26,7 +25,6 @@ impl File {
     /// # Panics
     ///
     /// Panics if it cannot be written.
-    #[must_use]
     pub fn of(name: &str, kind: &str, content: impl AsRef<[u8]>) -> File {
         let file = File::new(name, kind);
         fs::write(&file.0, content).expect("a file in it");

@@ -57,7 +57,6 @@ pub struct Guest {
 impl Guest {
     /// Describes a guest that boots the image of a package: one core, 32 MiB,
     /// a microvm, deterministic, 600 s.
-    #[must_use]
     pub fn new(package: &str) -> Guest {
         Guest {
             package: package.into(),
@@ -71,7 +70,6 @@ impl Guest {
     }
 
     /// Describes a guest that runs a test of `tests/guest`.
-    #[must_use]
     pub fn test(name: &str) -> Guest {
         Guest::new("guest-tests").word(&format!("test={name}"))
     }

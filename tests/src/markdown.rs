@@ -21,7 +21,6 @@ pub struct Block {
 /// # Panics
 ///
 /// Panics if it cannot be read.
-#[must_use]
 #[track_caller]
 pub fn page(path: &str) -> String {
     let text = fs::read_to_string(workspace().join(path));
@@ -29,7 +28,6 @@ pub fn page(path: &str) -> String {
 }
 
 /// Takes the blocks out of a page.
-#[must_use]
 pub fn blocks(page: &str) -> Vec<Block> {
     let mut blocks = Vec::new();
     let mut open: Option<Block> = None;

@@ -71,7 +71,6 @@ impl System {
 
     /// Returns a number that differs, as good as surely, if the vehicle has acted on other
     /// lidar jobs (FNV-1a, over words).
-    #[must_use]
     pub fn digest(&self) -> u64 {
         let words = self.acted_on.iter().map(|job| job.load(Ordering::Relaxed));
         words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {

@@ -24,7 +24,6 @@ pub struct Latencies {
 
 impl Latencies {
     /// Measures a run of the system.
-    #[must_use]
     pub fn of(task_set: &TaskSet, record: &RunRecord, acted_on: &[AtomicU64]) -> Self {
         let [lidar, behaviour] = ["lidar", "behaviour"].map(|dag| task_set.find(dag));
         let finish_ns = |dag, job, name| {

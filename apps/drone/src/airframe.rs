@@ -73,7 +73,6 @@ pub struct Airframe {
 
 impl Airframe {
     /// Places the airframe in the air, askew.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             pose: Pose {
@@ -123,7 +122,6 @@ impl Default for Airframe {
 }
 
 /// Returns the matrix that turns the body's axes into the world's, by rows.
-#[must_use]
 pub fn rotation([roll, pitch, yaw]: Vector) -> [Vector; 3] {
     let ((sr, cr), (sp, cp), (sy, cy)) = (sin_cos(roll), sin_cos(pitch), sin_cos(yaw));
     [
@@ -134,7 +132,6 @@ pub fn rotation([roll, pitch, yaw]: Vector) -> [Vector; 3] {
 }
 
 /// Returns angles after a time of turning about the body's axes.
-#[must_use]
 pub fn turned([roll, pitch, yaw]: Vector, rates: Vector, seconds: f64) -> Vector {
     let ((sr, cr), (_, cp)) = (sin_cos(roll), sin_cos(pitch));
     let across = rates[1] * sr + rates[2] * cr;

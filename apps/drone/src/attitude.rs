@@ -25,7 +25,6 @@ pub struct Estimate {
 
 impl Estimate {
     /// Begins with measurements, of an airframe that does not climb.
-    #[must_use]
     pub fn new(measured: &Measured) -> Self {
         Self {
             angles: angles_of(measured),
@@ -73,7 +72,6 @@ fn difference(to: f64, from: f64) -> f64 {
 }
 
 /// Decides what the rotors do to reach a goal. Without a fix the airframe stays level.
-#[must_use]
 pub fn control(estimate: &Estimate, fix: Option<(Fix, f64)>, goal: Vector) -> Force {
     const MOST: f64 = 2.5; // m/s^2, which is a tilt of 14 degrees
     let mut wanted = [0.0; 2];

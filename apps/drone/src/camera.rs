@@ -62,7 +62,6 @@ pub fn capture(pose: &Pose) -> Image {
 }
 
 /// Finds the beacon's column and row from the image's centre, if it is there.
-#[must_use]
 pub fn detect(image: &Image) -> Option<(f32, f32)> {
     let (mut sum, mut columns, mut rows) = (0.0_f32, 0.0_f32, 0.0_f32);
     for (index, pixel) in (0_u16..).zip(image) {
@@ -83,7 +82,6 @@ fn column_and_row(index: u16) -> (f32, f32) {
 }
 
 /// Returns where the airframe is if the beacon is seen there.
-#[must_use]
 pub fn locate((column, row): (f32, f32), estimate: &Estimate) -> [f64; 2] {
     let ray: Vector = [f64::from(column / FOCAL), f64::from(row / FOCAL), -1.0];
     let [x, y, z] = rotation(estimate.angles)

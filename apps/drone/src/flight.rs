@@ -26,38 +26,32 @@ struct Figures {
 
 impl Flight {
     /// Returns how many waypoints were reached.
-    #[must_use]
     pub fn waypoints(&self) -> u64 {
         self.0.waypoints.load(Relaxed)
     }
 
     /// Reports whether the drone was sent down.
-    #[must_use]
     pub fn has_landed(&self) -> bool {
         self.0.has_landed.load(Relaxed) > 0
     }
 
     /// Returns the number of frames, and of those in which the beacon was seen.
-    #[must_use]
     pub fn frames(&self) -> (u64, u64) {
         (self.0.frames.load(Relaxed), self.0.fixes.load(Relaxed))
     }
 
     /// Returns the largest angle between the body's upward axis and the world's, in degrees.
-    #[must_use]
     pub fn most_tilt_degrees(&self) -> f64 {
         f64::from_bits(self.0.most_tilt.load(Relaxed)).to_degrees()
     }
 
     /// Returns the largest distance between a place that the camera has found and the true one,
     /// in metres.
-    #[must_use]
     pub fn most_error_metres(&self) -> f64 {
         f64::from_bits(self.0.most_error.load(Relaxed))
     }
 
     /// Returns the height of the end, in metres.
-    #[must_use]
     pub fn height_metres(&self) -> f64 {
         f64::from_bits(self.0.height.load(Relaxed))
     }

@@ -58,7 +58,6 @@ impl Batch {
 }
 
 /// Makes the wire.
-#[must_use]
 pub fn wire() -> Wire {
     let options = WireOptions {
         framing: Framing::Chunks,

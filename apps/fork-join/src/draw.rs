@@ -18,13 +18,11 @@ pub struct ExecutionTimes {
 
 impl ExecutionTimes {
     /// Starts the sequence of parallel subtask `branch` for `seed`.
-    #[must_use]
     pub fn new(seed: u64, branch: usize) -> Self {
         Self::up_to(WCET, seed, branch)
     }
 
     /// Starts one whose longest time, at least 1 ms, is not that of the paper.
-    #[must_use]
     pub fn up_to(longest: Duration, seed: u64, branch: usize) -> Self {
         let seed = nth(seed, branch as u64);
         Self {

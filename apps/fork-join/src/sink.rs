@@ -50,14 +50,12 @@ struct Counts {
 
 impl Joins {
     /// Returns the number of joins.
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.0.total.load(Ordering::Relaxed)
     }
 
     /// Returns the number of joins whose values were not all of the job that
     /// was to be joined; the model allows none.
-    #[must_use]
     pub fn mixed(&self) -> u64 {
         self.0.mixed.load(Ordering::Relaxed)
     }

@@ -16,7 +16,6 @@ const NUMBERS: usize = 64;
 const BYTES: usize = 1024;
 
 /// Does so many rounds of work. The same arguments give the same result.
-#[must_use]
 pub fn compute(rounds: u64, seed: u64) -> u64 {
     (0..rounds).fold(seed, |state, _| round(black_box(state)))
 }

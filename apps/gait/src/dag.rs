@@ -77,7 +77,6 @@ pub struct Walk(Arc<[AtomicU64]>);
 
 impl Walk {
     /// Makes room for the rows of so many samples.
-    #[must_use]
     pub fn new(samples: usize) -> Self {
         Self((0..samples * OF_A_ROW).map(|_| AtomicU64::new(0)).collect())
     }
@@ -103,7 +102,6 @@ impl Walk {
 
     /// Returns a hash of all bits (FNV-1a with 64 bits, over whole words): two walks with the
     /// same one are the same.
-    #[must_use]
     pub fn digest(&self) -> u64 {
         let words = self.0.iter().map(|word| word.load(Relaxed));
         words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {

@@ -21,7 +21,6 @@ const GAIN: f64 = 0.041;
 const SECONDS: f64 = 1.0 / 120.0;
 
 /// Returns the product of two quaternions.
-#[must_use]
 pub fn product([a, b, c, d]: Quaternion, [w, x, y, z]: Quaternion) -> Quaternion {
     [
         a * w - b * x - c * y - d * z,
@@ -32,7 +31,6 @@ pub fn product([a, b, c, d]: Quaternion, [w, x, y, z]: Quaternion) -> Quaternion
 }
 
 /// Returns the opposite turn of a unit quaternion.
-#[must_use]
 pub fn conjugate([w, x, y, z]: Quaternion) -> Quaternion {
     [w, -x, -y, -z]
 }
@@ -43,7 +41,6 @@ pub fn conjugate([w, x, y, z]: Quaternion) -> Quaternion {
 /// # Panics
 ///
 /// If a part of the sample is no number, for then no orientation after it would be one.
-#[must_use]
 pub fn after(orientation: Quaternion, sensor: &Sensor) -> Quaternion {
     let parts = [sensor.acc, sensor.gyr, sensor.mag];
     let are_numbers = parts.as_flattened().iter().all(|part| part.is_finite());

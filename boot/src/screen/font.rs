@@ -16,7 +16,6 @@ static LETTERS: [[u8; WIDTH]; COUNT] = letters();
 
 /// Reports whether the pixel in this column and row of a letter is lit; of what is no
 /// visible character, all are.
-#[must_use]
 pub fn is_lit(letter: u8, column: usize, row: usize) -> bool {
     let index = letter.wrapping_sub(FIRST);
     let columns = LETTERS.get(usize::from(index));

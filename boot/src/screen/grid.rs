@@ -33,7 +33,6 @@ impl Default for Grid {
 
 impl Grid {
     /// Creates a grid of blanks.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             wanted: [const { AtomicU8::new(0) }; CELLS],
@@ -99,7 +98,6 @@ impl Grid {
     }
 
     /// Reports whether a cell may be open.
-    #[must_use]
     pub fn has_open(&self) -> bool {
         self.first.load(Relaxed) < self.end.load(Relaxed)
     }

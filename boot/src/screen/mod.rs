@@ -40,7 +40,6 @@ impl Screen {
     ///
     /// 1. Later drawing goes to memory that is mapped, and nobody else's.
     /// 2. A row's pixels fit into the pitch.
-    #[must_use]
     pub unsafe fn new(buffer: Framebuffer) -> Self {
         const WANTED_COLUMNS: usize = 100;
         let (width, height) = (buffer.width as usize, buffer.height as usize);

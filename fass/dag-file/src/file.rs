@@ -54,7 +54,6 @@ pub struct FileSubtask {
 impl FileDag {
     /// Returns the longest time that an instance of a subtask may execute: its WCET, or that of its
     /// samples.
-    #[must_use]
     pub fn most_ns(&self, subtask: usize) -> u64 {
         let spec = &self.spec.subtasks[subtask];
         let samples = self.subtasks[subtask].samples_ns.chunks(sample_len(spec));
@@ -64,13 +63,11 @@ impl FileDag {
 }
 
 /// Returns how many times a sample of a subtask has: those of its segments and waits.
-#[must_use]
 pub const fn sample_len(spec: &SubtaskSpec) -> usize {
     2 * spec.waits.len() + 1
 }
 
 /// Returns how long an instance executes whose times are those of a sample.
-#[must_use]
 pub fn executed_ns(sample: &[u64]) -> u64 {
     sample
         .iter()
@@ -80,7 +77,6 @@ pub fn executed_ns(sample: &[u64]) -> u64 {
 
 impl DagFile {
     /// Returns the number of subtasks of the set that has most.
-    #[must_use]
     pub fn most_subtasks(&self) -> usize {
         let of = |set: &Set| set.dags.iter().map(|dag| dag.subtasks.len()).sum();
         self.sets.iter().map(of).max().unwrap_or(0)

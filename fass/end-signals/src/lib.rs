@@ -51,7 +51,6 @@ impl EndSignals {
     }
 
     /// Returns how many have come.
-    #[must_use]
     pub fn count(&self) -> u32 {
         ENDS_ASKED.load(Ordering::Acquire)
     }

@@ -77,7 +77,6 @@ impl Control {
     /// ```
     /// assert!(linux::Control::get().is_none()); // nothing is committed
     /// ```
-    #[must_use]
     pub fn get() -> Option<Self> {
         latest().filter(|control| !control.office.is_over())
     }
@@ -163,7 +162,6 @@ impl Control {
     }
 
     /// Returns the model.
-    #[must_use]
     pub fn task_set(&self) -> &Arc<TaskSet> {
         &self.office.task_set
     }

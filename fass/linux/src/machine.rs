@@ -92,19 +92,16 @@ impl std::error::Error for StartError {}
 
 /// Returns the core of the model that the calling thread computes for, counted within its cluster;
 /// `None` outside of functions of a run.
-#[must_use]
 pub fn own_core() -> Option<u32> {
     with_own_worker(Worker::seat).flatten().map(|core| core.0)
 }
 
 /// Returns the time on the clock, whatever functions are told.
-#[must_use]
 pub fn now_ns() -> u64 {
     sys::now_ns()
 }
 
 /// Returns how many processors this program may use.
-#[must_use]
 pub fn processors() -> u32 {
     u32::try_from(sys::processors().len()).unwrap_or(u32::MAX)
 }
@@ -203,7 +200,6 @@ impl Linux {
     }
 
     /// Returns the terms of the commits to come.
-    #[must_use]
     pub fn terms(&self) -> RunConfig {
         HOST.terms()
     }
@@ -285,14 +281,12 @@ impl Linux {
     }
 
     /// Reports whether started instances may lose their cores.
-    #[must_use]
     pub fn is_preemptive(&self) -> bool {
         self.terms().scheduler.preemption == Preemption::Enabled
     }
 
     /// Returns what changes the committed run from any thread; `None` if nothing is
     /// committed.
-    #[must_use]
     pub fn control(&self) -> Option<Control> {
         control::latest()
     }

@@ -366,7 +366,6 @@ impl Run {
     }
 
     /// Returns how often the threads did what.
-    #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
     }

@@ -28,26 +28,22 @@ const HALF_TURN: Long = (PI, 1.224_646_799_147_353_2e-16);
 const QUARTER_TURN: Long = (FRAC_PI_2, 6.123_233_995_736_766e-17);
 
 /// Returns the angle whose tangent is `x`, in radians, from -pi/2 to pi/2.
-#[must_use]
 pub fn atan(x: f64) -> f64 {
     atan2(x, 1.0)
 }
 
 /// Returns the angle whose sine is `x`, in radians, from -pi/2 to pi/2; NaN beyond 1.
-#[must_use]
 pub fn asin(x: f64) -> f64 {
     atan2(x, sqrt((1.0 - x) * (1.0 + x)))
 }
 
 /// Returns the angle whose cosine is `x`, in radians, from 0 to pi; NaN beyond 1.
-#[must_use]
 pub fn acos(x: f64) -> f64 {
     atan2(sqrt((1.0 - x) * (1.0 + x)), x)
 }
 
 /// Returns the angle of the point (x, y), in radians, from -pi to pi; of zeros and infinities as
 /// IEEE 754 (9.2.1) has it.
-#[must_use]
 pub fn atan2(y: f64, x: f64) -> f64 {
     if x.is_nan() || y.is_nan() {
         return f64::NAN;

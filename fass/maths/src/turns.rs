@@ -21,26 +21,22 @@ const QUARTER: [f64; 3] = [
 ];
 
 /// Returns the sine of an angle in radians.
-#[must_use]
 pub fn sin(angle: f64) -> f64 {
     sin_cos(angle).0
 }
 
 /// Returns the cosine of an angle in radians.
-#[must_use]
 pub fn cos(angle: f64) -> f64 {
     sin_cos(angle).1
 }
 
 /// Returns the tangent of an angle in radians.
-#[must_use]
 pub fn tan(angle: f64) -> f64 {
     let (sin, cos) = sin_cos(angle);
     sin / cos
 }
 
 /// Returns sine and cosine of an angle in radians.
-#[must_use]
 pub fn sin_cos(angle: f64) -> (f64, f64) {
     if angle.is_nan() || angle.abs() > LARGEST_ANGLE {
         return (f64::NAN, f64::NAN);

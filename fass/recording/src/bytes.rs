@@ -125,7 +125,6 @@ pub struct Malformed {
 
 impl<'b> Decoder<'b> {
     /// Begins at the start of these bytes.
-    #[must_use]
     pub const fn new(bytes: &'b [u8]) -> Self {
         Self { bytes, offset: 0 }
     }
@@ -133,7 +132,6 @@ impl<'b> Decoder<'b> {
     /// Returns the offset of the next byte.
     ///
     /// See [`Malformed`].
-    #[must_use]
     pub const fn offset(&self) -> usize {
         self.offset
     }
@@ -143,7 +141,6 @@ impl<'b> Decoder<'b> {
     /// ```
     /// assert_eq!(recording::Decoder::new(&[1, 2]).remaining(), 2);
     /// ```
-    #[must_use]
     pub const fn remaining(&self) -> usize {
         self.bytes.len() - self.offset
     }

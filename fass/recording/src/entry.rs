@@ -198,7 +198,6 @@ pub struct Entry<'v> {
 /// let place = value.as_ptr().addr() - bytes.as_ptr().addr();
 /// assert_eq!(recording::release_ns_of(&bytes, place), Some(20));
 /// ```
-#[must_use]
 pub fn release_ns_of(bytes: &[u8], value: usize) -> Option<u64> {
     // It is the last but one of the numbers before the value.
     let (_, [release_ns, _]) = bytes.get(..value)?.as_rchunks::<8>().1.split_last_chunk()?;

@@ -70,7 +70,6 @@ impl<'b> Recording<'b> {
     /// Returns what the recording says of itself.
     ///
     /// See [`Writer`](crate::Writer).
-    #[must_use]
     pub const fn header(&self) -> &Header {
         &self.read.header
     }
@@ -78,7 +77,6 @@ impl<'b> Recording<'b> {
     /// Returns the number of entries.
     ///
     /// See [`Writer`](crate::Writer).
-    #[must_use]
     pub const fn count(&self) -> u64 {
         self.read.count
     }
@@ -87,7 +85,6 @@ impl<'b> Recording<'b> {
     /// [cut](Self::is_cut): it is complete.
     ///
     /// See [`Writer`](crate::Writer).
-    #[must_use]
     pub const fn lost(&self) -> u64 {
         self.read.lost
     }
@@ -96,7 +93,6 @@ impl<'b> Recording<'b> {
     /// run died, or its buffer was full of what is never lost.
     ///
     /// See [`Stream`].
-    #[must_use]
     pub const fn is_cut(&self) -> bool {
         self.is_cut
     }

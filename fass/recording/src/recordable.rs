@@ -94,7 +94,6 @@ pub trait Recordable: Sized {
 /// ```
 /// assert_eq!(recording::to_bytes(&Some(258_u16)), [1, 2, 1]);
 /// ```
-#[must_use]
 pub fn to_bytes<T: Recordable>(value: &T) -> Vec<u8> {
     let mut bytes = Vec::new();
     loop {
@@ -440,7 +439,6 @@ macro_rules! implement_tuple {
 }
 
 /// Returns how deeply that is nested which has elements of these depths.
-#[must_use]
 pub const fn deepest(elements: &[usize]) -> usize {
     let (mut deepest, mut index) = (0, 0);
     while index < elements.len() {

@@ -122,7 +122,6 @@ of_scalars!(define_scalars);
 impl Schema {
     /// Returns the schema of a struct.
     #[doc(hidden)]
-    #[must_use]
     pub fn of_struct<const N: usize>(name: &str, fields: [(&str, Schema); N]) -> Self {
         let fields = fields.map(|(name, schema)| Field {
             name: name.into(),
@@ -162,7 +161,6 @@ impl Schema {
     /// use recording::Recordable;
     /// assert_eq!(<([u16; 3], Vec<u8>)>::schema().least_bytes(), 10);
     /// ```
-    #[must_use]
     pub fn least_bytes(&self) -> usize {
         match self {
             Self::Scalar(scalar) => scalar.least_bytes(),

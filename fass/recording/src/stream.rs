@@ -88,7 +88,6 @@ pub struct Crc(u32);
 
 impl Crc {
     /// Begins with no byte.
-    #[must_use]
     pub const fn new() -> Self {
         Self(u32::MAX)
     }
@@ -201,7 +200,6 @@ const EVENTS_HEAD: usize = 10;
 
 impl Writer {
     /// Begins a recording.
-    #[must_use]
     pub fn new(header: &Header) -> Self {
         let mut writer = Self::begin(Vec::new());
         writer.header(header);
@@ -326,13 +324,11 @@ impl<S: Sink + ?Sized> Stream<S> {
     }
 
     /// Returns the number of entries so far.
-    #[must_use]
     pub const fn entries(&self) -> u64 {
         self.entries
     }
 
     /// Returns how many of these are of what was lost.
-    #[must_use]
     pub const fn lost(&self) -> u64 {
         self.lost
     }

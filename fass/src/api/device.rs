@@ -210,7 +210,6 @@ pub struct Ticket {
 
 impl Ticket {
     /// Returns the job that asks.
-    #[must_use]
     pub const fn job(&self) -> u64 {
         self.wait.instance.job
     }
@@ -784,7 +783,6 @@ impl<Q, A> DeviceDriver<Q, A> {
     /// drop(sonar);
     /// assert!(!driver.is_used());
     /// ```
-    #[must_use]
     pub fn is_used(&self) -> bool {
         Arc::strong_count(&self.cell) > 1
     }

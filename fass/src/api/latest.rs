@@ -111,7 +111,6 @@ pub struct Sample<'a, T> {
 
 impl<T> Sample<'_, T> {
     /// Returns the time since the writer was complete, in nanoseconds.
-    #[must_use]
     pub fn age_ns(&self) -> u64 {
         crate::now_ns().saturating_sub(self.completed_ns)
     }

@@ -342,7 +342,6 @@ impl ModeSwitch<'_> {
 
 impl Modes {
     /// Makes a handle without modes. A commit has those of one handle.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }

@@ -198,7 +198,6 @@ impl dyn Tunable + '_ {
     /// Returns its value and what it can be, as text. Nothing is allocated.
     ///
     /// See [`Tunable`].
-    #[must_use]
     pub fn shown(&self) -> impl fmt::Display {
         fmt::from_fn(|f| self.write(f))
     }
@@ -223,7 +222,6 @@ impl<T: ParameterValue> Parameter<T> {
     ///
     /// If that is not within the range, or the name is empty or has a blank, `=` or `,` in it, so
     /// that nobody could type it.
-    #[must_use]
     #[track_caller]
     pub fn new(name: &str, initial: T, range: RangeInclusive<T>) -> Self {
         let is_typed = |c: char| !(c.is_whitespace() || c.is_control() || "=,".contains(c));
@@ -246,7 +244,6 @@ impl<T: ParameterValue> Parameter<T> {
     }
 
     /// Returns the value for the jobs to come.
-    #[must_use]
     pub fn value(&self) -> T {
         T::from_bits(self.0.bits.load(Ordering::Relaxed))
     }

@@ -149,7 +149,6 @@ impl Signal {
     /// let button = create_dag().sporadic(minimum);
     /// assert_eq!(button.target(), None);
     /// ```
-    #[must_use]
     pub fn target(&self) -> Option<(u64, DagId)> {
         self.target.get()
     }

@@ -78,7 +78,6 @@ impl UnixTime {
 
 impl WallClock {
     /// Makes a clock that does not know the time.
-    #[must_use]
     pub fn new() -> Self {
         Self(Arc::new(AtomicU64::new(UNKNOWN)))
     }

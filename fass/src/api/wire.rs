@@ -166,7 +166,6 @@ pub struct WireCounts {
 
 impl Wire {
     /// Makes a wire whose packets are lines, with a name for reports.
-    #[must_use]
     pub fn new(name: &str) -> Self {
         Self::with(name, WireOptions::default())
     }
@@ -174,7 +173,6 @@ impl Wire {
     /// Makes a wire with a name for reports.
     ///
     /// See [`WireOptions`].
-    #[must_use]
     pub fn with(name: &str, options: WireOptions) -> Self {
         Self {
             shared: Arc::new(WireState {
@@ -260,19 +258,16 @@ impl Wire {
     /// assert!(wire.link().value());
     /// wire.link().set(false).unwrap(); // as a test may
     /// ```
-    #[must_use]
     pub fn link(&self) -> &Parameter<bool> {
         &self.shared.link
     }
 
     /// Returns the wire's name.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.shared.name
     }
 
     /// Returns the counts of the wire so far.
-    #[must_use]
     pub fn counts(&self) -> WireCounts {
         let WireState {
             incoming, outgoing, ..
@@ -302,14 +297,12 @@ pub struct DeviceEnd(Wire);
 impl DeviceEnd {
     /// Takes the device's end of the wire; returns `None` while somebody has it. Dropped, it can
     /// be taken again.
-    #[must_use]
     pub fn of(wire: &Wire) -> Option<Self> {
         let is_taken = wire.shared.is_connected.swap(true, Ordering::Acquire);
         (!is_taken).then(|| Self(wire.clone()))
     }
 
     /// Returns the wire.
-    #[must_use]
     pub fn wire(&self) -> &Wire {
         &self.0
     }
@@ -348,7 +341,6 @@ impl DeviceEnd {
     }
 
     /// Reports whether there is a packet to go, or the rest of a packet.
-    #[must_use]
     pub fn has_bytes_to_go(&self) -> bool {
         !self.0.shared.outgoing.is_empty()
     }

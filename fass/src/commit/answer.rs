@@ -127,7 +127,6 @@ impl Commit {
     ///     println!("{answer}");
     /// }
     /// ```
-    #[must_use]
     pub fn answers(&self) -> &[DagAnswer] {
         &self.answers.of_dags
     }
@@ -139,7 +138,6 @@ impl Commit {
     /// If there is no such DAG.
     ///
     /// See [`answers`](Self::answers).
-    #[must_use]
     #[track_caller]
     pub fn answer(&self, dag: impl DagKey) -> &DagAnswer {
         &self.answers.of_dags[self.task_set.find(dag).index()]
@@ -159,7 +157,6 @@ impl Commit {
     /// let commit = finish_create_dags(&[dag]).unwrap();
     /// assert!(commit.witnesses().contains("bound 0 5000000 "));
     /// ```
-    #[must_use]
     pub fn witnesses(&self) -> String {
         self.answers.witness(&self.task_set)
     }
@@ -168,7 +165,6 @@ impl Commit {
     /// commit, how old that value can be; see [`Staleness`].
     ///
     /// See [`Latest`](crate::shared::Latest) for an example.
-    #[must_use]
     pub fn staleness(&self) -> &[Staleness] {
         &self.staleness
     }
@@ -259,7 +255,6 @@ impl Commit {
     /// that no DAG samples; at most 1000.
     ///
     /// See [`EndToEnd`].
-    #[must_use]
     pub fn chains(&self) -> Vec<EndToEnd> {
         let chains = Chain::all(&self.task_set, &self.samplings());
         self.with_bounds(chains)
@@ -269,7 +264,6 @@ impl Commit {
     /// number; none if there is no such subtask, or nothing leads there.
     ///
     /// See [`EndToEnd`].
-    #[must_use]
     pub fn chains_between(&self, from: &str, to: &str) -> Vec<EndToEnd> {
         let [Some(from), Some(to)] = [from, to].map(|name| Chain::find(&self.task_set, name))
         else {
@@ -433,7 +427,6 @@ pub enum Verdict {
 
 impl Verdict {
     /// Returns the bound, if there is one.
-    #[must_use]
     pub const fn bound(&self) -> Option<Duration> {
         match self {
             Self::Proven { bound, .. } => Some(*bound),
@@ -450,7 +443,6 @@ impl Verdict {
     /// let bound = Duration::from_millis(5);
     /// assert_eq!(Verdict::Proven { bound, test: SchedulabilityTest::Edf }.unproven(), None);
     /// ```
-    #[must_use]
     pub const fn unproven(&self) -> Option<&UnprovenDag> {
         match self {
             Self::Proven { .. } => None,

@@ -151,14 +151,12 @@ pub struct UnprovenDag {
 
 impl UnprovenDag {
     /// Returns the reason, by which a program may decide.
-    #[must_use]
     pub const fn reason(&self) -> NotProvenReason {
         self.reason
     }
 
     /// Reports whether deadlines will be missed when every instance takes its
     /// WCET, rather than merely not being proven to be met.
-    #[must_use]
     pub const fn is_certain(&self) -> bool {
         self.reason.is_certain()
     }

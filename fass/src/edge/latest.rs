@@ -226,7 +226,6 @@ struct ChannelHistory {
 
 impl LatestJobs {
     /// Makes room for the inputs of so many jobs; `None`: there is no memory.
-    #[must_use]
     pub fn new(channels: &[Channel], jobs: u32) -> Option<Self> {
         let count = usize::try_from(jobs).unwrap_or(usize::MAX);
         let mut places = Vec::with_capacity(channels.len());
@@ -284,20 +283,17 @@ impl LatestJobs {
     }
 
     /// Reports whether an input of a job would be kept: it is not behind one that has failed.
-    #[must_use]
     pub fn is_of_interest(&self, dag: usize, job: u64) -> bool {
         self.last.get(dag).is_some_and(|last| job <= *last)
     }
 
     /// Returns the last jobs of a DAG.
-    #[must_use]
     pub fn jobs(&self, dag: usize) -> Range<u64> {
         let end = self.ends.get(dag).copied().unwrap_or(0);
         end.saturating_sub(self.jobs.into())..end
     }
 
     /// Reports whether a job is among the last ones of its DAG.
-    #[must_use]
     pub fn has(&self, dag: usize, job: u64) -> bool {
         let end = self.ends.get(dag).copied().unwrap_or(0);
         job.saturating_add(self.jobs.into()) >= end

@@ -180,7 +180,6 @@ impl WatchedValue {
     /// Returns the value in the buffer that it was taken into, as text. Nothing is allocated.
     ///
     /// See [`Echoing`].
-    #[must_use]
     pub fn shown<'s>(&'s self, buffer: &'s [u8]) -> impl fmt::Display + 's {
         let bytes = self.length.and_then(|length| buffer.get(..length));
         fmt::from_fn(move |f| match bytes {
@@ -331,7 +330,6 @@ pub struct Edge {
 
 impl Edge {
     /// Begins without a wish.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             wish: None,
@@ -359,19 +357,16 @@ impl Edge {
     }
 
     /// Reports whether there is a wish.
-    #[must_use]
     pub const fn is_wished(&self) -> bool {
         self.wish.is_some() || self.shows
     }
 
     /// Reports whether there are results among what crosses.
-    #[must_use]
     pub const fn has_results(&self) -> bool {
         self.shows || !matches!(self.wish, Some(EdgeMode::Latest { .. }))
     }
 
     /// Reports whether a replay is wished.
-    #[must_use]
     pub const fn is_replay(&self) -> bool {
         matches!(self.wish, Some(EdgeMode::Replay { .. }))
     }
@@ -522,7 +517,6 @@ impl Edge {
     }
 
     /// Returns a recorded value, which outlasts the edge's lock: what reads it is the app's.
-    #[must_use]
     pub fn find(&self, channel: u16, job: u64) -> Option<&'static [u8]> {
         self.crossing.as_ref()?.find(channel, job)
     }

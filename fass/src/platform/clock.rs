@@ -89,7 +89,6 @@ pub(super) static ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
 /// assert_eq!(fass::now_ns(), 0);
 /// ```
 #[inline]
-#[must_use]
 pub fn now_ns() -> u64 {
     CLOCK.get()()
 }

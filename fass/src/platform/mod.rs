@@ -280,7 +280,6 @@ impl LaunchError {
     /// let error = fass::platform::LaunchError::new("a plan runs already; wait for its end");
     /// assert_eq!(error.to_string(), "a plan runs already; wait for its end");
     /// ```
-    #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: message.into(),

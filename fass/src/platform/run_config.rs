@@ -65,7 +65,6 @@ pub struct RunConfig {
 impl RunConfig {
     /// Makes terms of so many cores: they are not divided, static priorities and preemption rule,
     /// nothing is charged, and there are no budgets but stated ones.
-    #[must_use]
     pub const fn of_cores(cores: u32) -> Self {
         Self {
             scheduler: SchedulerOptions {

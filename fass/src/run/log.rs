@@ -191,7 +191,6 @@ impl LogLine {
 
     /// Returns the names of its DAG and its subtask, and the instance, if it is of one of these
     /// DAGs.
-    #[must_use]
     pub fn names<'t>(&self, task_set: Option<&'t TaskSet>) -> Option<(&'t str, &'t str, Instance)> {
         let instance = self.instance?;
         let dag = task_set?.dags().get(instance.dag.index())?;

@@ -299,13 +299,11 @@ impl SubtaskCode {
     }
 
     /// Reports whether its instances may wait.
-    #[must_use]
     pub fn may_wait(&self) -> bool {
         self.turn().is_some()
     }
 
     /// Reports whether the instance of a job has begun and not finished: it has a further turn.
-    #[must_use]
     pub fn goes_on(&self, job: u64) -> bool {
         self.turn().is_some_and(|turn| turn.is_of(job))
     }
@@ -433,7 +431,6 @@ impl SubtaskCode {
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
     /// platform to which a clock is dear need not read it for the others.
-    #[must_use]
     pub fn has_effects(&self) -> bool {
         self.has_effects
     }
@@ -469,7 +466,6 @@ impl SubtaskCode {
     /// Returns the replacement of the function after a fault; `None`: its faults end the DAG.
     ///
     /// See [`ReplacementCode`].
-    #[must_use]
     pub fn replacement(&self) -> Option<ReplacementCode> {
         self.subtask.replacement()
     }

@@ -53,7 +53,6 @@ pub struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// Starts at the first line.
-    #[must_use]
     pub fn new(text: &'a str) -> Self {
         Self {
             rest: text.lines().enumerate(),
@@ -118,7 +117,6 @@ impl<'a> Lines<'a> {
     }
 
     /// Returns the error of a file that ends too early.
-    #[must_use]
     pub fn ended(&self, expected: &str) -> Malformed {
         Malformed {
             line: self.last + 1,
@@ -180,7 +178,6 @@ pub fn blocks<'a, Case>(
 
 impl Line<'_> {
     /// Returns an error on this line.
-    #[must_use]
     pub fn malformed(&self, reason: impl Into<String>) -> Malformed {
         Malformed {
             line: self.number,
@@ -310,7 +307,6 @@ impl core::error::Error for Malformed {}
 
 /// Returns the first of the items that equals one before it: the positions of that one
 /// and of itself.
-#[must_use]
 pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, usize)> {
     let items: Vec<T> = items.into_iter().collect();
     let order = sorted_by_key(items.len(), |position| &items[position]);

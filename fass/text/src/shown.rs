@@ -37,7 +37,6 @@ pub fn visible(text: &str) -> impl fmt::Display {
 
 /// Reports whether a character is seen as itself: it is no control character, and none
 /// of those that Unicode calls default-ignorable, or by which text changes direction.
-#[must_use]
 pub fn is_seen(character: char) -> bool {
     let is_hidden = matches!(
         character,

@@ -66,7 +66,6 @@ impl VirtualTime {
     /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
     ///
     /// See [`Dag::record`](fass::Dag::record).
-    #[must_use]
     pub fn recording(&self) -> Vec<u8> {
         let session = self.machine.session.borrow();
         session.as_ref().map_or(Vec::new(), Session::recording)
@@ -219,7 +218,6 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If the wire is not connected.
-    #[must_use]
     pub fn sent(&self, wire: &Wire) -> Vec<u8> {
         let packets = self.sent_packets(wire).into_iter();
         packets.flat_map(|(bytes, _)| bytes).collect()
@@ -232,7 +230,6 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If the wire is not connected.
-    #[must_use]
     pub fn sent_packets(&self, wire: &Wire) -> Vec<SentPacket> {
         let wires = self.machine.wires.borrow();
         let of_wire = wires.iter().find(|(end, _)| end.wire() == wire);

@@ -123,7 +123,6 @@ impl Report {
     }
 
     /// Returns the record of one instance, if it became ready.
-    #[must_use]
     pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
         (self.instances.iter()).find(|record| record.instance == instance)
     }
@@ -132,7 +131,6 @@ impl Report {
     /// nothing.
     ///
     /// See [`VirtualTime::silent`](crate::VirtualTime::silent).
-    #[must_use]
     pub fn took_no_time(&self) -> bool {
         self.instances.iter().all(|record| record.execution_ns == 0)
     }
@@ -248,7 +246,6 @@ impl Report {
     /// assert_eq!((clock.sink_misses("tick"), clock.is_degraded()), (0, false));
     /// assert_eq!(report.dags().count(), 1);
     /// ```
-    #[must_use]
     #[track_caller]
     pub fn dag(&self, dag: impl DagKey) -> DagReport<'_> {
         DagReport {
@@ -270,7 +267,6 @@ impl<'r> DagReport<'r> {
     /// Returns the scheduler's counters.
     ///
     /// See [`Report::dag`].
-    #[must_use]
     pub fn statistics(&self) -> &'r DagStatistics {
         self.report.statistics(self.id)
     }
@@ -282,7 +278,6 @@ impl<'r> DagReport<'r> {
     /// If it is no sink of the DAG.
     ///
     /// See [`Report::dag`].
-    #[must_use]
     #[track_caller]
     pub fn sink_misses(&self, sink: impl SubtaskKey) -> u64 {
         self.report.sink_misses(self.id, sink)
@@ -291,7 +286,6 @@ impl<'r> DagReport<'r> {
     /// Reports whether a subtask of the DAG has fallen back on its second function.
     ///
     /// See [`Report::dag`].
-    #[must_use]
     pub fn is_degraded(&self) -> bool {
         self.report.degraded[self.id.index()]
     }
@@ -311,7 +305,6 @@ impl<'r> DagReport<'r> {
     /// If there is no such subtask.
     ///
     /// See [`Report::dag`].
-    #[must_use]
     #[track_caller]
     pub fn subtask(&self, subtask: impl SubtaskKey) -> Vec<InstanceRecord> {
         let subtask = self.report.task_set().dag(self.id).find(subtask);

@@ -77,7 +77,6 @@ impl UsageError {
     /// let error = UsageError::new("`rate=3`: only even rates are possible");
     /// assert!(error.to_string().contains("rate=3"));
     /// ```
-    #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self(message.into())
     }

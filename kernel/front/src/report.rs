@@ -187,7 +187,6 @@ pub struct RecordLines {
 
 impl RecordLines {
     /// Begins with nothing.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             bytes: [0; LINE_BYTES],

@@ -68,7 +68,6 @@ impl Client {
 
     /// Returns a client that looks for a server at once. `transaction` is any number that clients
     /// in the same network are unlikely to share.
-    #[must_use]
     pub const fn new(mac: Mac, transaction: u32) -> Self {
         Self {
             mac,
@@ -80,13 +79,11 @@ impl Client {
     }
 
     /// Returns the time at which [`Client::send`] is to be called.
-    #[must_use]
     pub const fn due_ns(&self) -> u64 {
         self.due_ns
     }
 
     /// Returns the address that a server has given, while its time lasts.
-    #[must_use]
     pub const fn lease(&self) -> Option<Lease> {
         match self.state {
             State::Bound { lease, .. } => Some(lease),

@@ -142,7 +142,6 @@ pub struct Interface<B> {
 impl<B: AsMut<[u8]>> Interface<B> {
     /// Returns the interface of a card. Each `room` is for a frame that waits for a neighbour's
     /// answer.
-    #[must_use]
     pub fn new(mac: Mac, address: Address, room: impl FnMut() -> B) -> Self {
         Self {
             mac,
@@ -161,7 +160,6 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Returns the address.
-    #[must_use]
     pub const fn address(&self) -> Address {
         self.address
     }
@@ -172,7 +170,6 @@ impl<B: AsMut<[u8]>> Interface<B> {
     }
 
     /// Returns the numbers of frames that came.
-    #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
     }

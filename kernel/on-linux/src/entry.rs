@@ -61,7 +61,6 @@ macro_rules! entry {
 
 /// Runs an app with the words of the program's command line. The exit code is 0 after a
 /// success, 1 after a failure, 2 if the command line is refused.
-#[must_use]
 pub fn start(name: &'static str, app: fn(&Machine) -> Result<(), AppError>) -> ExitCode {
     let line = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let run = AssertUnwindSafe(|| run(name, line.leak(), app));

@@ -14,7 +14,6 @@ pub struct Event {
 
 impl Event {
     /// Makes an event that has not happened.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             version: Mutex::new(0),
@@ -23,7 +22,6 @@ impl Event {
     }
 
     /// Returns how often the event has happened.
-    #[must_use]
     pub fn version(&self) -> u64 {
         *self.version.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -53,7 +53,6 @@ pub use linux_system::Machine;
 pub use sched_dag::engine::Run;
 
 /// Reports whether functions may use AVX: the processor has it.
-#[must_use]
 pub fn has_avx() -> bool {
     #[cfg(target_arch = "x86_64")]
     return std::is_x86_feature_detected!("avx");

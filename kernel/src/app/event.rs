@@ -54,7 +54,6 @@ pub struct Event {
 
 impl Event {
     /// Makes an event that has not happened.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             version: AtomicU64::new(0),
@@ -63,7 +62,6 @@ impl Event {
     }
 
     /// Returns how often the event has happened.
-    #[must_use]
     pub fn version(&self) -> u64 {
         self.version.load(Ordering::SeqCst)
     }

@@ -26,7 +26,6 @@ pub struct Random {
 
 impl Random {
     /// Starts the sequence of `seed`.
-    #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self { state: seed }
     }
@@ -72,7 +71,6 @@ impl Random {
 }
 
 /// Returns number `n` of the sequence of `seed`, counted from 0.
-#[must_use]
 pub const fn nth(seed: u64, n: u64) -> u64 {
     let mut mixed = seed.wrapping_add(INCREMENT.wrapping_mul(n.wrapping_add(1)));
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -82,7 +80,6 @@ pub const fn nth(seed: u64, n: u64) -> u64 {
 
 /// Maps a number of 64 bits to a range: the high part of the product has not
 /// the bias of a remainder.
-#[must_use]
 pub fn scale<N: Copy + TryFrom<u64> + TryInto<u64>>(number: u64, range: RangeInclusive<N>) -> N {
     let [least, most] = [range.start(), range.end()].map(|&it| it.try_into().unwrap_or(0));
     let choices = u128::from(most.saturating_sub(least)) + 1;

@@ -148,7 +148,6 @@ impl Run {
     }
 
     /// Returns the model that was run.
-    #[must_use]
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
     }
@@ -161,7 +160,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no memory for it.
-    #[must_use]
     pub fn record(&self) -> &RunRecord {
         let record = self.try_record();
         record.expect("there is no memory for the times of so many jobs; give the machine more")
@@ -169,7 +167,6 @@ impl Run {
 
     /// Returns the times of all jobs, as [`record`](Self::record) does; `None` if there is no memory
     /// for them, as after an overload, in which each job that waits counts.
-    #[must_use]
     pub fn try_record(&self) -> Option<&RunRecord> {
         let record = self.record.get_or_init(|| {
             let (is_whole, events) = (self.journal.is_whole(), self.journal.events());
@@ -196,27 +193,23 @@ impl Run {
     /// Returns the statistics of all jobs and instances, those included whose events made way for
     /// later ones; `None` if some were not recorded, because of `trace_events=0` or the console's
     /// `trace off`.
-    #[must_use]
     pub fn times(&self) -> Option<&RunTally> {
         let tally = || self.journal.statistics(&self.task_set, FINEST);
         self.times.get_or_init(tally).as_ref()
     }
 
     /// Returns counts and maxima of all times, as [`times`](Self::times) does, in less memory.
-    #[must_use]
     pub fn coarse_times(&self) -> Option<RunTally> {
         self.journal.statistics(&self.task_set, 0)
     }
 
     /// Returns the journal: what has happened, in its order.
-    #[must_use]
     pub const fn journal(&self) -> &Journal {
         &self.journal
     }
 
     /// Returns the instant from which releases count, in nanoseconds on the clock that functions
     /// read.
-    #[must_use]
     pub const fn epoch_ns(&self) -> u64 {
         self.counts.epoch_ns
     }
@@ -226,7 +219,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[track_caller]
     pub fn statistics(&self, dag: impl DagKey) -> &DagStatistics {
         &self.snapshot(dag).statistics
@@ -237,7 +229,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[track_caller]
     pub fn snapshot(&self, dag: impl DagKey) -> &DagSnapshot {
         &self.dags[self.task_set.find(dag).index()].snapshot
@@ -249,7 +240,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG, or the subtask is no sink of it.
-    #[must_use]
     #[track_caller]
     pub fn sink_misses(&self, dag: impl DagKey, sink: impl SubtaskKey) -> u64 {
         let (dag, sink) = self.find(dag, sink);
@@ -259,20 +249,17 @@ impl Run {
     }
 
     /// Returns how the scheduler was told to work.
-    #[must_use]
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
 
     /// Returns the response time that the commit has proven of a DAG, if it has.
-    #[must_use]
     #[track_caller]
     pub fn bound_ns(&self, dag: impl DagKey) -> Option<u64> {
         *self.proven.bounds_ns.get(self.task_set.find(dag).index())?
     }
 
     /// Returns the response time that the commit has proven of a sink, if it has.
-    #[must_use]
     #[track_caller]
     pub fn sink_bound_ns(&self, dag: impl DagKey, sink: impl SubtaskKey) -> Option<u64> {
         let (dag, sink) = self.find(dag, sink);
@@ -328,21 +315,18 @@ impl Run {
 
     /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
     /// and how long it takes to react; of the latest jobs if events are lost.
-    #[must_use]
     pub fn latencies(&self, chain: &Chain) -> ChainLatencies {
         chain.latencies(&self.task_set, self.journal.events())
     }
 
     /// Returns how often anything allocated memory between the start of the run and its last
     /// completion.
-    #[must_use]
     pub const fn allocations(&self) -> u64 {
         self.counts.allocations
     }
 
     /// Returns how often the schedulers' locks were taken between the start of the run and its
     /// last completion, modulo 2^32; 0 where nobody counts.
-    #[must_use]
     pub const fn lock_acquisitions(&self) -> u32 {
         self.counts.lock_acquisitions
     }

@@ -59,7 +59,6 @@ pub struct Journal {
 impl Journal {
     /// Takes the memory for what happens to the DAGs of one cluster, of `free_bytes`, and for
     /// at most `most_events` events.
-    #[must_use]
     #[inline(never)]
     pub fn of_cluster(
         task_set: &Arc<TaskSet>,
@@ -91,7 +90,6 @@ impl Journal {
     }
 
     /// Makes one that has no room.
-    #[must_use]
     pub const fn none() -> Self {
         Self {
             events: Vec::new(),
@@ -112,7 +110,6 @@ impl Journal {
     }
 
     /// Makes one that keeps all, as long as there is memory.
-    #[must_use]
     pub const fn growing() -> Self {
         let mut journal = Self::none();
         journal.grows = true;
@@ -188,19 +185,16 @@ impl Journal {
     }
 
     /// Reports whether events are recorded.
-    #[must_use]
     pub const fn is_recording(&self) -> bool {
         self.events.capacity() > 0
     }
 
     /// Reports whether there is room for events.
-    #[must_use]
     pub const fn has_room(&self) -> bool {
         self.is_recording() || self.put_away.capacity() > 0
     }
 
     /// Returns how many events are not there any more, or were not recorded.
-    #[must_use]
     pub const fn lost(&self) -> u64 {
         self.lost
     }
@@ -216,7 +210,6 @@ impl Journal {
     }
 
     /// Returns how many events were written, and so the number of the next one.
-    #[must_use]
     pub const fn written(&self) -> u64 {
         self.lost + self.events.len() as u64
     }
@@ -255,14 +248,12 @@ impl Journal {
     }
 
     /// Reports whether no event is lost.
-    #[must_use]
     pub const fn is_whole(&self) -> bool {
         self.lost == 0
     }
 
     /// Computes the statistics of the run, in histograms of so many bits unless others were
     /// kept; `None` if events were neither kept nor counted.
-    #[must_use]
     #[inline(never)]
     pub fn statistics(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<RunTally> {
         let mut tally = match &self.tally {
@@ -274,7 +265,6 @@ impl Journal {
     }
 
     /// Measures what the platform's own work has cost, core by core; `None` if events are lost.
-    #[must_use]
     #[inline(never)]
     pub fn costs(&self, task_set: &TaskSet) -> Option<MeasuredCosts> {
         let measure = || MeasuredCosts::of_cores(task_set, self.events());

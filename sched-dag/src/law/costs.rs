@@ -35,7 +35,6 @@ impl MeasuredCosts {
     /// finished another one, or has begun one that a fault ended: all of that one's time counts as
     /// what the fault took. ([`judge_dispatch`](super::judge_dispatch) asks the rule itself,
     /// with ten times the code: which instance was to run, whichever core took it.)
-    #[must_use]
     pub fn of_cores(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
         let mut costs = Self::of_releases(task_set, events.clone());
         let mut waiting: Vec<(Instance, u64)> = Vec::new();
@@ -70,7 +69,6 @@ impl MeasuredCosts {
     }
 
     /// Measures the releases alone.
-    #[must_use]
     pub fn of_releases(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
         let mut costs = Self::default();
         for event in events

@@ -40,7 +40,6 @@ pub struct Distribution {
 
 impl Distribution {
     /// Orders the samples.
-    #[must_use]
     pub fn new(samples_ns: impl IntoIterator<Item = u64>) -> Self {
         let samples = samples_ns.into_iter().map(|ns| (ns, 1));
         Self::counted(u64::MAX, samples.collect())
@@ -55,7 +54,6 @@ impl Distribution {
     /// let latencies = Distribution::counted(9, vec![(15, 1), (11, 2)]);
     /// assert_eq!((latencies.min(), latencies.median(), latencies.max()), (9, 11, 15));
     /// ```
-    #[must_use]
     pub fn counted(min_ns: u64, values: Vec<(u64, u64)>) -> Self {
         let mut values = sorted(&values);
         values.dedup_by(|later, before| {
@@ -86,7 +84,6 @@ impl Distribution {
     }
 
     /// Returns the number of samples.
-    #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
     }
@@ -113,7 +110,6 @@ impl Distribution {
     /// let latencies = Distribution::new(1..=200);
     /// assert_eq!(latencies.per_mille(900), 180);
     /// ```
-    #[must_use]
     pub fn per_mille(&self, thousandths: u64) -> u64 {
         let rank = u128::from(self.count) * u128::from(thousandths);
         let rank = rank.div_ceil(1000).max(1);
@@ -126,25 +122,21 @@ impl Distribution {
     }
 
     /// Returns the smallest sample, or 0.
-    #[must_use]
     pub fn min(&self) -> u64 {
         self.min_ns.unwrap_or(0)
     }
 
     /// Returns the middle sample, or 0.
-    #[must_use]
     pub fn median(&self) -> u64 {
         self.per_mille(500)
     }
 
     /// Returns the sample that 99 per cent do not exceed, or 0.
-    #[must_use]
     pub fn p99(&self) -> u64 {
         self.per_mille(990)
     }
 
     /// Returns the largest sample, or 0.
-    #[must_use]
     pub fn max(&self) -> u64 {
         self.values.last().map_or(0, |(ns, _)| *ns)
     }
@@ -181,7 +173,6 @@ impl Histogram {
     /// # Panics
     ///
     /// If `bits` is more than 16.
-    #[must_use]
     pub fn new(bits: u32) -> Self {
         Self {
             bits,
@@ -193,7 +184,6 @@ impl Histogram {
     }
 
     /// Returns the bytes that one takes.
-    #[must_use]
     pub const fn size_of(bits: u32) -> usize {
         size_of::<Self>() + Self::buckets(bits) * size_of::<u32>()
     }
@@ -233,7 +223,6 @@ impl Histogram {
 
     /// Returns the distribution. Its values are the largest ones of the buckets that are not
     /// empty, the last of them the maximum.
-    #[must_use]
     pub fn distribution(&self) -> Distribution {
         let counts = self.counts.iter().copied().enumerate();
         let filled = counts.filter(|(_, count)| *count > 0);

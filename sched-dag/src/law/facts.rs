@@ -17,7 +17,6 @@ impl RunRecord {
     /// due at or after the first event that is left: of these no event is missing.
     ///
     /// Returns `None` if there is no memory for so many jobs.
-    #[must_use]
     pub fn of_events(
         task_set: &TaskSet,
         is_whole: bool,

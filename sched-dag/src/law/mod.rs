@@ -85,7 +85,6 @@ pub struct JobRecord {
 
 impl JobRecord {
     /// Returns the time from the nominal release to the end, if there was one.
-    #[must_use]
     pub fn response_time_ns(&self) -> Option<u64> {
         Some(self.ended_ns?.saturating_sub(self.release_ns?))
     }
@@ -171,7 +170,6 @@ impl RunRecord {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn jobs(&self, dag: DagId) -> &[JobRecord] {
         &self.dags[dag.index()].jobs
     }
@@ -182,7 +180,6 @@ impl RunRecord {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn first_job(&self, dag: DagId) -> u64 {
         self.dags[dag.index()].first_job
     }
@@ -197,7 +194,6 @@ impl RunRecord {
     }
 
     /// Returns one job, `None` if it is not recorded.
-    #[must_use]
     pub fn job(&self, dag: DagId, job: u64) -> Option<&JobRecord> {
         let dag = self.dags.get(dag.index())?;
         Some(&dag.jobs[dag.position(job)?])
@@ -208,7 +204,6 @@ impl RunRecord {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn instances(&self, dag: DagId, job: u64) -> &[InstanceRecord] {
         let dag = &self.dags[dag.index()];
         let of_job = |place| &dag.instances[place * dag.subtasks..][..dag.subtasks];
@@ -216,7 +211,6 @@ impl RunRecord {
     }
 
     /// Returns an instance's times, `None` if it is not recorded.
-    #[must_use]
     pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
         self.instances(instance.dag, instance.job)
             .get(instance.subtask.index())
@@ -240,7 +234,6 @@ impl RunRecord {
     /// Returns when all predecessors of a subtask had finished their part of
     /// the job: the earliest time at which the model lets it become ready by R2.
     /// `None` if it has no predecessor, or one has not finished.
-    #[must_use]
     pub fn join_ns(&self, task_set: &TaskSet, instance: Instance) -> Option<u64> {
         let Instance { dag, job, subtask } = instance;
         let job = self.instances(dag, job);
@@ -250,7 +243,6 @@ impl RunRecord {
 
     /// Returns when a job was complete (R4): the latest finish of its subtasks.
     /// `None` if one has not finished.
-    #[must_use]
     pub fn completion_ns(&self, dag: DagId, job: u64) -> Option<u64> {
         let instances = self.instances(dag, job).iter();
         latest(instances.map(|instance| instance.finish_ns))

@@ -81,7 +81,6 @@ struct InstanceTimes {
 
 impl RunTally {
     /// Makes an empty one whose histograms have `2^bits` buckets a doubling.
-    #[must_use]
     pub fn new(task_set: &Arc<TaskSet>, bits: u32) -> Self {
         let of_dag = |dag: &Dag| DagTally {
             response_time: Histogram::new(bits),
@@ -113,7 +112,6 @@ impl RunTally {
     }
 
     /// Returns the bytes that one takes.
-    #[must_use]
     pub fn size_of(task_set: &TaskSet, bits: u32) -> usize {
         let in_flight = |dag: &Dag| {
             let job = size_of::<JobInFlight>() + dag.subtasks().len() * size_of::<InstanceTimes>();
@@ -130,7 +128,6 @@ impl RunTally {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn dag(&self, dag: DagId) -> &DagTally {
         &self.dags[dag.index()]
     }
@@ -140,7 +137,6 @@ impl RunTally {
     /// # Panics
     ///
     /// If there is no such subtask.
-    #[must_use]
     pub fn subtask(&self, vertex: Vertex) -> &SubtaskTally {
         &self.subtasks[vertex.index()]
     }
@@ -210,7 +206,6 @@ impl RunTally {
 
 impl DagTally {
     /// Returns the longest response time of a complete job, and the job's number.
-    #[must_use]
     pub const fn longest(&self) -> (u64, u64) {
         self.longest
     }

@@ -218,13 +218,11 @@ worded! {
 
 impl Violation {
     /// Returns the rule that is broken.
-    #[must_use]
     pub const fn rule(&self) -> Rule {
         self.columns().0
     }
 
     /// Returns when it shows, in nanoseconds from the run's epoch.
-    #[must_use]
     pub const fn time_ns(&self) -> u64 {
         match self.columns().1 {
             At(time_ns) => time_ns,

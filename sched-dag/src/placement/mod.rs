@@ -79,7 +79,6 @@ fn some(vertex: Vertex) -> Option<Vertex> {
 impl<Body, Parked> Placement<Body, Parked> {
     /// Makes the places of so many vertices, all without a body until one
     /// [is put there](Self::replace).
-    #[must_use]
     pub fn empty(vertices: usize, cores: usize) -> Self {
         Self {
             places: (0..vertices).map(|_| BodyState::Lost).collect(),

@@ -36,7 +36,6 @@ impl Policy {
     }
 
     /// Returns the policy of a word.
-    #[must_use]
     pub fn of_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|policy| policy.word() == word)
     }

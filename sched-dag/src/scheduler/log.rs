@@ -77,14 +77,12 @@ impl EventLog {
 
     /// Returns the latest instant.
     #[inline]
-    #[must_use]
     pub const fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
     /// Reports whether there are notices.
     #[inline]
-    #[must_use]
     pub const fn has_notices(&self) -> bool {
         !self.notices.is_empty()
     }

@@ -131,7 +131,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If the options say 0 cores.
-    #[must_use]
     pub fn new(task_set: Arc<TaskSet>, options: SchedulerOptions) -> Self {
         Self::of_cluster(task_set, options, ClusterId(0))
     }
@@ -143,7 +142,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such cluster, or it has no cores.
-    #[must_use]
     #[inline(never)]
     pub fn of_cluster(
         task_set: Arc<TaskSet>,
@@ -242,7 +240,6 @@ impl Scheduler {
     /// Returns when the driver has to begin the next instant, if nothing
     /// completes before: at the next release, or when a deadline has passed. An
     /// ended DAG has neither. `None`: only completions are to come, or nothing.
-    #[must_use]
     #[inline]
     pub fn next_event_ns(&self) -> Option<u64> {
         self.timers.peek().map(|(event_ns, _)| event_ns)
@@ -253,7 +250,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such core.
-    #[must_use]
     #[inline]
     pub fn running(&self, core: CoreId) -> Option<Instance> {
         let key = self.cores.running(core)?;
@@ -261,7 +257,6 @@ impl Scheduler {
     }
 
     /// Reports whether every DAG [is over](Self::is_over), and every skip is told of.
-    #[must_use]
     #[inline]
     pub fn is_finished(&self) -> bool {
         let dags = self.task_set.dags().iter().zip(&self.dags);
@@ -277,7 +272,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn is_over(&self, dag: DagId) -> bool {
         let state = &self.dags[dag.index()];
@@ -290,7 +284,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn is_closed(&self, dag: DagId) -> bool {
         self.dags[dag.index()].jobs.is_closed()
@@ -303,7 +296,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn is_ended(&self, dag: DagId) -> bool {
         self.phase(dag) == DagPhase::Ended
@@ -314,7 +306,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn statistics(&self, dag: DagId) -> &DagStatistics {
         &self.dags[dag.index()].statistics
@@ -326,28 +317,24 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn waiting(&self, dag: DagId) -> u64 {
         self.dags[dag.index()].jobs.waiting()
     }
 
     /// Returns the model that is scheduled.
-    #[must_use]
     #[inline]
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
     }
 
     /// Returns the options.
-    #[must_use]
     #[inline]
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
 
     /// Returns the latest instant begun, in nanoseconds.
-    #[must_use]
     #[inline]
     pub const fn now_ns(&self) -> u64 {
         self.log.now_ns
@@ -359,7 +346,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn vertex(&self, instance: Instance) -> Vertex {
         self.task_set.vertex(instance)
@@ -371,7 +357,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such vertex.
-    #[must_use]
     #[inline]
     pub fn instance_of(&self, vertex: Vertex) -> Instance {
         self.vertices.get(vertex.0).present_instance()

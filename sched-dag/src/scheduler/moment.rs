@@ -134,7 +134,6 @@ impl<'s> Moment<'s> {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn in_flight(&self, dag: DagId) -> u64 {
         self.scheduler.in_flight(dag)

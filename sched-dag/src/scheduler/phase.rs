@@ -169,7 +169,6 @@ pub struct DagSnapshot {
 
 impl DagSnapshot {
     /// Returns the word for its state that people and programs read.
-    #[must_use]
     pub const fn word(&self) -> &'static str {
         match self.phase {
             DagPhase::Closed | DagPhase::Ended => "ended",
@@ -181,7 +180,6 @@ impl DagSnapshot {
     }
 
     /// Reports whether it will release no further job, whatever comes.
-    #[must_use]
     pub fn is_final(&self) -> bool {
         self.is_over || self.phase >= DagPhase::Closed
     }
@@ -193,7 +191,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn phase(&self, dag: DagId) -> DagPhase {
         self.dags[dag.index()].jobs.phase
@@ -217,7 +214,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn snapshot(&self, dag: DagId) -> DagSnapshot {
         DagSnapshot {
             phase: self.phase(dag),
@@ -233,7 +229,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn is_paused(&self, dag: DagId) -> bool {
         self.phase(dag) == DagPhase::Paused
@@ -244,7 +239,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     #[inline]
     pub fn in_flight(&self, dag: DagId) -> u64 {
         let jobs = &self.dags[dag.index()].jobs;
@@ -442,7 +436,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn survives(&self, dag: DagId, job: u64) -> bool {
         !self.is_ended(dag) && self.dags[dag.index()].survived.would_take(job)
     }

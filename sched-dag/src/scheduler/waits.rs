@@ -182,7 +182,6 @@ impl Scheduler {
 
     /// Reports whether subtasks state waits, as those of most sets do not.
     #[inline]
-    #[must_use]
     pub const fn has_waits(&self) -> bool {
         self.waits.len() > 0
     }
@@ -292,7 +291,6 @@ impl Scheduler {
     }
 
     /// Returns when the job was released whose instance a vertex has.
-    #[must_use]
     pub(crate) fn release_ns(&self, vertex: Vertex) -> u64 {
         let vertex = self.vertices.get(vertex.0);
         let jobs = &self.dags[vertex.dag.index()].jobs;
@@ -304,7 +302,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If the subtask states no waits.
-    #[must_use]
     pub fn latest_wait(&self, vertex: Vertex) -> (WaitId, bool) {
         let latest = self.waits.latest[self.waits.place(vertex.0)];
         // Where a cut job does not wait (W6), the subtask may have the next job's instance by now.

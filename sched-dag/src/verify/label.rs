@@ -46,7 +46,6 @@ impl TaskSet {
     /// # Panics
     ///
     /// If there is no such DAG.
-    #[must_use]
     pub fn label(&self, id: DagId) -> DagLabel {
         let name = self.dag(id).name().into();
         DagLabel { id, name }
@@ -57,7 +56,6 @@ impl TaskSet {
     /// # Panics
     ///
     /// If there is no such subtask.
-    #[must_use]
     pub fn subtask_label(&self, dag: DagId, id: SubtaskId) -> SubtaskLabel {
         let name = self.dag(dag).subtask(id).name().into();
         SubtaskLabel { id, name }

@@ -267,7 +267,6 @@ pub enum CountLimit {
 
 impl CommitOptions {
     /// Returns options with the paper's construction policy.
-    #[must_use]
     pub const fn new(policy: Policy, cores: u32) -> Self {
         Self {
             policy,
@@ -302,13 +301,11 @@ impl CommitOptions {
 
 impl ConstructionPolicy {
     /// Returns the paper's policy, which is the default.
-    #[must_use]
     pub const fn paper() -> Self {
         Self::all(CountLimit::One)
     }
 
     /// Returns the policy that accepts every acyclic graph.
-    #[must_use]
     pub const fn any_graph() -> Self {
         Self::all(CountLimit::Several)
     }

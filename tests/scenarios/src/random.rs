@@ -53,7 +53,6 @@ struct Round {
 impl Scenario {
     /// Draws a round for so many cores, in which each DAG releases jobs for `length`: 3 to 8 DAGs
     /// of 3 to 12 subtasks, and up to one more that fails.
-    #[must_use]
     pub fn random(seed: u64, round: u64, cores: u32, length: Duration) -> Self {
         let random = &mut Random::new(nth(seed, round));
         let policy = random.one_of(&Policy::ALL);

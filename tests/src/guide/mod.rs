@@ -18,7 +18,6 @@ pub const PAGES: [&str; 2] = ["docs/guide.md", "docs/from-ros-2.md"];
 /// # Panics
 ///
 /// Panics if there is no such block.
-#[must_use]
 pub fn documented_output(name: &str) -> String {
     let info = format!("text output-{name}");
     let mut blocks = blocks(&page(PAGES[0])).into_iter();
@@ -27,7 +26,6 @@ pub fn documented_output(name: &str) -> String {
 }
 
 /// Replaces each number by `N`: what stays the same when the code becomes faster.
-#[must_use]
 pub fn without_numbers(line: &str) -> String {
     let mut text = String::new();
     for character in line.chars() {

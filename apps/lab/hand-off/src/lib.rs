@@ -223,7 +223,6 @@ pub struct Pen {
 
 impl Pen {
     /// Makes a pen by itself with room for a given number of times.
-    #[must_use]
     pub fn new(times: usize) -> Self {
         Self {
             times: (0..times).map(|_| AtomicU64::new(0)).collect(),
@@ -271,13 +270,11 @@ impl Stamps {
     }
 
     /// Returns when a body's first instruction was, if it stamped.
-    #[must_use]
     pub fn first(&self, subtask: usize, job: u64) -> Option<u64> {
         self.time(subtask, job, 0)
     }
 
     /// Returns when a body's last instruction was, if it stamped.
-    #[must_use]
     pub fn last(&self, subtask: usize, job: u64) -> Option<u64> {
         self.time(subtask, job, 1)
     }

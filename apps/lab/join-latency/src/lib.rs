@@ -63,7 +63,6 @@ pub struct Samples {
 
 impl Samples {
     /// Returns the jobs whose values a join has joined.
-    #[must_use]
     pub fn indices_of(&self, join: usize) -> &[u64] {
         let parallel = self.parallel.len();
         &self.indices[join * parallel..(join + 1) * parallel]
@@ -71,7 +70,6 @@ impl Samples {
 
     /// Returns how many joins there are, how many of them are of one job and how many across jobs,
     /// and how many never happened: one for each index that all topics have published.
-    #[must_use]
     pub fn counts(&self) -> [usize; 4] {
         let joins = self.joins.len();
         let is_of_one = |join: &usize| {
@@ -85,14 +83,12 @@ impl Samples {
 
     /// Returns the join latency as the paper defines it, for each join: from the last publication
     /// of index i to the i-th join.
-    #[must_use]
     pub fn join_latencies_ns(&self) -> Vec<u64> {
         self.delays_ns(0..self.joins.len())
     }
 
     /// Returns for each index that a join covers how long that took: from the last publication of
     /// the index to the first join that covers it.
-    #[must_use]
     pub fn cover_delays_ns(&self) -> Vec<u64> {
         self.delays_ns(self.covering_joins())
     }
@@ -108,7 +104,6 @@ impl Samples {
 
     /// Returns for each index that a join covers the position of the first such join. If no join
     /// covers an index, none covers a later one.
-    #[must_use]
     pub fn covering_joins(&self) -> Vec<usize> {
         let mut first = 0;
         let indices = (0..).take(self.last_publications_ns().count());

@@ -84,7 +84,6 @@ impl Parameters {
     /// # Panics
     ///
     /// If `topics` is 0.
-    #[must_use]
     pub fn new(topics: usize, queue_size: NonZeroUsize) -> Self {
         assert!(
             topics > 0,
@@ -131,7 +130,6 @@ impl AgePenalty {
     /// assert!(AgePenalty::from_factor(3, 1).is_some(), "1 + 0.5");
     /// assert!(AgePenalty::from_factor(0, 1).is_none());
     /// ```
-    #[must_use]
     pub const fn from_factor(factor: u64, shift: u32) -> Option<Self> {
         if factor == 0 || factor > Self::MOST_FACTOR || shift > Self::MOST_SHIFT {
             return None;
@@ -221,7 +219,6 @@ impl<M> ApproximateTime<M> {
     /// # Panics
     ///
     /// If memory does not suffice for the queue size plus one messages a topic.
-    #[must_use]
     pub fn new(parameters: Parameters) -> Self {
         let topics = parameters.lower_bounds_ns.len();
         let entries = parameters.queue_size.get().saturating_add(1);

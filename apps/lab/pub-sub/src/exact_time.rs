@@ -74,7 +74,6 @@ impl<M> ExactTime<M> {
     ///
     /// If `topics` is 0, or memory does not suffice for `topics * (queue_size + 1)`
     /// messages.
-    #[must_use]
     pub fn new(topics: usize, queue_size: usize) -> Self {
         assert!(
             topics > 0,

@@ -77,7 +77,6 @@ pub enum Next<M, C> {
 
 impl<M, C> Graph<M, C> {
     /// Makes a graph of so many topics, without groups.
-    #[must_use]
     pub fn new(topics: usize) -> Self {
         Self {
             topics: (0..topics).map(|_| Vec::new()).collect(),
@@ -186,7 +185,6 @@ impl<M, C> Graph<M, C> {
     }
 
     /// Returns how many messages the subscriptions have dropped, all together.
-    #[must_use]
     pub fn dropped(&self) -> u64 {
         self.subscriptions.iter().map(|one| one.dropped).sum()
     }

@@ -71,7 +71,6 @@ const MOST_OF_NAME: usize = 255;
 
 /// Reports whether a name can stand in a file: one word of characters that are seen,
 /// not too long, that begins neither a comment nor a machine line and is no arrow.
-#[must_use]
 pub fn is_name(word: &str) -> bool {
     let is_plain = |character: char| !character.is_whitespace() && is_seen(character);
     (1..=MOST_OF_NAME).contains(&word.len())
@@ -81,7 +80,6 @@ pub fn is_name(word: &str) -> bool {
 }
 
 /// Says why a word is refused as a name.
-#[must_use]
 pub fn no_name(word: &str) -> String {
     format!(
         "{} is no name; give a word of at most {MOST_OF_NAME} bytes that begins with neither `#` \

@@ -206,7 +206,6 @@ const MOST_JOBS: u64 = 10_000_000;
 /// ```
 /// assert_eq!(fass::edge::job_of("gait/17"), Some(("gait", 17)));
 /// ```
-#[must_use]
 pub fn job_of(words: &str) -> Option<(&str, u64)> {
     let (dag, job) = words.rsplit_once('/')?;
     Some((dag, job.parse().ok()?))

@@ -235,7 +235,6 @@ impl Replay {
     }
 
     /// Reports whether the inputs of a DAG are recorded.
-    #[must_use]
     pub fn is_of(&self, dag: DagId) -> bool {
         u16::try_from(dag.0).is_ok_and(|dag| self.passed.is_of(dag))
     }
@@ -261,7 +260,6 @@ impl Replay {
     }
 
     /// Returns the recorded value of a channel of the plan.
-    #[must_use]
     pub fn value(&self, channel: u16, job: u64) -> Option<&[u8]> {
         self.bytes.get(self.place(channel, job)?)
     }
@@ -280,7 +278,6 @@ impl Replay {
     }
 
     /// Reports whether an instance is one whose function is not called.
-    #[must_use]
     pub fn passes_over(&self, instance: Instance) -> bool {
         self.passed.has(instance)
     }

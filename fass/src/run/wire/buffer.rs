@@ -31,7 +31,6 @@ impl Buffer {
     pub const HEADROOM: usize = 64;
 
     /// Makes a buffer of so many bytes at least, with nothing in it. It allocates.
-    #[must_use]
     pub fn new(bytes: usize) -> Self {
         Self {
             bytes: alloc::vec![0; bytes.max(Self::LEAST_BYTES)].into(),
@@ -46,7 +45,6 @@ impl Buffer {
     }
 
     /// Returns where the packet's bytes are.
-    #[must_use]
     pub fn range(&self) -> Range<usize> {
         self.range.clone()
     }
@@ -62,7 +60,6 @@ impl Buffer {
     }
 
     /// Returns the packet's bytes.
-    #[must_use]
     pub fn content(&self) -> &[u8] {
         &self.bytes[self.range()]
     }

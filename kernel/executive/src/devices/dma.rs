@@ -48,7 +48,6 @@ macro_rules! access {
 impl DmaMemory {
     /// Takes zeroed memory, rounded up to whole pages, before the commit. `None`: there is no
     /// more.
-    #[must_use]
     pub fn new(length: usize) -> Option<Self> {
         let length = length.max(1).checked_next_multiple_of(PAGE)?;
         let layout = Layout::from_size_align(length, PAGE).ok()?;
@@ -61,7 +60,6 @@ impl DmaMemory {
     }
 
     /// Returns the address by which the device reaches it.
-    #[must_use]
     pub const fn address(&self) -> u64 {
         self.start
     }

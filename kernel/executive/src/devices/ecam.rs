@@ -69,7 +69,6 @@ pub struct Ecam(Registers);
 
 impl Ecam {
     /// Maps the space that begins at an address, that of bus 0; none if there is something else.
-    #[must_use]
     pub fn new(start: u64) -> Option<Self> {
         let end = start.checked_add(BUSES as u64 * BUS)?;
         Registers::map(start..end).map(Self)

@@ -160,7 +160,6 @@ impl<'c> Function<'c> {
     }
 
     /// Reads four bytes of its configuration space.
-    #[must_use]
     pub fn read(&self, offset: u16) -> u32 {
         self.configuration.read(self.place, offset & 0xffc)
     }

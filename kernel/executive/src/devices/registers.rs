@@ -112,7 +112,6 @@ impl Registers {
     }
 
     /// Returns a part of the range, if it is within.
-    #[must_use]
     pub fn part(&self, offset: u64, length: u64) -> Option<Self> {
         (offset.checked_add(length)? <= self.length).then_some(Self {
             start: self.start + offset,

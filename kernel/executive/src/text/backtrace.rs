@@ -27,7 +27,6 @@ pub struct CodeLocation {
 impl CodeLocation {
     /// Returns the place of this very call.
     #[inline(never)]
-    #[must_use]
     pub fn here() -> CodeLocation {
         let local = 0u8;
         CodeLocation {

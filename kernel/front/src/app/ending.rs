@@ -179,7 +179,6 @@ struct ExceededBound {
 
 impl RunVerdict {
     /// Begins without a run. `shares_clock`: several cores share one clock.
-    #[must_use]
     pub const fn new(judges_bounds: bool, shares_clock: bool) -> Self {
         Self {
             judges_faults: Cell::new(true),

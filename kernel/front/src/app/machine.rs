@@ -142,7 +142,6 @@ impl<S: System> Machine<S> {
     /// Returns the words of the command line that the kernel left to the app.
     ///
     /// See [`CommandLine`].
-    #[must_use]
     pub const fn options(&self) -> &CommandLine<'static> {
         &self.options
     }
@@ -151,7 +150,6 @@ impl<S: System> Machine<S> {
     /// that the word `module=` names, if there is one. The loader's is not copied: memory and the
     /// boot's time are the same for files of any size. If there is one and the app never asks for
     /// it, a line says so at the end.
-    #[must_use]
     pub fn module(&self) -> Option<&'static [u8]> {
         self.has_asked.set(true);
         self.module.get()
@@ -159,13 +157,11 @@ impl<S: System> Machine<S> {
 
     /// Reports whether a person can talk to the kernel during a run (`console=on`), and
     /// so end one that would not end by itself.
-    #[must_use]
     pub fn has_console(&self) -> bool {
         self.system.has_console()
     }
 
     /// Returns the number of cores that run subtasks.
-    #[must_use]
     pub fn cores(&self) -> u32 {
         self.system.terms().scheduler.cores
     }
@@ -488,7 +484,6 @@ impl<S: System> Machine<S> {
     ///     machine.resources() != before
     /// }
     /// ```
-    #[must_use]
     pub fn resources(&self) -> MemoryInUse {
         let (contexts, contexts_free) = S::contexts();
         MemoryInUse {
@@ -560,7 +555,6 @@ impl<S: System> Machine<S> {
     }
 
     /// Returns how the cores are divided, unless the commit is to find that.
-    #[must_use]
     pub fn clusters(&self) -> CoreDivision {
         self.system.terms().clusters
     }

@@ -179,7 +179,6 @@ struct DagListing {
 
 impl<R: LiveRun> ShellSession<R> {
     /// Begins a conversation; `echoes`: what is typed is sent back.
-    #[must_use]
     pub const fn new(echoes: bool) -> Self {
         Self {
             input: LineEditor::new(),

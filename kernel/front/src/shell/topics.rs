@@ -44,7 +44,6 @@ pub struct TopicCommands<R> {
 
 impl<R: LiveRun> TopicCommands<R> {
     /// Makes them; no topic is echoed.
-    #[must_use]
     #[allow(clippy::new_without_default, reason = "it is for a static")]
     pub const fn new() -> Self {
         Self {

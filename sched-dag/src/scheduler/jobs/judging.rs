@@ -187,7 +187,6 @@ impl Scheduler {
     /// # Panics
     ///
     /// If there is no such DAG, or the subtask is no sink of it.
-    #[must_use]
     #[inline]
     pub fn sink_misses(&self, dag: DagId, sink: SubtaskId) -> u64 {
         let misses = self.dags[dag.index()].jobs.misses_of(sink);

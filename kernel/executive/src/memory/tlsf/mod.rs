@@ -84,7 +84,6 @@ unsafe impl Send for Tlsf {}
 impl Tlsf {
     /// Creates an allocator without memory: every allocation fails until
     /// [`add_region`](Self::add_region).
-    #[must_use]
     pub(crate) const fn new() -> Self {
         Self {
             free: FreeLists::new(),
@@ -231,7 +230,6 @@ impl Tlsf {
 
     /// Tells how much memory is in use, in bytes of whole blocks, 16-byte headers and rounding
     /// included: so `capacity_bytes - in_use_bytes` is what the free blocks hold.
-    #[must_use]
     pub(crate) const fn usage(&self) -> HeapUsage {
         self.usage
     }
