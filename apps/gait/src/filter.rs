@@ -133,8 +133,7 @@ fn unit<const N: usize>(parts: [f64; N]) -> [f64; N] {
 
 #[cfg(test)]
 mod tests {
-    use super::{START, after, conjugate, product};
-    use crate::Sensor;
+    use super::*;
 
     #[test]
     fn a_turn_and_its_opposite_are_none() {

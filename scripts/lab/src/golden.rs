@@ -88,8 +88,7 @@ impl Golden<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::Golden;
-    use std::fs;
+    use super::*;
 
     #[test]
     fn what_differs_fails_and_is_rewritten_in_its_place_when_blessed() {

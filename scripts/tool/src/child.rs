@@ -341,11 +341,8 @@ impl Tail<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Asked, Asking, Child, Step, Tail, Waited, bound_to_us};
-    use std::fs::File;
+    use super::*;
     use std::io::Write;
-    use std::path::Path;
-    use std::time::Duration;
 
     fn wait(words: &[&str], limit: Duration, watch: impl FnMut() -> bool) -> Waited {
         let mut command = bound_to_us(Path::new(words[0]));

@@ -213,13 +213,9 @@ fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use recording::{Commit, CommittedTopic};
-    use sched_dag::Policy;
-
-    use super::{quoted, text, without_paths};
+    use super::*;
     use crate::made::commit;
-    use crate::record::Committed;
-    use crate::record::Record;
+    use recording::{Commit, CommittedTopic};
 
     const EYE: &str = "static 2
 eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2";

@@ -341,10 +341,8 @@ impl Drop for Temporary {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_BYTES, Named, check, check_folder, check_once, read, read_text};
-    use std::fs::{self, File};
+    use super::*;
     use std::os::unix::fs::symlink;
-    use std::path::{Path, PathBuf};
 
     fn folder(name: &str) -> PathBuf {
         let folder = std::env::temp_dir().join(format!("{name}-{}", std::process::id()));

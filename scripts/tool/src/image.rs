@@ -217,10 +217,8 @@ fn executable(message: &Value, package: &str) -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use super::{check_app, executable, is_locked};
+    use super::*;
     use crate::json;
-    use std::fs::File;
-    use std::path::PathBuf;
 
     #[test]
     fn an_unknown_app_is_named_with_those_there_are() {

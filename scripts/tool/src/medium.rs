@@ -221,12 +221,7 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use super::TABLE;
-    use super::check;
-    use super::check_words;
-    use super::commands;
-    use super::name;
-    use crate::system;
+    use super::*;
     use crate::tests::right;
 
     /// `tests/tests/boots/by_grub.rs` shows that a module arrives.

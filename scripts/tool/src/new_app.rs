@@ -402,13 +402,9 @@ git init                # docs/guide.md goes on from here
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        CrateSource, FILES, MANIFEST, PACKAGES, PLACEHOLDER, check, create, create_repository, way,
-    };
-    use crate::options::Refusal;
+    use super::*;
     use crate::system::workspace;
     use crate::tests::rows;
-    use std::fs;
 
     #[test]
     fn the_template_names_itself_and_nothing_of_its_name_is_left_in_a_copy() {

@@ -246,11 +246,7 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::Outcome;
-    use crate::protocol::{Status, Verdict};
-    use crate::qemu::Ending;
-    use std::path::Path;
-    use std::time::Duration;
+    use super::*;
 
     const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"\"}\n";
     const USAGE: &str = "{\"kind\":\"verdict\",\"status\":\"usage\",\"reason\":\"`x=1`: no\"}\n";

@@ -361,7 +361,6 @@ mod tests {
     use super::*;
     use crate::system::workspace;
     use std::fs;
-    use std::path::Path;
 
     fn line(kind: &str, place: &str) -> String {
         format!("{{\"kind\":\"{kind}\",\"cpu\":0,\"place\":\"{place}\",\"message\":\"m\"}}")

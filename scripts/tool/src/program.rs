@@ -120,12 +120,8 @@ fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> 
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use std::os::unix::process::ExitStatusExt as _;
-    use std::process::ExitStatus;
-
-    use super::ending_of;
-    use crate::protocol::{Status, Transcript};
-    use crate::qemu::Ending;
 
     #[test]
     fn without_a_verdict_no_exit_code_counts() {

@@ -597,9 +597,8 @@ fn ending_of(status: ExitStatus) -> Ending {
 
 #[cfg(test)]
 mod tests {
-    use super::{Mode, Qemu};
+    use super::*;
     use std::ffi::OsStr;
-    use std::path::Path;
 
     /// Asserts which words are among QEMU's arguments, and which are not.
     fn has(qemu: &Qemu, parts: &[&str], others: &[&str]) {

@@ -187,9 +187,7 @@ fn clear(folder: &Path) {
 
 #[cfg(test)]
 mod tests {
-    use super::{KEPT, can_move, clear};
-    use std::ffi::OsStr;
-    use std::fs;
+    use super::*;
     use std::time::SystemTime;
 
     #[test]

@@ -670,8 +670,6 @@ impl Drain for SignalReplayer {
 
 #[cfg(test)]
 mod tests {
-    use alloc::vec::Vec;
-
     use super::*;
 
     #[test]

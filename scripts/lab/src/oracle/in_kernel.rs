@@ -403,11 +403,10 @@ fn compare_run(
 
 #[cfg(test)]
 mod tests {
-    use super::{Settings, judge};
+    use super::*;
     use crate::oracle::schedules::{Deviation, parse};
     use crate::tests::made::{self, line_of, record_of};
     use crate::tests::{altered, rows};
-    use tool::outcome::Outcome;
     use tool::protocol::Status;
     use tool::qemu::Ending;
 

@@ -263,8 +263,7 @@ fn free_mib(said: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{foreign, free_mib, judge, names_policy};
-    use std::path::Path;
+    use super::*;
 
     #[test]
     fn a_package_from_a_registry_is_named() {

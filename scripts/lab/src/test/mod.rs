@@ -346,8 +346,7 @@ impl fmt::Display for Tally {
 
 #[cfg(test)]
 mod tests {
-    use super::{CheckFailure, Tally, below, complaint, packages, sources};
-    use std::fs;
+    use super::*;
 
     #[test]
     fn an_app_of_ones_own_is_not_judged_and_all_packages_of_the_project_are() {

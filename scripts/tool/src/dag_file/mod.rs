@@ -419,16 +419,11 @@ fn lines(dag: &FileDag) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        Format, MOST_S, limit_s, memory_mib, name_of, parse, prepare, rd_gen, stg, translate,
-    };
-    use crate::run_options::{RUN, name};
+    use super::*;
+    use crate::run_options::RUN;
     use crate::system::workspace;
     use crate::tests::{right, rows};
-    use fass_dag_file::{DagFile, Length, is_name};
     use random::Random;
-    use std::path::Path;
-    use text::Malformed;
 
     #[test]
     fn every_file_name_becomes_a_name_and_its_ending_tells_the_format() {

@@ -123,9 +123,7 @@ impl Menu {
 
 #[cfg(test)]
 mod tests {
-    use super::{Choice, Menu, Refusal};
-    use std::ffi::OsString;
-    use std::process::ExitCode;
+    use super::*;
 
     static MENU: Menu = Menu {
         invocation: "./scripts/cook",

@@ -463,10 +463,9 @@ impl Values<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{of_message, write_message};
+    use super::*;
     use crate::json::{Value, parse};
     use random::Random;
-    use recording::{Recordable, Schema, to_bytes};
 
     /// Returns all types up to a depth of nesting.
     fn types(depth: u32) -> Vec<String> {

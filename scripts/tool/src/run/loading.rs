@@ -121,8 +121,7 @@ pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
 
 #[cfg(test)]
 mod tests {
-    use super::machine;
-    use crate::qemu::Machine;
+    use super::*;
     use crate::run::RUN;
     use crate::tests::right;
 

@@ -258,8 +258,7 @@ fn hand_on(mut input: ChildStdin, log: PathBuf, farewell: &'static str) {
 
 #[cfg(test)]
 mod tests {
-    use super::{WIDTH, describe};
-    use crate::protocol::read_line;
+    use super::*;
 
     fn described(rest: &str, wall_ns: u64, run_ns: u64) -> Option<String> {
         let text = format!("{{\"kind\":\"status\",\"time_ns\":5000000000,\"done\":12,{rest}}}");

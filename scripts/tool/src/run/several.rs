@@ -400,11 +400,9 @@ fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> 
 
 #[cfg(test)]
 mod tests {
-    use super::lines;
+    use super::*;
     use crate::json::{self, Value};
-    use crate::outcome::Outcome;
     use crate::qemu::Ending;
-    use std::path::Path;
 
     #[test]
     fn any_name_of_a_file_is_one_member_of_a_machine_line() {

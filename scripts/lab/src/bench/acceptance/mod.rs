@@ -195,12 +195,9 @@ pub(super) fn of_files(files: &[SetFile]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use sched_dag::analysis::{AnalysisSettings, Overheads, answer, assign};
-    use sched_dag::{
-        AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption,
-        SubtaskSpec, verify,
-    };
+    use sched_dag::{ AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskSpec, verify, };
+    use super::*;
 
     const LENT: usize = 3;
 

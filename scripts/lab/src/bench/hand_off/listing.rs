@@ -155,8 +155,7 @@ fn listing(hop: &[u64], frames: &Frames, instructions: &BTreeMap<u64, String>) -
 
 #[cfg(test)]
 mod tests {
-    use super::{Frames, addresses, line_and_function, table, usual_hop};
-    use tool::places::Frame;
+    use super::*;
     use tool::system::workspace;
 
     #[test]
