@@ -1,15 +1,12 @@
 //! Fakes of a card's parts, and what is asked of each card by them.
 
-use alloc::boxed::Box;
+use super::*;
 use alloc::collections::{BTreeSet, VecDeque};
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::cell::RefCell;
-
 use executive::devices::pci::{Configuration, PciError, find};
 use random::Random;
-
-use super::*;
 
 /// The configuration space of one function.
 pub(crate) struct Words(RefCell<[u32; 64]>);

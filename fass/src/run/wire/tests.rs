@@ -1,12 +1,9 @@
 //! Tests of both ways of a wire, one of them on real threads.
 
+use super::buffer::Buffer;
+use super::*;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
-
-use super::buffer::Buffer;
-use super::{Effect, Framing, PacketTaker, SendCompletion, SharedTaker, WireInput, WireOutput};
-use alloc::sync::Arc;
-use core::sync::atomic::{AtomicUsize, Ordering};
 
 /// Takes a packet that is there, as text, and its time.
 fn take(taker: &mut PacketTaker, mark: usize) -> Option<(String, u64)> {

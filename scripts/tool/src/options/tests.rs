@@ -1,11 +1,8 @@
 //! Command lines that a table accepts or refuses, and the words of refusals.
 
-use std::ffi::{OsStr, OsString};
-use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::path::Path;
-
-use super::{Command, Parsed, Refusal, Takes};
+use super::*;
 use crate::tests::{right, rows};
+use std::os::unix::ffi::OsStringExt;
 
 static COMMAND: Command = Command {
     invocation: "./scripts/example",

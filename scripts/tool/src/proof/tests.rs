@@ -1,19 +1,13 @@
 //! Views of the record of a guest that has proven a DAG and run it three times.
 
-use std::fs;
-use std::path::Path;
-
-use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
-use sched_dag::DagId;
-use sched_dag::law::MeasuredCosts;
-
-use super::observed;
 use super::observed::OfDag;
-use super::{ProofRow, complaint, rows, summary, table};
+use super::*;
 use crate::made::{commit, record_of};
-use crate::record::Committed;
 use crate::record::Record;
 use crate::tests::{altered, rows as rows_of};
+use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
+use sched_dag::law::MeasuredCosts;
+use std::fs;
 
 /// A chain of 2 and 3 ms, each charged 1 us.
 const CHAIN: &str = "static 2

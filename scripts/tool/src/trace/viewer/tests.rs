@@ -1,15 +1,10 @@
 //! Drawings of handmade traces, and of a real one.
 
-use std::collections::BTreeMap;
-
-use sched_dag::chains::SampledEdge;
-use sched_dag::{DagId, SubtaskId};
-
 use super::super::picture;
 use super::super::tests::run_of;
-use super::convert;
+use super::*;
 use crate::json::{Value, parse};
-use crate::record::Run;
+use sched_dag::chains::SampledEdge;
 
 /// A diamond of DAG `a`, `s` before `l` and `r` before `j`, under `b`, on two cores.
 const HEADER: &str = "
