@@ -49,7 +49,6 @@ pub const MAX_MODULES: usize = 4;
 pub const MOST_COMMAND_LINE_BYTES: usize = 2048;
 
 /// Information about the machine when the kernel takes over.
-#[derive(Debug)]
 pub struct BootInfo {
     /// The words that the loader passed, without interpretation.
     pub command_line: List<u8, MOST_COMMAND_LINE_BYTES>,

@@ -30,7 +30,6 @@ const FILLER: MemoryRegion = MemoryRegion {
 };
 
 /// The ranges that a loader has told.
-#[derive(Debug)]
 pub struct MemoryMap {
     regions: List<MemoryRegion, MAX_REGIONS>,
     /// Whether some did not fit.

@@ -26,7 +26,6 @@ const SETTINGS: Duration = Duration::from_millis(25);
 const VISUALIZER: Duration = Duration::from_millis(60);
 
 /// The system, built and not committed.
-#[derive(Debug)]
 pub struct System {
     /// The DAGs: `lidar`, `map`, `settings`, `visualizer`, `route`, `behaviour`.
     pub dags: Vec<Dag>,

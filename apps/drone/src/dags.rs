@@ -53,7 +53,6 @@ const STEP: f64 = 0.075;
 const CHARGE: f64 = 130.0;
 
 /// The drone's DAGs, and what is known of the flight when they have ended.
-#[derive(Debug)]
 pub struct System {
     /// In the order of the table above.
     pub dags: [Dag; 7],

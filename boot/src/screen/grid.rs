@@ -12,7 +12,6 @@ pub(super) const MOST_ROWS: usize = 64;
 const CELLS: usize = MOST_COLUMNS * MOST_ROWS;
 
 /// Cells with letters; 0 is a blank one. (So an empty grid takes no place in the image.)
-#[derive(Debug)]
 pub struct Grid {
     wanted: [AtomicU8; CELLS],
     drawn: [AtomicU8; CELLS],

@@ -179,7 +179,6 @@ pub fn replayed(outcome: &ReplayOutcome) {
 const LINE_BYTES: usize = 768;
 
 /// Prints a record, by the line.
-#[derive(Debug)]
 pub struct RecordLines {
     bytes: [u8; LINE_BYTES],
     length: usize,

@@ -30,7 +30,6 @@ use sched_dag::engine::{Run, RunCounts};
 pub type Machine = front::app::machine::Machine<BareMachine>;
 
 /// The kernel, as an app's machine knows it.
-#[derive(Debug)]
 pub struct BareMachine {
     /// Options of what people see, and say, during a run.
     wishes: BackgroundOptions,

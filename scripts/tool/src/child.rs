@@ -46,7 +46,6 @@ pub enum Waited {
 }
 
 /// The end of a child that was followed.
-#[derive(Debug)]
 pub struct Followed {
     /// Why the wait ended.
     pub waited: Waited,
@@ -231,7 +230,6 @@ enum Step {
 }
 
 /// The state of a child as seen so far.
-#[derive(Debug)]
 struct Asking {
     limit: Duration,
     /// The reason, and the number of signals at that time.
@@ -288,7 +286,6 @@ impl Asking {
 }
 
 /// A file that is being followed.
-#[derive(Debug)]
 struct Tail<'p> {
     path: &'p Path,
     /// The bytes that were read; `shown` of them have been shown.

@@ -12,7 +12,6 @@ use crate::qemu::{Loader, OVMF_FILE, PROGRAM};
 use crate::system::{self, find_program};
 
 /// Something of the host's that a command needs.
-#[derive(Debug)]
 pub struct Need {
     /// Its name, and a description for messages.
     name: &'static str,

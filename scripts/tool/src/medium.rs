@@ -111,7 +111,6 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
 }
 
 /// The content of a stick; the file is removed when this value is dropped.
-#[derive(Debug)]
 pub struct Medium(Temporary);
 
 impl Medium {

@@ -88,7 +88,6 @@ pub fn conclude(program: &str, code: ExitCode) -> ExitCode {
 }
 
 /// A table that grows row by row.
-#[derive(Debug)]
 pub struct Table {
     /// Whether the cells of a column begin at the left, how wide it is, and the decimals of its
     /// numbers.

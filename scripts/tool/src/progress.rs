@@ -13,7 +13,6 @@ pub const SILENCE: Duration = Duration::from_secs(5);
 
 /// Progress on standard error: one line that renews itself if that is a terminal, and
 /// otherwise a line whenever nothing was said for [`SILENCE`].
-#[derive(Debug)]
 pub struct Progress {
     /// The name of the counted units, such as `files`.
     unit: &'static str,
@@ -79,7 +78,6 @@ const MOST: Duration = Duration::from_secs(60);
 
 /// Repeats on standard error that work goes on, first after [`SILENCE`] and then with doubling
 /// pauses, until it is dropped.
-#[derive(Debug)]
 pub struct Lasting {
     _over: Sender<()>,
 }

@@ -215,7 +215,6 @@ pub struct Stamps {
 }
 
 /// A pen, by which one body writes its times.
-#[derive(Debug)]
 pub struct Pen {
     times: Arc<[AtomicU64]>,
     next: usize,

@@ -156,7 +156,6 @@ impl Default for AgePenalty {
 }
 
 /// The policy that makes sets of stamps that are close to each other.
-#[derive(Debug)]
 pub struct ApproximateTime<M> {
     parameters: Parameters,
     rings: Vec<Ring<M>>,
@@ -396,7 +395,6 @@ impl<M> Synchronizer<M> for ApproximateTime<M> {
 /// The messages of one topic, oldest arrival first, and how far a search got. A *cursor* parts
 /// them: those before it are *passed*, those from it on are *waiting*. The first waiting one is the
 /// *head*. Entries leave at the front.
-#[derive(Debug)]
 struct Ring<M> {
     entries: VecDeque<Stamped<M>>,
     cursor: usize,

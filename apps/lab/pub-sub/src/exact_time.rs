@@ -43,7 +43,6 @@ use crate::{Outlet, Stamped, Synchronizer};
 /// exact.arrive(0, at(7, "left"), &mut words);
 /// assert_eq!(words.0, ["left", "right"]);
 /// ```
-#[derive(Debug)]
 pub struct ExactTime<M> {
     topics: usize,
     /// 0 for no limit.
@@ -59,7 +58,6 @@ pub struct ExactTime<M> {
 /// A slot for each topic.
 type Slots<M> = Vec<Option<M>>;
 
-#[derive(Debug)]
 struct Entry<M> {
     stamp_ns: u64,
     /// At least one of them is full.

@@ -35,7 +35,6 @@ use alloc::vec::Vec;
 
 /// Topics, groups, timers and subscriptions that belong together. `M` is the type of
 /// all messages, `C` of all groups' callbacks. Topics and groups are numbered from 0.
-#[derive(Debug)]
 pub struct Graph<M, C> {
     /// For each topic its subscriptions.
     topics: Vec<Vec<usize>>,
@@ -46,14 +45,12 @@ pub struct Graph<M, C> {
     is_shut_down: bool,
 }
 
-#[derive(Debug)]
 struct Timer {
     group: usize,
     next_ns: u64,
     period_ns: u64,
 }
 
-#[derive(Debug)]
 struct Subscription<M> {
     topic: usize,
     group: usize,
@@ -63,7 +60,6 @@ struct Subscription<M> {
 }
 
 /// The next work of a worker.
-#[derive(Debug)]
 pub enum Next<M, C> {
     /// Call the callbacks of this group and give them back: for a message, which comes with its
     /// topic, or for the timer that is due.

@@ -10,7 +10,6 @@ use core::alloc::Layout;
 const PAGE: usize = 4096;
 
 /// Memory that a device reads and writes, for good.
-#[derive(Debug)]
 pub struct DmaMemory {
     start: u64,
     length: usize,

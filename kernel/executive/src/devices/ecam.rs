@@ -64,7 +64,6 @@ pub fn configuration() -> Result<&'static Ecam, EcamError> {
 }
 
 /// The configuration space of the first buses.
-#[derive(Debug)]
 pub struct Ecam(Registers);
 
 impl Ecam {

@@ -12,7 +12,6 @@ use super::context::Parked;
 use super::{paint, section};
 
 /// A context that a handler has left for good.
-#[derive(Debug)]
 #[must_use = "its stack is lost unless it is recovered"]
 pub struct AbandonedContext(Parked);
 

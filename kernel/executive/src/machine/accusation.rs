@@ -12,7 +12,6 @@
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 /// The accusations of one core.
-#[derive(Debug)]
 pub(super) struct AccusationBox {
     is_open: AtomicBool,
     /// When the core had taken its last interrupt, as of its last answer.

@@ -101,7 +101,6 @@ const CONTROL: [(usize, [u8; 8]); 2] = [
 ];
 
 /// Vector state, then registers.
-#[derive(Debug)]
 #[repr(C, align(64))]
 struct SaveArea {
     vector_state: [u8; VECTOR_BYTES],
@@ -118,7 +117,6 @@ const _: () = {
 };
 
 /// A computation with a stack of its own.
-#[derive(Debug)]
 pub struct Context {
     save_area: UnsafeCell<SaveArea>,
     stack_top: u64,
@@ -138,7 +136,6 @@ pub struct Context {
 }
 
 /// A context's note of its section; see [`section`](super::section).
-#[derive(Debug)]
 pub(super) struct SectionNote {
     /// The lock that it is in a section of, or waits for; null if there is none.
     pub(super) lock: AtomicPtr<LockWords>,
@@ -254,7 +251,6 @@ impl Context {
 }
 
 /// A context that does not run. Its owner may have it run.
-#[derive(Debug)]
 pub struct Parked(&'static Context);
 
 impl Parked {

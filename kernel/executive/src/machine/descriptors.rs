@@ -29,7 +29,6 @@ pub(crate) enum InterruptStack {
 }
 
 /// The 64-bit task state segment, of which only the interrupt stacks matter.
-#[derive(Debug)]
 #[repr(C, packed(4))]
 pub(crate) struct TaskState {
     reserved_0: u32,

@@ -13,7 +13,6 @@ const PAGE_FAULT: u64 = 14;
 const MACHINE_CHECK: u64 = 18;
 
 /// An exception, in words and numbers.
-#[derive(Debug)]
 pub struct CpuException<'a> {
     /// Its name, such as `page fault`.
     pub name: &'static str,

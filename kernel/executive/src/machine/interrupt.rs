@@ -32,7 +32,6 @@ unsafe extern "C" {
 }
 
 /// Handlers of the layer above, which the machine layer calls.
-#[derive(Debug)]
 pub struct Handlers {
     /// The local timer has fired.
     pub timer: fn(&mut Interrupted),
@@ -53,7 +52,6 @@ pub struct Handlers {
 }
 
 /// The proof of being in a handler: the context that was running is saved.
-#[derive(Debug)]
 pub struct Interrupted(());
 
 impl Interrupted {

@@ -254,7 +254,6 @@ mod tests {
     use super::*;
 
     /// A local APIC after INIT, as far as its local vector table goes.
-    #[derive(Debug)]
     struct ApicModel {
         is_enabled: bool,
         /// The timer, the two pins, the error.

@@ -71,7 +71,6 @@ const ADDRESS: u64 = 0x000f_ffff_ffff_f000;
 ///
 /// **Table invariant**: every table page is a zeroed frame of its own, reachable
 /// at its physical address, and linked from the root exactly once.
-#[derive(Debug)]
 pub(crate) struct PageTable {
     root: u64,
 }

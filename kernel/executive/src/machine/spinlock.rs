@@ -16,7 +16,6 @@ use super::{cpu, interrupt_flag};
 ///
 /// **Ticket invariant**: exactly one ticket equals `serving`; its holder alone
 /// touches `data`, from taking the ticket's turn until it serves the next.
-#[derive(Debug)]
 pub struct SpinLock<T> {
     next: AtomicU32,
     serving: AtomicU32,
@@ -28,7 +27,6 @@ pub struct SpinLock<T> {
 unsafe impl<T: Send> Sync for SpinLock<T> {}
 
 /// Access to the data of a [`SpinLock`] until dropped.
-#[derive(Debug)]
 pub struct SpinLockGuard<'a, T> {
     lock: &'a SpinLock<T>,
     interrupts_were_enabled: bool,

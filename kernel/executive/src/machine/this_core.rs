@@ -18,7 +18,6 @@ use fass::platform::SetOnce;
 
 /// The stacks with which a core begins: their tops, each with a guard page below,
 /// and the context that it runs first.
-#[derive(Debug)]
 pub struct CoreStacks {
     /// The context that the core runs first.
     pub first_context: Parked,
@@ -29,7 +28,6 @@ pub struct CoreStacks {
 }
 
 /// A meter of how long a core's interrupts stay disabled, in ticks of the time stamp counter.
-#[derive(Debug)]
 pub(super) struct CoreMeter {
     /// When the current section began; 0 if there is none.
     pub(super) began: AtomicU64,
@@ -66,7 +64,6 @@ pub(super) enum TimeSlicePart {
 }
 
 /// One core's own data, on cache lines of its own.
-#[derive(Debug)]
 #[repr(C, align(128))]
 pub struct Core {
     this: AtomicU64,

@@ -14,7 +14,6 @@ pub(crate) const FRAME: u64 = 4096;
 const LOWEST: u64 = 1 << 20;
 
 /// The frames that nobody has taken.
-#[derive(Debug)]
 pub(crate) struct FreeFrames {
     /// Image and module cut two ranges of a map in two.
     free: List<(u64, u64), { MAX_REGIONS + 2 }>,

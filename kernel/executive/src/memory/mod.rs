@@ -23,7 +23,6 @@ const STACK_WINDOW: u64 = MEMORY_END;
 pub const MODULE_WINDOW: u64 = 1 << 40;
 
 /// The physical memory and the address space over it.
-#[derive(Debug)]
 struct PhysicalMemory {
     frames: FreeFrames,
     table: PageTable,

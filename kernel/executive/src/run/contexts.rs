@@ -27,7 +27,6 @@ const STACK_BYTES: u64 = 64 * 1024;
 /// whole runs, also in builds without optimization.
 const MAIN_STACK_BYTES: u64 = 256 * 1024;
 
-#[derive(Debug)]
 struct ContextPool {
     free: Vec<Parked>,
     /// How many there are, free or not.

@@ -9,7 +9,6 @@ use front::json::JsonObject;
 const MOST: usize = 24;
 
 /// The calls that a stack held, for when it holds others.
-#[derive(Debug)]
 pub struct Backtrace {
     instruction: Option<u64>,
     calls: [Option<CallSite>; MOST],

@@ -46,7 +46,6 @@ use crate::text::json;
 /// assert!(matches!(ending, AppError::Usage(_)));
 /// assert_eq!(ending.to_string(), "`jobs=0`: give at least 1");
 /// ```
-#[derive(Debug)]
 pub enum AppError {
     /// The command line is wrong; QEMU exits with 37.
     Usage(UsageError),
@@ -153,7 +152,6 @@ impl fmt::Display for AppError {
 pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
 
 /// The faults and exceeded bounds that are known of the runs so far.
-#[derive(Debug)]
 pub struct RunVerdict {
     judges_faults: Cell<bool>,
     judges_bounds: Cell<bool>,

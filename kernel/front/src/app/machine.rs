@@ -94,7 +94,6 @@ pub trait System: Sized {
 ///     Ok(())
 /// }
 /// ```
-#[derive(Debug)]
 pub struct Machine<S> {
     pub(super) system: S,
     pub(super) options: CommandLine<'static>,

@@ -7,7 +7,6 @@ const BACKSPACE: u8 = 0x08;
 const DELETE: u8 = 0x7f;
 
 /// A line that is being typed.
-#[derive(Debug)]
 pub(super) struct LineEditor {
     bytes: [u8; LONGEST],
     length: usize,

@@ -160,7 +160,6 @@ pub trait Commands: Sync {
 }
 
 /// A conversation.
-#[derive(Debug)]
 pub struct ShellSession<R> {
     input: LineEditor,
     echoes: bool,

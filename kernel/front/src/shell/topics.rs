@@ -33,7 +33,6 @@ const MOST_EVENTS: u64 = 2048;
 const NONE: u64 = u64::MAX;
 
 /// The commands, and the topic that is echoed. Only the session uses it, a slice at a time.
-#[derive(Debug)]
 pub struct TopicCommands<R> {
     /// The topic: its DAG, and its place there in the lower half; or [`NONE`].
     echoed: AtomicU64,

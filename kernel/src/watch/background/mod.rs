@@ -70,7 +70,6 @@ pub(crate) enum ConsoleEcho {
 const STARVED_NS: u64 = 200_000_000;
 
 /// Work done in slices, by the background or by the heartbeat.
-#[derive(Debug)]
 struct SlicedWork {
     status: Option<StatusPrinter>,
     session: Option<ShellSession<KernelRun>>,
@@ -115,7 +114,6 @@ pub(crate) fn beat(now_ns: u64) {
 }
 
 /// The background of one run.
-#[derive(Debug)]
 pub(crate) struct Background {
     progress: RunProgress,
     listener: Option<ByteListener>,
@@ -221,7 +219,6 @@ fn look_for_end() {
 }
 
 /// The DAG that bytes are for.
-#[derive(Debug)]
 pub(super) struct ByteListener {
     plan: u64,
     dag: DagId,
@@ -249,7 +246,6 @@ impl ByteListener {
 }
 
 /// The kernel's run.
-#[derive(Debug)]
 pub struct KernelRun;
 
 impl LiveRun for KernelRun {

@@ -47,7 +47,6 @@ const MOST_CORES: usize = 64;
 const MOST_NAMED: usize = 16;
 
 /// The state of the watch in this run. It begins as zeros, which take no room in an image.
-#[derive(Debug)]
 struct StallWatch {
     /// Whether there is a run.
     looks: bool,

@@ -33,7 +33,6 @@ const FEW_EVENTS: u64 = 128;
 const MOST_EVENTS: u64 = 2048;
 
 /// When and what to print.
-#[derive(Debug)]
 pub(super) struct StatusPrinter {
     period_ns: u64,
     total: u64,
@@ -88,7 +87,6 @@ impl StatusPrinter {
 }
 
 /// How far a run has come.
-#[derive(Debug)]
 pub(super) struct RunProgress {
     total: u64,
     printed: u64,
@@ -243,7 +241,6 @@ const TIME_TO_PRINT_NS: u64 = 100_000;
 const PATIENCE_NS: u64 = 100_000_000;
 
 /// Since when a line has waited.
-#[derive(Debug)]
 pub(super) struct LinePatience {
     since_ns: Option<u64>,
 }

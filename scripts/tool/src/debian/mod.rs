@@ -32,7 +32,6 @@ const POLICY: &str = "fass/linux/bpf/seats.bpf.c";
 const MEMORY_MIB: u64 = 1024;
 
 /// A program to run in a guest.
-#[derive(Debug)]
 pub struct GuestOrder<'a> {
     /// The program.
     pub program: &'a Path,
@@ -49,7 +48,6 @@ pub struct GuestOrder<'a> {
 }
 
 /// A guest that can be started: QEMU, and its arguments.
-#[derive(Debug)]
 pub struct Guest {
     /// QEMU.
     pub program: PathBuf,
@@ -201,7 +199,6 @@ const TRIED: [u32; 2] = [6, 18];
 const LEAST: [u32; 2] = [6, 13];
 
 /// The packages, unpacked.
-#[derive(Debug)]
 struct Packages {
     /// The folder that stands for a file system's root.
     root: PathBuf,

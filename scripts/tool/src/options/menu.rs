@@ -10,7 +10,6 @@ use super::{Refusal, nearest};
 use crate::output;
 
 /// The words to choose from.
-#[derive(Debug)]
 pub struct Menu {
     /// The command as a person types it, such as `./scripts/bench`.
     pub invocation: &'static str,

@@ -35,7 +35,6 @@ pub use sched_dag::nearest;
 pub(crate) const BY_PERSON: u8 = 130;
 
 /// A subcommand of the tool.
-#[derive(Debug)]
 pub struct Command {
     /// The command as a person types it, such as `./scripts/run`.
     pub invocation: &'static str,

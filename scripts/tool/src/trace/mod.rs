@@ -540,7 +540,6 @@ fn load_permille(view: &View<'_>, first_ns: u64, span_ns: u64) -> Vec<u64> {
 }
 
 /// A run in the order of time.
-#[derive(Debug)]
 struct View<'r> {
     run: &'r Run,
     /// The first instant from which on no event is missing.

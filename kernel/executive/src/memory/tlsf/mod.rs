@@ -69,7 +69,6 @@ use block::{
 };
 
 /// An allocator over any number of memory regions.
-#[derive(Debug)]
 pub(crate) struct Tlsf {
     free: FreeLists,
     usage: HeapUsage,
@@ -285,7 +284,6 @@ impl Tlsf {
 ///
 /// Bit `f` of `ranges` is set exactly when `classes[f]` is not zero; bit `s` of
 /// `classes[f]` exactly when `heads[f][s]` is a block.
-#[derive(Debug)]
 struct FreeLists {
     ranges: u32,
     classes: [u32; FIRST_LEVEL],

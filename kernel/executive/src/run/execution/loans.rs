@@ -19,7 +19,6 @@ use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 
 /// A runner that is to be [given back](Self::give_back).
-#[derive(Debug)]
 pub struct RunnerLoan(NonNull<CoreRunner>);
 
 // SAFETY: by the loan invariant it is the one way to the runner, which is `Send`.

@@ -301,7 +301,6 @@ impl fmt::Display for Condition {
 const MOST_BOOTS: usize = 6;
 
 /// The machine for all conditions, and its versions, for the summary.
-#[derive(Debug)]
 struct Setting<'p> {
     plan: &'p JoinPlan,
     /// The mode of the guests; `None`: programs of this computer.

@@ -482,7 +482,6 @@ struct Flow {
 }
 
 /// The arrows of a run.
-#[derive(Debug)]
 struct Flows {
     /// For each instance, the arrows that leave it.
     out: BTreeMap<Instance, Vec<Flow>>,
@@ -577,7 +576,6 @@ struct Output {
 struct Group(u64);
 
 /// A track that is being drawn.
-#[derive(Debug)]
 struct TrackWriter {
     group: Group,
     id: u64,
