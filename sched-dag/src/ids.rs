@@ -15,7 +15,6 @@ macro_rules! ids {
 
             impl $Id {
                 /// Returns the position as an index into a table.
-                #[must_use]
                 pub const fn index(self) -> usize {
                     self.0 as usize
                 }

@@ -74,7 +74,6 @@ impl EventSubject {
     }
 
     /// Unpacks an instance.
-    #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "20 bits are left")]
     pub const fn instance(self) -> Instance {
         Instance {
@@ -232,25 +231,21 @@ impl EventKind {
     }
 
     /// Returns the word.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         EVENTS[self as usize].1
     }
 
     /// Reports whether it happens to a DAG as a whole, or to the run, and to no job.
-    #[must_use]
     pub const fn is_of_dag(self) -> bool {
         matches!(EVENTS[self as usize].2, EventTarget::Dag)
     }
 
     /// Reports whether it happens to a job or a DAG, not to an instance.
-    #[must_use]
     pub const fn is_of_job(self) -> bool {
         matches!(EVENTS[self as usize].2, EventTarget::Job | EventTarget::Dag)
     }
 
     /// Reports whether it happens on a core, not only in the scheduler's books.
-    #[must_use]
     pub const fn is_of_machine(self) -> bool {
         matches!(EVENTS[self as usize].2, EventTarget::Core)
     }

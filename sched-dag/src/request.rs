@@ -34,7 +34,6 @@ pub enum Request {
 impl Request {
     /// Reports whether what it comes to is for a [`Lifecycle`](crate::lifecycle::Lifecycle) to say,
     /// where there is one.
-    #[must_use]
     pub const fn is_of_lifecycle(self) -> bool {
         !matches!(
             self,

@@ -36,7 +36,6 @@ const LIMIT: Duration = Duration::from_secs(600);
 /// # Panics
 ///
 /// Panics with what is missing, or with the serial log if it does not succeed.
-#[must_use]
 pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u64) -> Transcript {
     let run = || -> Result<(String, String), String> {
         install::ensure(&install::BOCHS)?;

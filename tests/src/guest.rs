@@ -41,6 +41,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 
 /// A guest that a test describes and boots.
 #[derive(Clone, Debug)]
+#[must_use = "a guest does nothing until it boots"]
 pub struct Guest {
     package: String,
     /// A file to boot instead of what the package is built into.
@@ -75,21 +76,18 @@ impl Guest {
     }
 
     /// Sets the number of processors.
-    #[must_use]
     pub fn cores(mut self, cores: u64) -> Guest {
         self.qemu.cores = cores;
         self
     }
 
     /// Sets the memory, in MiB.
-    #[must_use]
     pub fn memory_mib(mut self, memory_mib: u64) -> Guest {
         self.qemu.memory_mib = memory_mib;
         self
     }
 
     /// Sets what time means.
-    #[must_use]
     pub fn mode(mut self, mode: Mode) -> Guest {
         self.qemu.mode = mode;
         self
@@ -98,13 +96,11 @@ impl Guest {
     /// Runs on emulated processors in real time, where a busy host may hold any of them
     /// back at any moment. So no budget is derived from a WCET, and the test may judge
     /// by order and by counts alone.
-    #[must_use]
     pub fn in_real_time(self) -> Guest {
         self.mode(Mode::Threads).word("budget_factor=0")
     }
 
     /// Sets the board.
-    #[must_use]
     pub fn machine(mut self, machine: Machine) -> Guest {
         self.qemu.machine = machine;
         self
@@ -112,7 +108,6 @@ impl Guest {
 
     /// Boots as a PC does: from a stick, by this loader, with its words and its module on
     /// the stick. It is in real time, as firmware takes long otherwise, on a q35.
-    #[must_use]
     pub fn from_stick(self, loader: Loader) -> Guest {
         let mut guest = self.in_real_time().machine(Machine::Q35);
         guest.qemu.loader = loader;
@@ -120,14 +115,12 @@ impl Guest {
     }
 
     /// Adds words to the guest's command line, such as `jobs=20` or `jobs=20 seed=7`.
-    #[must_use]
     pub fn word(mut self, word: &str) -> Guest {
         self.words.push(word.into());
         self
     }
 
     /// Boots this file, which is not built first; the package only names it.
-    #[must_use]
     pub fn image(mut self, file: &Path) -> Guest {
         self.image = Some(file.into());
         self
@@ -135,7 +128,6 @@ impl Guest {
 
     /// Boots by a QEMU with other words in place of ours, each given with its place, and with
     /// these added.
-    #[must_use]
     pub fn altered(mut self, changes: &[(&str, &str)], more: &str) -> Guest {
         let program = altered(changes, more);
         self.qemu.program.clone_from(&program.0);
@@ -144,7 +136,6 @@ impl Guest {
     }
 
     /// Boots on a processor of this model, which may lack or have things: `max,-nx`.
-    #[must_use]
     pub fn model(self, model: &str) -> Guest {
         self.altered(&[("#max", model)], "")
     }
@@ -161,7 +152,6 @@ impl Guest {
     }
 
     /// Leaves a file in the guest's memory.
-    #[must_use]
     pub fn module(mut self, file: &Path) -> Guest {
         self.qemu.module = Some(file.into());
         self
@@ -172,7 +162,6 @@ impl Guest {
     /// # Panics
     ///
     /// Panics if the file is wrong, or cannot be written.
-    #[must_use]
     pub fn input(self, text: &str) -> Guest {
         let entries = wire_script::read(text).unwrap_or_else(|why| panic!("the input:{why}"));
         let script = wire_script::for_guest(&entries);
@@ -203,7 +192,6 @@ impl Guest {
     }
 
     /// Has the guest's recording written to a file, from a buffer of so many KiB.
-    #[must_use]
     pub fn records(mut self, file: &Path, kib: u64) -> Guest {
         self.qemu.records = Some(file.into());
         self.word(&format!("keep={kib}"))
@@ -214,7 +202,6 @@ impl Guest {
     /// # Panics
     ///
     /// If there is no such file.
-    #[must_use]
     pub fn replays(self, file: &Path) -> Guest {
         let bytes = fs::metadata(file).expect("the recording").len();
         self.module(file).word(&format!("replay={bytes}"))
@@ -222,14 +209,12 @@ impl Guest {
 
     /// Gives the guest a console. Each pair is a text to wait for, in any line that
     /// comes after what was said before, and what to say then.
-    #[must_use]
     pub fn conversation(self, conversation: &[(&str, &str)]) -> Guest {
         self.typing(conversation).word("console=on")
     }
 
     /// As [`conversation`](Self::conversation), without a console: what is said goes
     /// to the app.
-    #[must_use]
     pub fn typing(mut self, conversation: &[(&str, &str)]) -> Guest {
         let owned = |&(text, answer): &(&str, &str)| (text.into(), answer.into());
         self.conversation = conversation.iter().map(owned).collect();
@@ -238,7 +223,6 @@ impl Guest {
     }
 
     /// Sets how long the guest may take in wall time.
-    #[must_use]
     pub fn limit(mut self, limit: Duration) -> Guest {
         self.limit = limit;
         self

@@ -32,7 +32,6 @@ pub use said::{Members, Said, lawful_runs};
 /// # Panics
 ///
 /// Panics if it ends in a failure.
-#[must_use]
 pub fn run(app: &str, words: &[&str]) -> Transcript {
     let mut command = Command::new(system::workspace().join("scripts/run"));
     // On Linux a panic's backtrace counts as its instance's time, which a budget limits.

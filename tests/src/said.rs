@@ -113,7 +113,6 @@ impl Members for MachineLine {
 /// # Panics
 ///
 /// Panics with what breaks a rule, or if there is no trace.
-#[must_use]
 #[track_caller]
 pub fn lawful_runs(outcome: &Outcome, bound_ns: u64) -> Vec<Run> {
     let runs = trace::read(&outcome.serial);

@@ -26,7 +26,6 @@ use pub_sub::{ApproximateTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 /// # Panics
 ///
 /// If there is no topic.
-#[must_use]
 pub fn run(max_interval_ms: u64, times_ns: &[Vec<u64>]) -> Samples {
     let queue_size = NonZeroUsize::new(1000).expect("not 0");
     let mut parameters = Parameters::new(times_ns.len(), queue_size);

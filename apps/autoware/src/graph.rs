@@ -86,7 +86,6 @@ struct Builder<'w> {
 
 impl Workload {
     /// Builds the six DAGs.
-    #[must_use]
     pub fn build(&self) -> System {
         let build = Builder {
             workload: self,

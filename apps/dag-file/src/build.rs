@@ -42,7 +42,6 @@ impl Settings {
 }
 
 /// Builds the DAGs of a set, to be committed with any shape of graph allowed.
-#[must_use]
 pub fn build(set: &Set, settings: &Settings) -> Vec<Dag> {
     let mut seeds = (0..).map(|n| nth(settings.seed, n));
     let length = settings.length.of(set);

@@ -35,7 +35,6 @@ impl Estimate {
     }
 
     /// Takes measurements in.
-    #[must_use]
     pub fn update(self, measured: &Measured) -> Self {
         const TRUST: f64 = 0.02;
         let mut angles = turned(self.angles, measured.rates, SECONDS);

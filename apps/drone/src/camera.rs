@@ -92,7 +92,6 @@ pub fn locate((column, row): (f32, f32), estimate: &Estimate) -> [f64; 2] {
 
 impl Fix {
     /// Takes a place in that was seen `seconds` after the one before (an alpha-beta filter).
-    #[must_use]
     pub fn update(self, seen: [f64; 2], seconds: f64) -> Self {
         let mut fix = self;
         for (axis, seen) in seen.into_iter().enumerate() {

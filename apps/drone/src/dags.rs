@@ -64,7 +64,6 @@ pub struct System {
 
 impl Workload {
     /// Builds the DAGs.
-    #[must_use]
     pub fn build(self) -> System {
         let flight = Flight::default();
         let [attitude, camera, battery, mission, command, descent, safety] = [

@@ -69,7 +69,6 @@ pub fn wire() -> Wire {
 
 /// Builds the DAGs. Two jobs are `distance` apart at least, and take at most three quarters of it.
 /// The run ends after so many milliseconds; without, it does not end by itself.
-#[must_use]
 pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
     let taking = |name, share| SubtaskAttributes::named(name).wcet(distance / share);
     let echo = create_dag();

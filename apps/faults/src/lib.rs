@@ -68,7 +68,6 @@ pub const POLICIES: [(&str, Policy); 3] = [
 ];
 
 /// Builds the DAG that must not notice anything.
-#[must_use]
 pub fn healthy() -> Dag {
     pipeline("healthy", 0, None, Some(BUDGET), Policy::End)
 }
@@ -78,7 +77,6 @@ const SHORT_PERIOD: Duration = Duration::from_millis(1);
 
 /// Builds a healthy DAG, and a restless one that survives so many faults, one in every second
 /// job.
-#[must_use]
 pub fn restless(faults: u32) -> [Dag; 2] {
     let jobs = u64::from(faults) * 2;
     let healthy = create_dag();
@@ -115,13 +113,11 @@ pub fn restless(faults: u32) -> [Dag; 2] {
 }
 
 /// Builds the DAG that commits `crime` in its job [`FATAL_JOB`].
-#[must_use]
 pub fn doomed(crime: Crime, policy: Policy) -> Dag {
     pipeline("doomed", 1, Some(crime), Some(BUDGET), policy)
 }
 
 /// Builds the DAG that is ended by its crime, with all the time it wants for that.
-#[must_use]
 pub fn doomed_at_leisure(crime: Crime) -> Dag {
     pipeline("doomed", 1, Some(crime), None, Policy::End)
 }
@@ -129,7 +125,6 @@ pub fn doomed_at_leisure(crime: Crime) -> Dag {
 /// Builds a DAG that asks a device once a job, and the doomed one, which the questions release and
 /// which answers, until it commits `crime` in its job [`FATAL_JOB`]. The first one holds the answers
 /// against that, and would fail itself.
-#[must_use]
 pub fn served(crime: Crime) -> [Dag; 2] {
     let (device, mut driver) = create_device::<u64, u64>("served");
     let (asks, serves) = (create_dag(), create_dag());

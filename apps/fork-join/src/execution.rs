@@ -42,7 +42,6 @@ impl Pace {
     const SEED: u64 = 1;
 
     /// Measures this core's pace.
-    #[must_use]
     pub fn measure() -> Self {
         const ROUNDS: u64 = 100;
         // For the first time code and data come from further away.
@@ -59,7 +58,6 @@ impl Pace {
     }
 
     /// Returns how long a round takes.
-    #[must_use]
     pub const fn round_ns(self) -> u64 {
         self.round_ns
     }

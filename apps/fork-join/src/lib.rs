@@ -78,7 +78,6 @@ impl Workload {
     /// # Panics
     ///
     /// If `parallel` is 0 or more than [`MOST_PARALLEL`].
-    #[must_use]
     pub fn build(&self) -> (Dag, Joins) {
         let dag = create_dag();
         dag.name("fork-join").in_flight(match self.jobs {

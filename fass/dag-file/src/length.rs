@@ -17,7 +17,6 @@ pub enum Length {
 
 impl Length {
     /// Returns the same, for the DAGs of a set.
-    #[must_use]
     pub fn of(self, set: &Set) -> Self {
         let Self::Periods(count) = self else {
             return self;
@@ -27,7 +26,6 @@ impl Length {
     }
 
     /// Returns the number of jobs of a DAG: its own, if it states one.
-    #[must_use]
     pub fn jobs(self, spec: &DagSpec) -> u64 {
         match (spec.jobs, self) {
             (Some(jobs), _) | (None, Self::Jobs(jobs) | Self::Periods(jobs)) => jobs,

@@ -69,7 +69,6 @@ macro_rules! kinds {
 
         impl $Kinds {
             /// Returns the word for it.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$Kind => $name,)+
@@ -157,7 +156,6 @@ impl Role {
     /// ```
     /// assert!(!recording::Role::Sample.is_written());
     /// ```
-    #[must_use]
     pub const fn is_written(self) -> bool {
         matches!(self, Self::Source | Self::Result)
     }

@@ -101,7 +101,6 @@ macro_rules! define_scalars {
             /// ```
             /// assert_eq!(recording::Scalar::Text.name(), "text");
             /// ```
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$Scalar => $name),*

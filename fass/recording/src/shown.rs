@@ -150,7 +150,6 @@ macro_rules! read_scalars {
             /// ```
             /// assert_eq!(recording::Scalar::U16.parse("258"), Some(vec![2, 1]));
             /// ```
-            #[must_use]
             pub fn parse(self, value: &str) -> Option<Vec<u8>> {
                 match self {
                     $(Self::$Scalar => value.parse::<$Type>().ok().map(|value| to_bytes(&value))),*

@@ -101,7 +101,6 @@ impl Crc {
     }
 
     /// Returns the checksum of all bytes so far.
-    #[must_use]
     pub const fn value(self) -> u32 {
         !self.0
     }

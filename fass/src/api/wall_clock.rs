@@ -70,7 +70,6 @@ recording::recordable! {
 impl UnixTime {
     /// Returns the nanoseconds since 1970, without leap seconds, of an instant on the clock of
     /// [`now_ns`](crate::now_ns); `None` if nobody has stated them.
-    #[must_use]
     pub fn of(self, instant_ns: u64) -> Option<u64> {
         (self.offset_ns != UNKNOWN).then(|| self.offset_ns.saturating_add(instant_ns))
     }

@@ -96,13 +96,11 @@ pub fn set_level(most: Option<Level>) {
 impl Level {
     /// Reports whether lines of this level are said.
     #[inline]
-    #[must_use]
     pub fn is_on(self) -> bool {
         self as u8 <= LEVEL.load(Ordering::Relaxed)
     }
 
     /// Returns its name in lines and on the command line.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Error => "error",

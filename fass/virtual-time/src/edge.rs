@@ -98,7 +98,6 @@ impl VirtualTime {
     /// refused if no inputs of such a DAG are recorded.
     ///
     /// See [`State::record`](fass::shared::State::record) for an example.
-    #[must_use = "the machine itself is returned"]
     pub fn from(self, dag: &str, job: u64) -> Self {
         let edge = &self.machine.edge;
         edge.of_replay(|replay| replay.begin_before(dag, job));
@@ -116,7 +115,6 @@ impl VirtualTime {
     ///
     /// let machine = VirtualTime::new().contain_panics().keep_latest(16);
     /// ```
-    #[must_use = "the machine itself is returned"]
     pub fn keep_latest(self, jobs: u32) -> Self {
         self.set(|settings| settings.most_jobs = Some(jobs))
     }

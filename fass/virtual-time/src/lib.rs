@@ -101,6 +101,7 @@ pub use settings::Silent;
 /// assert_eq!(report.jobs[0].response_time_ns(), Some(5_000_000));
 /// assert_eq!(report.jobs[1].release_ns, Some(10_000_000));
 /// ```
+#[must_use = "dropping the machine removes it from the thread"]
 #[derive(Debug)]
 pub struct VirtualTime {
     machine: Rc<Machine>,
@@ -125,7 +126,6 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If the program has installed another platform.
-    #[must_use = "dropping the machine removes it from the thread"]
     #[allow(clippy::new_without_default, reason = "it installs a platform")]
     pub fn new() -> Self {
         Self {
@@ -139,33 +139,28 @@ impl VirtualTime {
     }
 
     /// Sets the number of cores. See [`VirtualTime`].
-    #[must_use = "the machine itself is returned"]
     pub fn cores(self, cores: u32) -> Self {
         self.set(|settings| settings.terms.scheduler.cores = cores)
     }
 
     /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
     /// DAGs; all have one clock. See [`fass::Dag::cluster`].
-    #[must_use = "the machine itself is returned"]
     pub fn clusters(self, sizes: &[u32]) -> Self {
         self.set(|settings| settings.terms.divide(sizes))
     }
 
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
     /// others share clusters of one core each. All subtasks need WCETs. See [`fass::commit::ClusterPlacement`].
-    #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
         self.set(|settings| settings.terms.divide_by_commit())
     }
 
     /// Sets the scheduling policy. See [`VirtualTime`].
-    #[must_use = "the machine itself is returned"]
     pub fn policy(self, policy: Policy) -> Self {
         self.set(|settings| settings.terms.scheduler.policy = policy)
     }
 
     /// Sets whether a started instance may lose its core. See [`VirtualTime`].
-    #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
         self.set(|settings| settings.terms.scheduler.preemption = preemption)
     }
@@ -173,7 +168,6 @@ impl VirtualTime {
     /// Sets the costs that the commit adds to each WCET before it answers about
     /// deadlines: those of the machine that the DAGs are meant for. The run
     /// itself stays without overheads. See [`VirtualTime`].
-    #[must_use = "the machine itself is returned"]
     pub fn overheads(self, overheads: Overheads) -> Self {
         self.set(|settings| settings.terms.overheads = overheads)
     }
@@ -197,7 +191,6 @@ impl VirtualTime {
     ///     "dag `tick` takes at most 1.2ms, by multiple paths; 1 of 1 WCETs are observed ones and 20 %"
     /// );
     /// ```
-    #[must_use = "the machine itself is returned"]
     pub fn wcets(self, file: &str) -> Self {
         let file = file.to_owned();
         self.set(|settings| settings.terms.wcets = Some(file.into()))
@@ -237,7 +230,6 @@ impl VirtualTime {
     /// assert_eq!(report.dag("healthy").statistics().completed, 4);
     /// assert_eq!(report.dag("faulty").statistics().cut_short, 1);
     /// ```
-    #[must_use = "the machine itself is returned"]
     pub fn contain_panics(self) -> Self {
         self.set(|settings| settings.contains_panics = true)
     }

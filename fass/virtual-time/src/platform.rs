@@ -121,7 +121,6 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If the wire has a device already; likewise in [`arrive_at`](Self::arrive_at).
-    #[must_use = "the machine itself is returned"]
     pub fn connect(self, wire: &Wire) -> Self {
         let place = self.machine.place_of(wire);
         self.machine.wires.borrow_mut()[place].1 = Some(Vec::new());

@@ -66,7 +66,6 @@ impl VirtualTime {
     /// assert!(report.jobs.iter().all(|job| late_ns(job) <= 1_000_000));
     /// assert_eq!(report.violations(), []);
     /// ```
-    #[must_use = "the machine itself is returned"]
     pub fn late(self, most: Duration, seed: u64) -> Self {
         let most_ns = nanoseconds(most);
         self.set(|settings| settings.late = Late { most_ns, seed })
@@ -93,7 +92,6 @@ impl VirtualTime {
     /// assert_eq!(report.panics[0].instance.job, 3);
     /// assert_eq!(report.end_ns, 32_000_000);
     /// ```
-    #[must_use = "the machine itself is returned"]
     pub fn fault(self, dag: &str, subtask: &str, job: u64) -> Self {
         let fault = Fault {
             dag: dag.into(),
@@ -206,7 +204,6 @@ impl VirtualTime {
     /// when the function has returned, so `fass::now_ns` in the function does not show it.
     ///
     /// See [`Silent`].
-    #[must_use = "the machine itself is returned"]
     pub fn silent(self, silent: Silent) -> Self {
         self.set(|settings| settings.silent = silent)
     }

@@ -747,7 +747,6 @@ pub enum FaultCost {
 
 impl FaultCost {
     /// Returns its word in machine lines.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Dag => "dag",
@@ -757,7 +756,6 @@ impl FaultCost {
     }
 
     /// Returns the consequence, for people.
-    #[must_use]
     pub const fn consequence(self) -> &'static str {
         match self {
             Self::Dag => "the DAG is ended",

@@ -231,7 +231,6 @@ impl Violation {
     }
 
     /// Returns its text with the names of the model that was run, instead of numbers.
-    #[must_use]
     pub fn with_names(self, task_set: &TaskSet) -> impl fmt::Display {
         fmt::from_fn(move |f| self.tell(NamedSubject(Some(task_set)), f))
     }

@@ -30,7 +30,6 @@ struct PolicyRule {
 
 impl Policy {
     /// Returns the word of options, scenarios and traces.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         Self::WORDS[self as usize]
     }
@@ -41,7 +40,6 @@ impl Policy {
     }
 
     /// Returns the number of each subtask of a DAG; the smaller one goes first.
-    #[must_use]
     pub fn numbers(self, dag: &Dag) -> Vec<u64> {
         let mut numbers = (Self::RULES[self as usize].numbers)(dag);
         if self.adds_release() {
@@ -55,7 +53,6 @@ impl Policy {
     }
 
     /// Reports whether the nominal release of a job is added to the numbers of its subtasks.
-    #[must_use]
     pub const fn adds_release(self) -> bool {
         Self::RULES[self as usize].adds_release
     }

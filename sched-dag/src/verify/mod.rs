@@ -222,6 +222,7 @@ impl DagFindings<'_, '_> {
 /// Options of the verification.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
+#[must_use = "options have no effect until something is verified by them"]
 pub struct CommitOptions {
     /// How ready instances will be ordered; decides which attributes are needed.
     pub policy: Policy,
@@ -278,21 +279,18 @@ impl CommitOptions {
     }
 
     /// Returns the same options with another construction policy.
-    #[must_use]
     pub const fn with_construction(mut self, construction: ConstructionPolicy) -> Self {
         self.construction = construction;
         self
     }
 
     /// Returns the same options with the cores divided.
-    #[must_use]
     pub fn with_clusters(mut self, clusters: CoreDivision) -> Self {
         self.clusters = clusters;
         self
     }
 
     /// Returns the same options with another bound on instances in flight.
-    #[must_use]
     pub const fn with_instance_limit(mut self, instance_limit: u32) -> Self {
         self.instance_limit = instance_limit;
         self

@@ -59,7 +59,6 @@ pub struct Workload {
 /// # Panics
 ///
 /// If a fork-join has no or more than 16 parallel subtasks.
-#[must_use]
 pub fn build(workload: &Workload) -> (Dag, Stamps) {
     let dag = create_dag();
     dag.jobs(workload.jobs).in_flight(1);
@@ -252,7 +251,6 @@ impl Pen {
 
 impl Stamps {
     /// Makes a pen for the next subtask's body, which writes twice a job.
-    #[must_use]
     pub fn pen(&mut self, jobs: u64) -> Pen {
         let pen = Pen::new(
             usize::try_from(jobs)

@@ -40,7 +40,6 @@ pub enum Shape {
 
 impl Shape {
     /// Returns the number of subtasks.
-    #[must_use]
     pub const fn subtasks(self) -> usize {
         match self {
             Self::Chain(subtasks) | Self::Layered { subtasks, .. } => subtasks,
@@ -50,7 +49,6 @@ impl Shape {
 
     /// Returns the edges, from smaller to larger numbers, ordered by the latter;
     /// none stands twice.
-    #[must_use]
     pub fn edges(self) -> Vec<(usize, usize)> {
         let sink = self.subtasks() - 1;
         match self {

@@ -35,7 +35,6 @@ impl CodeLocation {
     }
 
     /// Reads the calls, all of this core's stack.
-    #[must_use]
     pub fn backtrace(self) -> Backtrace {
         let mut found = backtrace::calls(self.stack_pointer);
         Backtrace {
