@@ -24,10 +24,7 @@ mod list;
 pub mod memory_functions;
 mod memory_map;
 pub mod multiboot2;
-#[allow(
-    unsafe_code,
-    reason = "what the loader left is at addresses, not in references"
-)]
+#[allow(unsafe_code, reason = "the loader leaves addresses, not references")]
 pub mod physical;
 pub mod power;
 pub mod pvh;

@@ -1,6 +1,5 @@
 //! The app on Linux: the function is the image's, the machine is this computer.
 
-extern crate alloc;
 extern crate kernel_on_linux as kernel;
 
 #[path = "../src/main.rs"]

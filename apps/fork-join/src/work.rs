@@ -83,10 +83,7 @@ fn next(state: &mut u64) -> u32 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
     *state ^= *state << 17;
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "the upper half of 64 bits is 32"
-    )]
+    #[allow(clippy::cast_possible_truncation, reason = "half of 64 bits is 32")]
     {
         (*state >> 32) as u32
     }

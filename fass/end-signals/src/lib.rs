@@ -6,10 +6,7 @@
 
 #![deny(unsafe_code)]
 
-#[allow(
-    unsafe_code,
-    reason = "system calls that the standard library does not offer"
-)]
+#[allow(unsafe_code, reason = "system calls that std does not offer")]
 mod sys;
 
 use std::sync::atomic::Ordering;

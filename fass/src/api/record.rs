@@ -132,10 +132,7 @@ fn plan_channels(drafts: &Drafts, plan: &mut Plan) {
 /// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
 /// recorded states, tells the platform, and adds their lines to those before. Returns what is
 /// put around subtasks for that.
-#[allow(
-    clippy::too_many_lines,
-    reason = "gives numbers in one order, which a reader has to see whole"
-)]
+#[allow(clippy::too_many_lines, reason = "one order, to be seen whole")]
 fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Around)> {
     let draft = &*drafts[dag.index()].borrow();
     let (verified, lines) = (plan.task_set.dag(dag), &mut plan.lines);

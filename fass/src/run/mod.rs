@@ -6,10 +6,7 @@
 //! commit has made it.
 
 pub(crate) mod answers;
-#[allow(
-    unsafe_code,
-    reason = "the cells of job slots, shared values and records, and the waker of turns"
-)]
+#[allow(unsafe_code, reason = "the cells of slots, and the waker of turns")]
 pub(crate) mod cell;
 pub(crate) mod effect;
 pub(crate) mod gate;
@@ -26,8 +23,5 @@ pub(crate) mod topic;
 pub(crate) mod tuple;
 pub(crate) mod turn;
 pub(crate) mod waiting;
-#[allow(
-    unsafe_code,
-    reason = "the claim of an instance that a fault has ended"
-)]
+#[allow(unsafe_code, reason = "the claim of an instance that a fault ended")]
 pub(crate) mod wire;

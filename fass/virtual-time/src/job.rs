@@ -69,10 +69,7 @@ pub enum Value {
 
 impl JobShown {
     /// Shows a job of a run, of which the recording so far says what is known of values.
-    #[allow(
-        clippy::too_many_lines,
-        reason = "puts together what recording and report know of one job"
-    )]
+    #[allow(clippy::too_many_lines, reason = "all that is known of one job")]
     pub(crate) fn new(report: &Report, recording: &[u8], dag: DagId, job: u64) -> Self {
         let recording = Recording::read(recording).expect("it is what this machine has written");
         let channels = &recording.header().channels;

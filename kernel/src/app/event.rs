@@ -78,9 +78,7 @@ impl Event {
                 if core.context().awaits(self.address()) {
                     core.wake_up();
                 }
-                if were_enabled {
-                    interrupt_flag::enable();
-                }
+                interrupt_flag::restore(were_enabled);
                 left &= left - 1;
             }
         }

@@ -48,10 +48,7 @@ const HANDLER_STACK: u64 = 16 * 1024;
 
 /// Brings up memory and interrupts, then goes on on the core's own stack: the
 /// boot stack has no guard page.
-#[allow(
-    clippy::too_many_lines,
-    reason = "the order of the steps is what it states"
-)]
+#[allow(clippy::too_many_lines, reason = "it states the order of the steps")]
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::FIRST.initialize();
     // What an app's wire gets from now on waits there.

@@ -61,10 +61,7 @@ pub(super) fn beat(now_ns: u64) {
     }
 }
 
-#[allow(
-    clippy::too_many_lines,
-    reason = "the order in which a report is safe, whatever has failed"
-)]
+#[allow(clippy::too_many_lines, reason = "the order that is safe")]
 fn die(
     what: &str,
     message: &dyn Display,

@@ -320,10 +320,7 @@ impl Vertex {
         }
         // The number of slots is a power of two, so that a mask finds the counter.
         let slot = sequence & u64::from(self.slot_mask);
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "the slot is less than a count that came from a u32"
-        )]
+        #[allow(clippy::cast_possible_truncation, reason = "a slot fits into a u32")]
         let place = self.counters as usize + slot as usize;
         &mut counters[place]
     }

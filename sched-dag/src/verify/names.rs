@@ -48,10 +48,7 @@ impl<'a> Interner<'a> {
         let hash = fnv_1a(EMPTY, name.as_bytes());
         let hash = hash ^ (hash >> 32);
         let mask = self.table.len() - 1;
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "the low bits suffice for a place in the table on every target"
-        )]
+        #[allow(clippy::cast_possible_truncation, reason = "low bits suffice")]
         let mut place = hash as usize & mask;
         loop {
             let entry = self.table[place];

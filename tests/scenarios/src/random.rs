@@ -123,10 +123,7 @@ fn modes(dags: u64, is_divided: bool, random: &mut Random) -> Vec<(String, Vec<S
 }
 
 impl Round {
-    #[allow(
-        clippy::too_many_lines,
-        reason = "draws in an order on which each seed's round depends"
-    )]
+    #[allow(clippy::too_many_lines, reason = "each seed depends on the order")]
     fn dag(&self, number: u64, size: u64, random: &mut Random) -> DagText {
         let at = usize::try_from(number).unwrap_or(0);
         let urgency = random.index(PERIODS_MS.len());

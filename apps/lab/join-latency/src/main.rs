@@ -39,10 +39,7 @@ const WORDS: [&str; 7] = [
     "depth",
 ];
 
-#[allow(
-    clippy::too_many_lines,
-    reason = "the app's steps, one after the other"
-)]
+#[allow(clippy::too_many_lines, reason = "the app's steps, in order")]
 fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let max_interval_ms = options.number("max_interval_ms", 1..=1_000_000, 50)?;

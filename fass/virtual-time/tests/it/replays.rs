@@ -195,10 +195,7 @@ fn run(machine: &VirtualTime, set: &Set, raises: &[(usize, Duration)]) -> (Repor
 type Said = (&'static str, (u16, u16, u64), Vec<u8>);
 
 /// Runs a case, and returns how much of what there was.
-#[allow(
-    clippy::too_many_lines,
-    reason = "one case, from its set to the comparison"
-)]
+#[allow(clippy::too_many_lines, reason = "one case, from set to comparison")]
 fn case(seed: u64) -> [usize; 6] {
     let mut later = 0;
     let mut random = Random::new(!seed);

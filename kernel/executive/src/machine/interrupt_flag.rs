@@ -53,6 +53,14 @@ pub fn enable() {
     cpu::set_interrupt_flag();
 }
 
+/// Enables interrupts if they were enabled before [`disable`].
+#[inline(always)]
+pub fn restore(were_enabled: bool) {
+    if were_enabled {
+        enable();
+    }
+}
+
 /// Enables interrupts and halts until one has been handled; leaves them enabled. Where cores stay
 /// awake it may return at once, as from an interrupt that changes nothing.
 ///

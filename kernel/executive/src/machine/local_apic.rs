@@ -100,10 +100,7 @@ fn write(register: ApicRegister, value: u32) {
 /// Apart, so that the usual way keeps its registers.
 #[cold]
 #[inline(never)]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the upper half of the registers that are read is 0"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "their upper half is 0")]
 fn read_specific(register: u32) -> u32 {
     // SAFETY: in x2APIC mode these are the local APIC's registers, without side effects.
     unsafe { cpu::read_msr(register) as u32 }

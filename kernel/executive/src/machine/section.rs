@@ -49,9 +49,7 @@ pub fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
 fn with_core<R>(work: impl FnOnce(&'static Core) -> R) -> R {
     let were_enabled = interrupt_flag::disable();
     let result = work(this_core::get());
-    if were_enabled {
-        interrupt_flag::enable();
-    }
+    interrupt_flag::restore(were_enabled);
     result
 }
 

@@ -81,9 +81,7 @@ impl<T> SpinLock<T> {
         if taken {
             return Some(self.guard(interrupts_were_enabled));
         }
-        if interrupts_were_enabled {
-            interrupt_flag::enable();
-        }
+        interrupt_flag::restore(interrupts_were_enabled);
         None
     }
 
@@ -125,9 +123,7 @@ impl<T> Drop for SpinLockGuard<'_, T> {
         self.lock
             .serving
             .store(serving.wrapping_add(1), Ordering::Release);
-        if self.interrupts_were_enabled {
-            interrupt_flag::enable();
-        }
+        interrupt_flag::restore(self.interrupts_were_enabled);
     }
 }
 

@@ -30,9 +30,7 @@ pub fn set(alarm: Alarm, at_ns: u64) {
     if core.alarms[alarm as usize].swap(at_ns, Ordering::Relaxed) != at_ns {
         arm(core);
     }
-    if were_enabled {
-        interrupt_flag::enable();
-    }
+    interrupt_flag::restore(were_enabled);
 }
 
 /// Makes sure that the alarm of this core, `core`, is not later than `at_ns`. It may be

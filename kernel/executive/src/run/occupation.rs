@@ -52,9 +52,7 @@ impl ExecutionTimer {
             start_ns: clock::now_ns(),
             suspended_before_ns: context.suspended_ns(),
         };
-        if were_enabled {
-            interrupt_flag::enable();
-        }
+        interrupt_flag::restore(were_enabled);
         timer
     }
 

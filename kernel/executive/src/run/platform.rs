@@ -95,9 +95,7 @@ impl Platform for Kernel {
     fn running(&self) -> Option<(u64, Instance)> {
         let were_enabled = interrupt_flag::disable();
         let running = execution::running(this_core::get());
-        if were_enabled {
-            interrupt_flag::enable();
-        }
+        interrupt_flag::restore(were_enabled);
         running.map(|instance| (self.plan.load(Ordering::Relaxed), instance))
     }
 

@@ -128,10 +128,7 @@ impl JobTable {
     fn slot(&self, sequence: u64) -> usize {
         // A mask, as the number of slots is a power of two.
         let slot = sequence & (self.in_flight.len() as u64 - 1);
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "it is less than the number of slots, a `usize`"
-        )]
+        #[allow(clippy::cast_possible_truncation, reason = "a count of slots fits")]
         {
             slot as usize
         }

@@ -191,10 +191,7 @@ impl Prepared {
 /// # Errors
 ///
 /// In lines for people: the faults of the options or of the file.
-#[allow(
-    clippy::too_many_lines,
-    reason = "one option after the other, each with a refusal of its own"
-)]
+#[allow(clippy::too_many_lines, reason = "one option after the other")]
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     let refuse = |line: String| vec![line];
     // Without a file, an option that is about one is a mistake.

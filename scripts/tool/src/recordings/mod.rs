@@ -284,10 +284,7 @@ pub fn independent_reader() -> Result<OsString, String> {
 }
 
 /// Returns a description of the recording for people.
-#[allow(
-    clippy::too_many_lines,
-    reason = "a text, from its first line to its last"
-)]
+#[allow(clippy::too_many_lines, reason = "a text, line by line")]
 fn shown(recording: &Recording<'_>) -> String {
     let header = recording.header();
     let mut values = vec![0_u64; header.channels.len()];
@@ -415,10 +412,7 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
 }
 
 /// Returns the lines about a job, given as `DAG/JOB`.
-#[allow(
-    clippy::too_many_lines,
-    reason = "a text, from its first line to its last"
-)]
+#[allow(clippy::too_many_lines, reason = "a text, line by line")]
 fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> {
     let header = recording.header();
     // The last `/`, since a DAG's name may contain one.

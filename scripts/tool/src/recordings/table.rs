@@ -25,10 +25,7 @@ use crate::files;
 use crate::options::Parsed;
 
 /// Converts a table to a recording.
-#[allow(
-    clippy::too_many_lines,
-    reason = "one pass over a table: each check stands where a row is read"
-)]
+#[allow(clippy::too_many_lines, reason = "one pass over a table")]
 pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> {
     let text = files::read_text(file)?;
     let place = files::shown_path(file);
@@ -308,10 +305,7 @@ impl Iterator for Rows<'_> {
 const MOST_COLUMNS: u64 = 256;
 
 /// Returns the tables, with the names of their files.
-#[allow(
-    clippy::too_many_lines,
-    reason = "a table for each channel, row by row"
-)]
+#[allow(clippy::too_many_lines, reason = "tables, row by row")]
 pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
     let header = recording.header();
     let mut names = BTreeMap::<String, usize>::new();

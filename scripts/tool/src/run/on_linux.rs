@@ -99,10 +99,7 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
 const GUEST_CORES: &str = "4";
 
 /// Builds the app's program and runs it as the options say.
-#[allow(
-    clippy::too_many_lines,
-    reason = "the steps of a run in their order, each by a call"
-)]
+#[allow(clippy::too_many_lines, reason = "the steps of a run, in order")]
 pub(super) fn run_app(
     options: &Parsed,
     app: &str,

@@ -1,6 +1,5 @@
 //! The app on Linux: the same `main` as the image's, on this computer.
 
-extern crate alloc;
 extern crate kernel_on_linux as kernel;
 
 #[path = "../src/main.rs"]

@@ -400,9 +400,7 @@ pub fn raise(plan: u64, dag: DagId) {
     if !is_instance {
         raise_in_interrupt(plan, dag);
     }
-    if were_enabled {
-        interrupt_flag::enable();
-    }
+    interrupt_flag::restore(were_enabled);
     assert!(
         !is_instance,
         "a subtask raises a signal that it was not registered with; register it by \
@@ -423,7 +421,5 @@ pub fn answer(plan: u64, wait: WaitId) {
     let were_enabled = interrupt_flag::disable();
     let cluster = cluster::cluster_of(this_core::get());
     status::serve(Some(plan), cluster, Request::Answer(wait));
-    if were_enabled {
-        interrupt_flag::enable();
-    }
+    interrupt_flag::restore(were_enabled);
 }
