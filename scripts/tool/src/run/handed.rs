@@ -245,10 +245,10 @@ pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::{RUN, prepare};
+    use super::*;
     use crate::system::workspace;
     use crate::tests::right;
     use std::fs;
-    use super::*;
 
     #[test]
     fn dags_of_a_file_are_a_module_that_goes_with_its_value() {

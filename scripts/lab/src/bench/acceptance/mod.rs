@@ -195,9 +195,12 @@ pub(super) fn of_files(files: &[SetFile]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use sched_dag::analysis::{AnalysisSettings, Overheads, answer, assign};
-    use sched_dag::{ AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskSpec, verify, };
     use super::*;
+    use sched_dag::analysis::{AnalysisSettings, Overheads, answer, assign};
+    use sched_dag::{
+        AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption,
+        SubtaskSpec, verify,
+    };
 
     const LENT: usize = 3;
 
