@@ -29,7 +29,6 @@ pub(super) type CoverChain = Vec<(usize, bool)>;
 /// cover the volume.
 ///
 /// Exact unless the graph is large.
-#[must_use]
 pub fn covers(task: &Task, most: usize) -> Vec<u64> {
     exact(task, most).unwrap_or_else(|| sums(&parts(task, most)))
 }
@@ -46,14 +45,12 @@ pub(super) fn parallelism_covers_and_parts(task: &Task, cores: u32) -> (u64, Vec
 }
 
 /// Returns the width, or `None` if the graph is too large to find it.
-#[must_use]
 pub fn width(task: &Task) -> Option<u64> {
     Some(exact(task, usize::MAX)?.len() as u64)
 }
 
 /// Returns the most cores that one job can use at an instant, at least 1:
 /// `min(cores, width)`, or just `cores` where the width is not known.
-#[must_use]
 pub fn parallelism(task: &Task, cores: u32) -> u64 {
     parallelism_covers_and_parts(task, cores).0
 }

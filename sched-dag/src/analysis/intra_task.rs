@@ -31,7 +31,6 @@ pub const PATH_LIMIT: u32 = 4096;
 /// `None`: does not apply (no cores, waits, `order` does not name each subtask once,
 /// or contradicts precedence) or takes too long (more than [`PATH_LIMIT`]
 /// paths or [`SUBTASK_LIMIT`] subtasks).
-#[must_use]
 pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     let count = task.subtask_count();
     let ranks = ranks(task, order)?;

@@ -96,7 +96,6 @@ impl CoreSupply {
 
     /// Returns the most time that the owner executes on this core in any window of a length, both
     /// in nanoseconds; never more than the length, 0 without an owner.
-    #[must_use]
     pub fn busy_ns(&self, window_ns: u64) -> u64 {
         self.busiest(window_ns).0
     }

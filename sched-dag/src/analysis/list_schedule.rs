@@ -112,7 +112,6 @@ impl ListSchedule {
     /// schedules, where all limits are `limit_ns` to begin with.
     ///
     /// The schedule may get longer, but not beyond that.
-    #[must_use]
     pub fn squeezed(&self, task: &Task, limit_ns: u64) -> Self {
         let mut limits_ns = vec![limit_ns; self.cores.len()];
         let mut best = self.clone();
@@ -141,13 +140,11 @@ impl ListSchedule {
     /// # Panics
     ///
     /// If there is no such core.
-    #[must_use]
     pub fn finish_ns(&self, core: usize) -> u64 {
         self.cores[core].last().map_or(0, |last| last.finish_ns)
     }
 
     /// Returns the last finish, in nanoseconds after the release; 0 without subtasks.
-    #[must_use]
     pub fn length_ns(&self) -> u64 {
         let finishes_ns = (0..self.cores.len()).map(|core| self.finish_ns(core));
         finishes_ns.max().unwrap_or(0)

@@ -275,7 +275,6 @@ texts! {
 
 impl AnalysisResult {
     /// Reports whether every DAG has a bound.
-    #[must_use]
     pub fn is_proven(&self) -> bool {
         self.bounds.iter().all(Option::is_some)
     }
@@ -284,7 +283,6 @@ impl AnalysisResult {
 impl NotProvenReason {
     /// Reports whether deadlines will be missed when every instance takes its
     /// WCET, rather than merely not being proven to be met.
-    #[must_use]
     pub const fn is_certain(&self) -> bool {
         matches!(
             self,

@@ -35,7 +35,6 @@ use super::workload::WorkloadSegment;
 use crate::ids::to_u32;
 
 /// Bounds the response time of one job alone on `cores` cores; `None` without cores.
-#[must_use]
 pub fn multi_path(task: &Task, cores: u32) -> Option<u64> {
     let most = usize::try_from(cores).ok()?;
     let covers = covers(task.oblivious(), most);

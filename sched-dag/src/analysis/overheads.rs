@@ -56,19 +56,16 @@ macro_rules! overheads {
             pub const NONE: Self = Self { $($term: 0),+ };
 
             /// Makes them of the numbers that state them.
-            #[must_use]
             pub const fn of_terms_ns([$($term),+]: [u64; Self::WORDS.len()]) -> Self {
                 Self { $($term),+ }
             }
 
             /// Returns the numbers that state them.
-            #[must_use]
             pub const fn terms_ns(&self) -> [u64; Self::WORDS.len()] {
                 [$(self.$term),+]
             }
 
             /// Returns these as text, with commas between.
-            #[must_use]
             pub fn stated(&self) -> String {
                 self.terms_ns().map(|ns| ns.to_string()).join(",")
             }
@@ -142,7 +139,6 @@ impl Overheads {
     }
 
     /// Returns the charge of each segment, or `None` if that overflows.
-    #[must_use]
     pub fn of_an_instance_ns(&self, preemption: Preemption) -> Option<u64> {
         self.sum_ns(usize::from(preemption == Preemption::Enabled))
     }
@@ -156,7 +152,6 @@ impl Overheads {
 
     /// Returns how long it takes to go on with an instance on another core of its group, since a
     /// pinned one takes its core.
-    #[must_use]
     pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
         match preemption {
             Preemption::Enabled => self.sum_ns(2).unwrap_or(u64::MAX),
@@ -165,7 +160,6 @@ impl Overheads {
     }
 
     /// Returns how long the device's interrupts keep its core at most, within a time.
-    #[must_use]
     pub const fn of_device_ns(&self, within_ns: u64) -> u64 {
         match within_ns.checked_div(self.device_distance_ns) {
             Some(whole) => whole.saturating_add(1).saturating_mul(self.device_ns),
@@ -174,7 +168,6 @@ impl Overheads {
     }
 
     /// Reports whether the device leaves its core some time.
-    #[must_use]
     pub const fn device_leaves_time(&self) -> bool {
         self.device_ns == 0 || self.device_ns < self.device_distance_ns
     }
@@ -186,7 +179,6 @@ impl Overheads {
     /// its start and, paid for by the one that has preempted it, once when it goes on. If it is
     /// preempted while it waits for a section, it waits for its turn anew. `docs/proving.md` has the
     /// argument.
-    #[must_use]
     pub fn among(self, dags: &mut dyn Iterator<Item = &Dag>, cores: u32) -> Self {
         let (mut longest_ns, mut turn_ns) = (0, 0);
         for of in dags.flat_map(Dag::locks) {

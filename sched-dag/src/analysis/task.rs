@@ -237,31 +237,26 @@ impl Task {
     }
 
     /// Returns the time between two releases, never 0.
-    #[must_use]
     pub const fn period_ns(&self) -> u64 {
         self.period_ns
     }
 
     /// Returns the relative deadline, never 0.
-    #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
     }
 
     /// Returns the least relative deadline of a sink, never 0.
-    #[must_use]
     pub const fn least_deadline_ns(&self) -> u64 {
         self.least_deadline_ns
     }
 
     /// Returns the WCETs by subtask.
-    #[must_use]
     pub const fn wcets_ns(&self) -> &[u64] {
         &self.wcets_ns
     }
 
     /// Returns the number of subtasks.
-    #[must_use]
     pub const fn subtask_count(&self) -> usize {
         self.wcets_ns.len()
     }
@@ -284,7 +279,6 @@ impl Task {
     }
 
     /// Returns the number of edges.
-    #[must_use]
     pub const fn edge_count(&self) -> usize {
         self.graph.successors.neighbours.len()
     }
@@ -300,7 +294,6 @@ impl Task {
     }
 
     /// Returns the bottom level of each subtask.
-    #[must_use]
     pub fn bottom_levels(&self) -> Vec<u64> {
         self.graph.levels(&self.wcets_ns)
     }
@@ -326,7 +319,6 @@ impl Task {
     /// # Panics
     ///
     /// If `weights` has not as many entries as there are subtasks.
-    #[must_use]
     pub fn longest_path<W>(&self, weights: &[W]) -> Vec<usize>
     where
         W: Copy + Default + Ord + Add<Output = W>,
@@ -361,32 +353,27 @@ impl Task {
     }
 
     /// Returns the largest number of subtasks on one path.
-    #[must_use]
     pub fn most_subtasks_on_a_path(&self) -> u64 {
         let counts = self.graph.levels(&vec![1; self.subtask_count()]);
         counts.into_iter().max().unwrap_or(0)
     }
 
     /// Returns the volume: the sum of all WCETs.
-    #[must_use]
     pub const fn volume_ns(&self) -> u64 {
         self.volume_ns
     }
 
     /// Returns the length: the largest sum of WCETs along a path.
-    #[must_use]
     pub const fn length_ns(&self) -> u64 {
         self.length_ns
     }
 
     /// Reports whether a subtask waits.
-    #[must_use]
     pub const fn has_waits(&self) -> bool {
         self.waits.is_some()
     }
 
     /// Returns the waits by subtask; empty if no subtask waits.
-    #[must_use]
     pub fn waits(&self) -> &[SubtaskWaits] {
         let waits = self.waits.as_ref();
         waits.map_or(&[], |waits| &waits.of_subtasks)
@@ -394,14 +381,12 @@ impl Task {
 
     /// Returns the task in which the waits are executed, for their limits; without waits that is
     /// this one.
-    #[must_use]
     pub fn oblivious(&self) -> &Self {
         let waits = self.waits.as_ref();
         waits.map_or(self, |waits| &waits.oblivious)
     }
 
     /// Returns the span: the largest sum of WCETs and of limits of waits along a path.
-    #[must_use]
     pub fn span_ns(&self) -> u64 {
         self.oblivious().length_ns
     }
