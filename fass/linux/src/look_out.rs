@@ -151,11 +151,8 @@ mod tests {
         assert_eq!(look_out.of_release(7, 0), 7 + 2 * PATIENCE_NS);
         assert!(!look_out.is_late(7 + 2 * PATIENCE_NS, 7));
         look_out.leave(CoreId(0));
-        assert_eq!(
-            look_out.of_worker(CoreId(1), 7),
-            7,
-            "the first one has work"
-        );
+        // The first one has work.
+        assert_eq!(look_out.of_worker(CoreId(1), 7), 7);
         look_out.leave(CoreId(1));
         assert_eq!(look_out.of_release(7, 0), 7);
         look_out.rest(CoreId(70));

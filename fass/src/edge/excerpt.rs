@@ -67,10 +67,10 @@ mod tests {
         assert_eq!(Excerpt::<4>::of("").to_string(), "");
         let cut = Excerpt::<4>::of("abcdef").to_string();
         assert_eq!(cut, "abcd ... and 2 more bytes");
+        // A character that does not fit is left out whole, and all behind it.
         assert_eq!(
             Excerpt::<4>::of("abc€d").to_string(),
-            "abc ... and 4 more bytes",
-            "a character that does not fit is left out whole, and all behind it"
+            "abc ... and 4 more bytes"
         );
         let parts = fmt::from_fn(|f| {
             f.write_str("abc")?;

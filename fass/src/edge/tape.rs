@@ -493,10 +493,8 @@ mod tests {
         );
         let noted = (0..100).filter(|run| lost.note(2 * run)).count();
         assert_eq!(noted, MOST_RUNS, "more are refused");
-        assert!(
-            lost.next_run(None).is_some() && lost.note(1000),
-            "one is gone"
-        );
+        // One is gone.
+        assert!(lost.next_run(None).is_some() && lost.note(1000));
     }
 
     #[test]

@@ -141,10 +141,8 @@ fn what_is_forgotten_or_not_recorded_counts_as_lost() {
     journal.record_events(true);
     run_all(&mut journal, 2..3);
     assert_eq!((journal.events().count(), journal.lost()), (5, 10));
-    assert!(
-        journal.statistics(&task_set, FINEST).is_none(),
-        "some were not counted"
-    );
+    // Some were not counted.
+    assert!(journal.statistics(&task_set, FINEST).is_none());
 }
 
 #[test]

@@ -135,10 +135,8 @@ fn the_order_of_reading_has_every_page() {
         let link = format!("({name})");
         assert!(index.contains(&link), "docs/README.md lacks {link}");
     }
-    assert!(
-        index.contains("(decisions/README.md)"),
-        "it lacks the decisions"
-    );
+    // It lacks the decisions.
+    assert!(index.contains("(decisions/README.md)"));
 }
 
 /// Returns the entries of the decisions' index: number and file.

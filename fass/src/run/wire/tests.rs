@@ -34,11 +34,8 @@ fn framed(framing: Framing, bytes: &[u8]) -> Vec<String> {
     if framing != Framing::Chunks {
         let at_once = WireInput::new(framing, 5, 16);
         at_once.arrive(bytes, 7);
-        assert_eq!(
-            packets(&mut at_once.taker().unwrap()),
-            all,
-            "the same, at once"
-        );
+        // The same, at once.
+        assert_eq!(packets(&mut at_once.taker().unwrap()), all);
     }
     all
 }

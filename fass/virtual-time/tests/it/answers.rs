@@ -100,11 +100,8 @@ fn a_demanded_proof_that_is_missing_refuses_the_commit() {
     let [late, busy] = late_and_busy();
     busy.demand_proof();
     let both = [late.clone(), busy];
-    assert_eq!(
-        codes(&both),
-        ["not_proven"],
-        "of `late` nothing is demanded"
-    );
+    // Of `late` nothing is demanded.
+    assert_eq!(codes(&both), ["not_proven"]);
     late.demand_proof();
     assert_eq!(codes(&both), ["not_proven"; 2]);
     // Other faults come before that question.

@@ -189,10 +189,8 @@ fn a_question_releases_the_dag_that_serves_it_and_that_time_counts() {
         ask.register(named("ask").wait(ms(4)));
         serves.name("serves").relative_deadline(ms(10));
         assert!(device.served_by(&serves.sporadic(ms(10))));
-        assert!(
-            !device.served_by(&serves.sporadic(ms(10))),
-            "one alone counts"
-        );
+        // One alone counts.
+        assert!(!device.served_by(&serves.sporadic(ms(10))));
         let mut is_first = delayed;
         let serve = move || {
             work(if std::mem::take(&mut is_first) { 5 } else { 3 });

@@ -299,21 +299,18 @@ mod tests {
         use OutputKind::{KernelLine, Line, Text};
         assert_eq!(sent(&[("{a\n", Text, true)]), " {a\n");
         assert_eq!(sent(&[("a", Text, true), ("{b\n", Text, true)]), "a{b\n");
-        assert_eq!(
-            sent(&[("a\n", Text, true), ("{", Text, false)]),
-            "a\n {",
-            "at the seam of two pieces"
-        );
+        // At the seam of two pieces.
+        assert_eq!(sent(&[("a\n", Text, true), ("{", Text, false)]), "a\n {");
         assert_eq!(sent(&[("{}\n", Line, true)]), "{}\n");
+        // A machine line begins in column 0.
         assert_eq!(
             sent(&[("a", Text, true), ("{}\n", KernelLine, true)]),
-            "a\n{}\n",
-            "a machine line begins in column 0"
+            "a\n{}\n"
         );
+        // The second piece of a line goes on in it.
         assert_eq!(
             sent(&[("{\"a\":", Line, true), ("{}}\n", Line, false)]),
-            "{\"a\":{}}\n",
-            "the second piece of a line goes on in it"
+            "{\"a\":{}}\n"
         );
     }
 
@@ -323,17 +320,13 @@ mod tests {
         assert!(buffer.append(b"0123456789abcde\n", OutputKind::Text, true));
         assert!(!buffer.append(b"x", OutputKind::Text, true));
         assert!(!buffer.append(b"{}\n", OutputKind::Line, true));
-        assert!(
-            buffer.append(b"{}\n", OutputKind::KernelLine, true),
-            "the reserve"
-        );
+        // The reserve.
+        assert!(buffer.append(b"{}\n", OutputKind::KernelLine, true));
         assert_eq!(emptied(&mut buffer), "0123456789abcde\n{}\n");
         assert!(buffer.is_empty() && buffer.pop().is_none());
         assert!(!buffer.append(b"0123456789abcdefg", OutputKind::Text, true));
-        assert!(
-            buffer.append(b"{123456789abcde", OutputKind::Text, true),
-            "and a blank"
-        );
+        // And a blank.
+        assert!(buffer.append(b"{123456789abcde", OutputKind::Text, true));
     }
 
     #[test]

@@ -332,10 +332,8 @@ mod tests {
         let mut patience = LinePatience::new();
         assert!(patience.ends(1_000, u64::MAX));
         assert!(!patience.ends(2_000, 3_000));
-        assert!(
-            patience.ends(3_000, 1_003_000),
-            "the gaps of a DAG of 1 kHz do"
-        );
+        // The gaps of a DAG of 1 kHz do.
+        assert!(patience.ends(3_000, 1_003_000));
         // Events without a gap, every 10 us.
         let waits = (0..).take_while(|step| {
             let now_ns = 5_000 + step * 10_000;

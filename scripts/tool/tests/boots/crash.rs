@@ -61,11 +61,8 @@ fn a_crash_leaves_what_shows_its_job_on_the_host() {
         .iter()
         .map(|channel| channel.role);
     let roles: Vec<Role> = roles.collect();
-    assert_eq!(
-        roles,
-        [Role::Source, Role::State, Role::State],
-        "no results"
-    );
+    // No results.
+    assert_eq!(roles, [Role::Source, Role::State, Role::State]);
     let values = (recording.entries()).filter(|entry| entry.what == EntryKind::Value);
     let jobs = |place| -> Vec<u64> {
         let of_place = values.clone().filter(|entry| entry.place == place);

@@ -130,10 +130,8 @@ fn resizing_in_place_takes_and_returns_the_memory_after() {
     assert!(heap.reallocate_in_place(first, 112), "the same size");
     assert!(!heap.reallocate_in_place(first, 113), "the next is used");
     heap.deallocate(second, 112, 8);
-    assert!(
-        !heap.reallocate_in_place(first, 241),
-        "the next is too small"
-    );
+    // The next is too small.
+    assert!(!heap.reallocate_in_place(first, 241));
     assert!(heap.reallocate_in_place(first, 200));
     assert_eq!(heap.validate().free_sizes, [32, WHOLE - 384]);
     assert!(heap.reallocate_in_place(first, 240), "no rest");

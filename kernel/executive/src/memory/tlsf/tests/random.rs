@@ -38,10 +38,8 @@ impl HeldBlock {
         let bytes = NonNull::slice_from_raw_parts(self.payload, size);
         // SAFETY: `fill` initialised these bytes, and no one writes them meanwhile.
         let bytes = unsafe { bytes.as_ref() };
-        assert!(
-            bytes.iter().all(|&byte| byte == self.pattern),
-            "overwritten"
-        );
+        // Overwritten.
+        assert!(bytes.iter().all(|&byte| byte == self.pattern));
     }
 }
 
@@ -137,10 +135,8 @@ impl CheckedHeap {
         let start = held.payload.addr().get();
         let end = start + held.size;
         if let Some((_, before)) = self.held.range(..=start).next_back() {
-            assert!(
-                before.payload.addr().get() + before.size <= start,
-                "overlap"
-            );
+            // Overlap.
+            assert!(before.payload.addr().get() + before.size <= start);
         }
         if let Some((&after, _)) = self.held.range(start..).next() {
             assert!(end <= after, "overlap");
