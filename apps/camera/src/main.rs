@@ -3,9 +3,6 @@
 #![no_std]
 #![no_main]
 
-extern crate alloc;
-
-use alloc::format;
 use core::sync::atomic::Ordering::Relaxed;
 
 use camera::{Conduct, Detection, build};
@@ -64,8 +61,5 @@ fn main(machine: &Machine) -> Result<(), AppError> {
             .number("refused", refused)
             .number("allocations", run.allocations());
     });
-    match run.violations().count() {
-        0 => Ok(()),
-        count => Err(AppError::Failure(format!("{count} violations"))),
-    }
+    AppError::of_violations(run.violations().count() as u64)
 }

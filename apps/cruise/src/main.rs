@@ -3,10 +3,6 @@
 #![no_std]
 #![no_main]
 
-extern crate alloc;
-
-use alloc::format;
-
 use cruise::{Releases, build};
 use fass::finish_create_dags;
 use fass::shared::Wire;
@@ -43,8 +39,5 @@ fn main(machine: &Machine) -> Result<(), AppError> {
         );
     }
     println!("{} allocations while jobs ran", run.allocations());
-    match run.violations().count() {
-        0 => Ok(()),
-        count => Err(AppError::Failure(format!("{count} violations"))),
-    }
+    AppError::of_violations(run.violations().count() as u64)
 }

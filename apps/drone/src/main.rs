@@ -3,9 +3,6 @@
 #![no_std]
 #![no_main]
 
-extern crate alloc;
-
-use alloc::format;
 use core::time::Duration;
 
 use drone::{Flight, Workload};
@@ -96,8 +93,5 @@ fn report(run: &Run, flight: &Flight) -> Result<(), AppError> {
             .number("violations", violations)
             .number("allocations", run.allocations());
     });
-    match violations {
-        0 => Ok(()),
-        count => Err(AppError::Failure(format!("{count} violations"))),
-    }
+    AppError::of_violations(violations)
 }

@@ -3,9 +3,6 @@
 #![no_std]
 #![no_main]
 
-extern crate alloc;
-
-use alloc::format;
 use core::time::Duration;
 
 use echo::{build, wire};
@@ -38,8 +35,5 @@ fn main(machine: &Machine) -> Result<(), AppError> {
         counts.misses,
         run.allocations()
     );
-    match run.violations().count() {
-        0 => Ok(()),
-        count => Err(AppError::Failure(format!("{count} violations"))),
-    }
+    AppError::of_violations(run.violations().count() as u64)
 }

@@ -81,10 +81,7 @@ fn report(run: &Run, walk: &Walk) -> Result<(), AppError> {
             .number("most_udeg", angles.iter().copied().max().unwrap_or(0))
             .number("digest", walk.digest());
     });
-    match violations {
-        0 => Ok(()),
-        count => Err(AppError::Failure(format!("{count} violations"))),
-    }
+    AppError::of_violations(violations)
 }
 
 /// Returns an angle in millionths of a degree.

@@ -58,6 +58,18 @@ pub enum AppError {
 }
 
 impl AppError {
+    /// Judges a run by how often it has violated the model's rules.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Failure`] if it has.
+    pub fn of_violations(count: u64) -> Result<(), Self> {
+        match count {
+            0 => Ok(()),
+            count => Err(Self::Failure(format!("{count} violations"))),
+        }
+    }
+
     /// Judges a run that a person has ended, and returns how its app ends. Whoever awaits that
     /// sees that it goes on.
     pub fn after_shutdown(run: &Run) -> Self {
