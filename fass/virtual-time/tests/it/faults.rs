@@ -1,17 +1,13 @@
 //! Panics that are contained: what is kept, reset and made anew. (Which jobs a fault costs, and
 //! when, the scenarios tell.)
 
-use crate::support::{Seen, every, job_numbers, ms, named, run, ticking, work};
+use crate::support::{Seen, every, job_numbers, ms, named, one_in, run, ticking, work};
 use fass::shared::Sample;
 use fass::{Dag, FaultLimit, Unique, create_dag, finish_create_dags};
 use virtual_time::VirtualTime;
 
 /// At most one fault within three jobs.
-const FAULT_LIMIT: FaultLimit = FaultLimit {
-    faults: 1,
-    window: 3,
-    in_all: 8,
-};
+const FAULT_LIMIT: FaultLimit = one_in(3, 8);
 
 /// A DAG that drops jobs, with a source that counts them.
 fn counting(jobs: u64) -> Dag {
@@ -58,10 +54,7 @@ fn each_fault_costs_one_job_and_makes_the_function_anew_for_what_waits() {
 fn a_fault_while_the_next_function_is_made_ends_the_dag() {
     let machine = VirtualTime::new().contain_panics();
     let dag = counting(12);
-    dag.survive_faults(FaultLimit {
-        window: 1,
-        ..FAULT_LIMIT
-    });
+    dag.survive_faults(one_in(1, 8));
     let mut made = 0;
     let make = move || {
         made += 1;

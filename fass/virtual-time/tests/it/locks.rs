@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use crate::support::{every, job_numbers, ms, named, taking, work};
+use crate::support::{every, job_numbers, ms, named, one_in, taking, work};
 use fass::shared::Lock;
-use fass::{Dag, FaultLimit, Preemption, finish_create_dags};
+use fass::{Dag, Preemption, finish_create_dags};
 use virtual_time::{Report, VirtualTime};
 
 /// A DAG of one subtask that takes 2 ms, in the cluster if one is given.
@@ -83,11 +83,7 @@ fn a_lock_without_a_longest_section_bars_the_proof_of_its_cluster_by_name() {
 fn faults(stated: &'static Lock<u32>, work: impl FnMut(u64) + Send + 'static) -> Report {
     let machine = VirtualTime::new().contain_panics();
     let (dag, mut work) = (every(10, "user"), work);
-    dag.jobs(4).survive_faults(FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: 8,
-    });
+    dag.jobs(4).survive_faults(one_in(1, 8));
     let source = dag.source(job_numbers(0));
     source.writes(&["job"]).register(named("source"));
     let call = move |(), (job,): (u64,)| work(job);

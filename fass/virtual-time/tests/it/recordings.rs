@@ -4,9 +4,9 @@
 
 use std::ops::AddAssign;
 
-use crate::support::{commit, every, job_numbers, ms, named, run, ticking};
+use crate::support::{commit, every, job_numbers, ms, named, one_in, run, ticking};
 use fass::shared::{Raiser, Sample, State};
-use fass::{Dag, FaultLimit, create_dag, finish_create_dags};
+use fass::{Dag, create_dag, finish_create_dags};
 use recording::{Entry, EntryKind, Recording, Role, Writer, to_bytes};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
@@ -202,11 +202,7 @@ fn a_job_that_a_survived_fault_has_cost_is_lost_in_the_replay_too() {
     let build = || {
         let dag = every(10, "demo");
         let make = || |(n,): (u64,)| assert!(n != 1, "one");
-        dag.jobs(3).record::<u64>("in").survive_faults(FaultLimit {
-            faults: 1,
-            window: 2,
-            in_all: 1,
-        });
+        dag.jobs(3).record::<u64>("in").survive_faults(one_in(2, 1));
         let source = dag.source(job_numbers(0)).writes(&["in"]);
         source.register(named("source"));
         let sink = dag.restarting(make).reads(&["in"]);

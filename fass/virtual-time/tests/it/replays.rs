@@ -7,12 +7,10 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
-use crate::support::{ms, named};
+use crate::support::{ms, named, one_in};
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::shared::{Raiser, Sample, Signal, Uses};
-use fass::{
-    Dag, FaultLimit, Occupation, OverrunPolicy, Policy, Preemption, create_dag, execute_for,
-};
+use fass::{Dag, Occupation, OverrunPolicy, Policy, Preemption, create_dag, execute_for};
 use random::{Random, nth};
 use recording::{Entry, EntryKind, Recording, Role};
 use virtual_time::{PanicRecord, Report, VirtualTime};
@@ -132,11 +130,7 @@ fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &
                     (value,)
                 }
             };
-            dag.survive_faults(FaultLimit {
-                faults: 1,
-                window: 1,
-                in_all: 40,
-            });
+            dag.survive_faults(one_in(1, 40));
             let subtask = dag.using(state).restarting(make).reads(&names[..1]);
             subtask.writes(&names[1..]).register(named(output));
         }

@@ -5,7 +5,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use fass::{
+    Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
+};
 use virtual_time::{Report, VirtualTime};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -24,6 +26,16 @@ pub(crate) fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
 
 pub(crate) fn work(time_ms: u64) {
     execute_for(ms(time_ms), Occupation::Spin);
+}
+
+/// One fault in so many jobs.
+pub(crate) const fn one_in(window: u64, in_all: u32) -> FaultLimit {
+    let faults = 1;
+    FaultLimit {
+        faults,
+        window,
+        in_all,
+    }
 }
 
 #[track_caller]
