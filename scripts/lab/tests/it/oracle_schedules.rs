@@ -8,6 +8,8 @@ use lab::oracle::schedules::{Case, Deviation, Scale, check, compare, compare_tur
 use lab::oracle::waiting::{self, WaitingCase};
 use virtual_time::VirtualTime;
 
+use crate::tests::{altered, assert_malformed, rows};
+
 const PUBLIC: &str = include_str!("../../../../tests/oracle/schedules.txt");
 const WITH_WAITS: &str = include_str!("../../../../tests/oracle/waiting.txt");
 const CLUSTERS: &str = include_str!("../../../../tests/oracle/clusters.txt");
@@ -26,23 +28,6 @@ j 0 0 0 5 5 1
 j 0 1 4 10 6 1
 end
 ";
-
-/// Splits a row of a table.
-fn split<const N: usize>(row: &str) -> [&str; N] {
-    let cells: Vec<&str> = row.split(" | ").collect();
-    cells.try_into().expect(row)
-}
-
-/// Makes sure that a case is refused with the line and the reason once a part is replaced.
-fn assert_malformed(case: &str, table: &str) {
-    for row in table.lines() {
-        let row = row.replace(r"\n", "\n");
-        let [from, to, line, reason] = split(&row);
-        let malformed = parse(&case.replacen(from, to, 1)).expect_err(to);
-        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
-        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
-    }
-}
 
 #[test]
 fn all_public_schedules_agree() {
@@ -125,10 +110,9 @@ j 0 1 4 10 6 1 | j 0 1 4 10 7 1 | dag 0 job 1: response: expected 7, found 6";
 
 #[test]
 fn the_first_difference_is_named() {
-    for row in WRONG.lines() {
-        let [from, to, difference] = split(row);
-        let cases = parse(&SMALL.replace(from, to)).expect("still well formed");
-        assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+    for [from, to, difference] in rows(WRONG) {
+        let cases = parse(&altered(SMALL, [&from, &to])).expect("still well formed");
+        assert_eq!(check(&cases[0]), Err(difference));
     }
 }
 
@@ -175,7 +159,7 @@ end\n |  | 12 | the file ends";
 
 #[test]
 fn malformed_files_are_refused_with_their_line() {
-    assert_malformed(SMALL, MALFORMED);
+    assert_malformed(parse, SMALL, MALFORMED);
     assert_eq!(parse("").expect_err("no case").line, 1);
 }
 
@@ -223,12 +207,11 @@ s 0 0 0 0 0 2 5 6\n |  | 12 | 1 `s` records";
 fn waits_agree_and_their_first_difference_is_named() {
     let checked = |text: &str| check(&parse(text).expect("well formed")[0]);
     assert_eq!(checked(WAITING), Ok(()));
-    for row in WAITS.lines() {
-        let [from, to, difference] = split(row);
-        let found = checked(&WAITING.replace(from, to));
-        assert_eq!(found, Err(difference.to_owned()), "{to}");
+    for [from, to, difference] in rows(WAITS) {
+        let found = checked(&altered(WAITING, [&from, &to]));
+        assert_eq!(found, Err(difference), "{to}");
     }
-    assert_malformed(WAITING, MALFORMED_WAITS);
+    assert_malformed(parse, WAITING, MALFORMED_WAITS);
 }
 
 #[test]
