@@ -135,7 +135,7 @@ fn the_order_of_reading_has_every_page() {
         let link = format!("({name})");
         assert!(index.contains(&link), "docs/README.md lacks {link}");
     }
-    // It lacks the decisions.
+    // Without the decisions.
     assert!(index.contains("(decisions/README.md)"));
 }
 
