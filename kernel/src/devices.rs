@@ -30,7 +30,7 @@ pub use executive::devices::lines::{DeviceLine, Line, LineError, tie};
 #[doc(inline)]
 pub use executive::devices::pci::{Function, PciError, Place};
 #[doc(inline)]
-pub use executive::devices::registers::{RangeError, Registers};
+pub use executive::devices::registers::Registers;
 
 /// Calls `each` with every PCI function of the machine.
 ///

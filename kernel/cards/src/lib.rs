@@ -28,8 +28,8 @@ use alloc::boxed::Box;
 use core::fmt;
 
 use executive::devices::dma::DmaMemory;
-use executive::devices::pci::{Function, Place};
-use executive::devices::registers::{RangeError, Registers};
+use executive::devices::pci::{Function, PciError, Place};
+use executive::devices::registers::Registers;
 use fass::platform::Buffer;
 use net::Mac;
 
@@ -89,7 +89,7 @@ pub struct CardError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// Its registers cannot be had.
-    Range(RangeError),
+    Range(PciError),
     /// There is none of this, which its driver needs.
     Lacks(&'static str),
 }
@@ -105,7 +105,7 @@ impl fmt::Display for CardError {
 }
 
 /// How a driver gets a range of its function's registers.
-type Map<'m> = &'m dyn Fn(u8) -> Result<Registers, RangeError>;
+type Map<'m> = &'m dyn Fn(u8) -> Result<Registers, PciError>;
 
 /// Opens a function if it is a card that is known, and allocates all that it will ever need.
 #[must_use]

@@ -5,7 +5,7 @@ use alloc::collections::{BTreeSet, VecDeque};
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::cell::RefCell;
-use executive::devices::pci::{Configuration, PciError, find};
+use executive::devices::pci::{Configuration, find};
 use random::Random;
 
 /// The configuration space of one function.
@@ -43,7 +43,7 @@ pub(crate) fn registers(length: u64) -> Registers {
 pub(crate) fn open(words: &Words, map: &dyn Fn(u8) -> Option<Registers>) -> Result<Card, String> {
     let mut card = None;
     find(words, &mut |function| {
-        let map = |bar| map(bar).ok_or(RangeError::Function(PciError::NoRange(bar)));
+        let map = |bar| map(bar).ok_or(PciError::NoRange(bar));
         card = open_by(&function, &map);
     });
     let card = card.unwrap().map_err(|error| error.to_string());

@@ -61,10 +61,7 @@ impl Client {
     pub const PORT: u16 = 68;
 
     /// All servers of the network.
-    pub const SERVERS: Peer = Peer {
-        ip: Ipv4Addr::BROADCAST,
-        port: 67,
-    };
+    pub const SERVERS: Peer = Peer::new(Ipv4Addr::BROADCAST, 67);
 
     /// Returns a client that looks for a server at once. `transaction` is any number that clients
     /// in the same network are unlikely to share.

@@ -148,14 +148,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
             address,
             neighbours: Neighbours::new(room),
             identification: 0,
-            counts: Counts {
-                frames: 0,
-                malformed: 0,
-                foreign: 0,
-                arps: 0,
-                echoes: 0,
-                datagrams: 0,
-            },
+            counts: Counts::default(),
         }
     }
 
@@ -236,10 +229,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
             ipv4::UDP if is_ours || is_for_all => {
                 let (from, port, payload) = udp::read(frame, &packet)?;
                 self.counts.datagrams += 1;
-                let from = Peer {
-                    ip: packet.from,
-                    port: from,
-                };
+                let from = Peer::new(packet.from, from);
                 return Some(Heard::Datagram(Datagram {
                     from,
                     port,
@@ -291,15 +281,16 @@ impl<B: AsMut<[u8]>> Interface<B> {
     ///
     /// Panics if the frame is shorter than its headers.
     pub fn address_datagram(&mut self, frame: &mut [u8], port: u16, to: Peer) -> Route {
-        let addresses = (self.address.ip, to.ip);
+        let (ip, to_port) = (*to.ip(), to.port());
+        let addresses = (self.address.ip, ip);
         let header = HEADERS - udp::LENGTH;
-        udp::write(&mut frame[header..], (port, to.port), addresses);
-        self.write_ipv4(frame, ipv4::UDP, to.ip);
-        if self.address.is_for_all(to.ip) {
+        udp::write(&mut frame[header..], (port, to_port), addresses);
+        self.write_ipv4(frame, ipv4::UDP, ip);
+        if self.address.is_for_all(ip) {
             self.write_ethernet(frame, Mac::BROADCAST, TYPE_IPV4);
             return Route::Ready;
         }
-        let hop = self.address.next_hop(to.ip);
+        let hop = self.address.next_hop(ip);
         let Some(hop) = hop.filter(|_| !self.address.ip.is_unspecified()) else {
             return Route::None;
         };

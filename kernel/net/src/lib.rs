@@ -17,8 +17,9 @@ mod ipv4;
 mod udp;
 
 use core::fmt;
-use core::net::Ipv4Addr;
 
+/// An address and a port: one end of a datagram's way.
+pub use core::net::SocketAddrV4 as Peer;
 pub use dhcp::{Client, Lease};
 pub use interface::{
     Address, Counts, Datagram, HEADERS, Heard, Interface, Kept, MOST_PAYLOAD, Route,
@@ -42,20 +43,5 @@ impl fmt::Display for Mac {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [a, b, c, d, e, g] = self.0;
         write!(f, "{a:02x}:{b:02x}:{c:02x}:{d:02x}:{e:02x}:{g:02x}")
-    }
-}
-
-/// An address and a port: one end of a datagram's way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Peer {
-    /// The address.
-    pub ip: Ipv4Addr,
-    /// The port.
-    pub port: u16,
-}
-
-impl fmt::Display for Peer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}", self.ip, self.port)
     }
 }

@@ -6,7 +6,7 @@ use fass::platform::SetOnce;
 
 use super::ecam;
 use super::pci::{Function, Message, PciError, Place};
-use super::registers::{RangeError, Registers};
+use super::registers::Registers;
 use crate::machine::interrupt::{self, Interrupted};
 use crate::machine::this_core::Core;
 use crate::machine::{clock, local_apic, this_core, vector};
@@ -28,7 +28,7 @@ static LINES: [SetOnce<&'static dyn DeviceLine>; vector::DEVICES as usize] =
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineError {
     /// The function has no such message.
-    Range(RangeError),
+    Function(PciError),
     /// All lines are taken.
     NoLine,
     /// There is no core with this number.
@@ -40,7 +40,7 @@ pub enum LineError {
 impl core::fmt::Display for LineError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Range(error) => error.fmt(f),
+            Self::Function(error) => error.fmt(f),
             Self::NoLine => write!(
                 f,
                 "finds all {} lines of devices taken; use fewer devices",
@@ -107,10 +107,9 @@ pub fn tie(
         vector,
         entry: None,
     };
-    let function_error = |error| LineError::Range(RangeError::Function(error));
     let entry = function.send(number, line.message(core)?);
-    if let Some(entry) = entry.map_err(function_error)? {
-        let table = Registers::in_bar(function, entry.bar).map_err(LineError::Range)?;
+    if let Some(entry) = entry.map_err(LineError::Function)? {
+        let table = Registers::in_bar(function, entry.bar).map_err(LineError::Function)?;
         line.entry = Some((table, entry.offset));
         line.route(core)?;
     }
@@ -175,8 +174,7 @@ impl Line {
             let function = function.and_then(|space| Function::at(space, self.place));
             let sent = function.ok_or(PciError::NoMessages);
             let sent = sent.and_then(|function| function.send(self.number, message));
-            let line_error = |error| LineError::Range(RangeError::Function(error));
-            return sent.map(drop).map_err(line_error);
+            return sent.map(drop).map_err(LineError::Function);
         };
         // Masked while its parts do not fit each other.
         table.write32(offset + 12, 1);

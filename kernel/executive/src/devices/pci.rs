@@ -59,6 +59,10 @@ pub enum PciError {
     NoRange(u8),
     /// A range's size or place cannot be.
     MalformedRange(u8),
+    /// There is memory, or something else, where a range is.
+    Taken(u8),
+    /// The function may reach memory: it has a driver, or the firmware has left it so.
+    Driven,
     /// It sends no messages, neither by MSI-X nor by MSI, or not so many.
     NoMessages,
     /// Its table of messages is not within its range, or is too short.
@@ -73,6 +77,13 @@ impl core::fmt::Display for PciError {
                 "has no registers in memory at BAR {bar}; boot it by a firmware that places them"
             ),
             Self::MalformedRange(bar) => write!(f, "states a range that cannot be at BAR {bar}"),
+            Self::Taken(bar) => write!(
+                f,
+                "has BAR {bar} where memory or another device is; update the firmware"
+            ),
+            Self::Driven => f.write_str(
+                "may reach memory already: use it by its driver, or stop it by `Function::enable`",
+            ),
             Self::NoMessages => {
                 f.write_str("has no MSI-X or MSI of that number; use a device that has")
             }

@@ -15,32 +15,6 @@ pub struct Registers {
     length: u64,
 }
 
-/// Why a range cannot be had.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RangeError {
-    /// The function has none such.
-    Function(PciError),
-    /// There is memory, or something else, at its addresses.
-    Taken(u8),
-    /// The function may reach memory: it has a driver, or the firmware has left it so.
-    Driven,
-}
-
-impl core::fmt::Display for RangeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Function(error) => error.fmt(f),
-            Self::Driven => f.write_str(
-                "may reach memory already: use it by its driver, or stop it by `Function::enable`",
-            ),
-            Self::Taken(bar) => write!(
-                f,
-                "has BAR {bar} where memory or another device is; update the firmware"
-            ),
-        }
-    }
-}
-
 macro_rules! access {
     ($read:ident, $write:ident, $kind:ty) => {
         /// Reads a register.
@@ -79,18 +53,17 @@ impl Registers {
     ///
     /// # Errors
     ///
-    /// [`RangeError`].
-    pub fn of(function: &Function<'_>, bar: u8) -> Result<Self, RangeError> {
+    /// [`PciError`].
+    pub fn of(function: &Function<'_>, bar: u8) -> Result<Self, PciError> {
         match function.reaches() {
-            true => Err(RangeError::Driven),
+            true => Err(PciError::Driven),
             false => Self::in_bar(function, bar),
         }
     }
 
     /// Maps a range of a function, whatever that may reach.
-    pub(super) fn in_bar(function: &Function<'_>, bar: u8) -> Result<Self, RangeError> {
-        let range = function.range(bar).map_err(RangeError::Function)?;
-        Self::map(range).ok_or(RangeError::Taken(bar))
+    pub(super) fn in_bar(function: &Function<'_>, bar: u8) -> Result<Self, PciError> {
+        Self::map(function.range(bar)?).ok_or(PciError::Taken(bar))
     }
 
     /// Makes registers of memory, for a fake device.

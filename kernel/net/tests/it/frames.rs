@@ -22,7 +22,7 @@ pub(super) fn interface() -> Interface<Vec<u8>> {
 }
 
 fn peer(ip: Ipv4Addr, port: u16) -> Peer {
-    Peer { ip, port }
+    Peer::new(ip, port)
 }
 
 /// Returns a frame with a datagram, and the way it goes.

@@ -20,27 +20,22 @@ const FIRST_OWN_PORT: u16 = 49_152;
 
 /// An endpoint in the machine's network, which its first one drives.
 struct UdpEndpoint {
-    network: &'static Network,
+    /// The network, for its first endpoint.
+    first: Option<&'static Network>,
     wire: &'static UdpWire,
-    is_first: bool,
 }
 
 /// Opens the network for the wire, if its word says so.
 pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
-    if !matches!(
-        words.word,
-        Some(EndpointWord::Port(_) | EndpointWord::Peer(_))
-    ) {
-        return Ok(None);
-    }
+    let (port, peer) = match words.word {
+        Some(EndpointWord::Peer(peer)) => (None, Some(peer)),
+        Some(EndpointWord::Port(port)) => (Some(port), None),
+        _ => return Ok(None),
+    };
     let network = network::open(wire, words.options)?;
     let count = network.wires.iter().count();
     let own = FIRST_OWN_PORT.saturating_add(u16::try_from(count).unwrap_or(u16::MAX));
-    let (port, peer) = match words.word {
-        Some(EndpointWord::Peer(peer)) => (own, Some(peer)),
-        Some(EndpointWord::Port(port)) => (port, None),
-        _ => (own, None),
-    };
+    let port = port.unwrap_or(own);
     if let Some(other) = network.wires.iter().find(|other| other.port == port) {
         let other = other.end.wire().name();
         let line = format!("has port {port} of wire `{other}`; give each one its own");
@@ -51,39 +46,33 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
     end.set_link(false);
     network.wires.add(UdpWire::new(end, port, peer));
     let wire = network.wires.iter().last();
-    let is_first = count == 0;
-    Ok(wire.map(|wire| -> Box<dyn Endpoint> {
-        Box::new(UdpEndpoint {
-            network,
-            wire,
-            is_first,
-        })
-    }))
+    let first = (count == 0).then_some(network);
+    Ok(wire.map(|wire| -> Box<dyn Endpoint> { Box::new(UdpEndpoint { first, wire }) }))
 }
 
 impl Endpoint for UdpEndpoint {
     fn begin_run(&self, _now_ns: u64) {
-        if self.is_first {
+        if let Some(network) = self.first {
             let dag = self.wire.end.released();
-            self.network.begin_run(dag.map(|(_, dag)| dag));
+            network.begin_run(dag.map(|(_, dag)| dag));
         }
     }
 
     fn beat(&self, core: &Core, now_ns: u64) {
-        if self.is_first {
-            self.network.beat(core, now_ns);
+        if let Some(network) = self.first {
+            network.beat(core, now_ns);
         }
     }
 
     fn end_run(&self) {
-        if self.is_first {
-            self.network.end_run();
+        if let Some(network) = self.first {
+            network.end_run();
         }
     }
 
     fn tell(&self) {
-        if self.is_first {
-            self.network.tell();
+        if let Some(network) = self.first {
+            network.tell();
         }
     }
 

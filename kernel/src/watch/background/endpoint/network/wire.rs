@@ -1,6 +1,6 @@
 //! A wire's place in the network: its port, and whom it exchanges datagrams with.
 
-use core::net::{Ipv4Addr, SocketAddrV4};
+use core::net::Ipv4Addr;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use executive::run::execution;
@@ -12,7 +12,7 @@ use net::{HEADERS, Peer};
 pub(in super::super) struct UdpWire {
     pub(in super::super) end: DeviceEnd,
     pub(in super::super) port: u16,
-    peer: Option<SocketAddrV4>,
+    peer: Option<Peer>,
     /// The peer that has sent last: its address and port, or 0.
     last: AtomicU64,
     /// Whether a packet has come that is not announced, or one has gone that is not told.
@@ -29,7 +29,7 @@ pub(super) enum Sent {
 }
 
 impl UdpWire {
-    pub(in super::super) fn new(end: DeviceEnd, port: u16, peer: Option<SocketAddrV4>) -> Self {
+    pub(in super::super) fn new(end: DeviceEnd, port: u16, peer: Option<Peer>) -> Self {
         Self {
             end,
             port,
@@ -42,15 +42,13 @@ impl UdpWire {
 
     /// Reports whether a datagram to this port is the wire's.
     pub(super) fn hears(&self, port: u16, from: Peer) -> bool {
-        let is_peer = |peer: SocketAddrV4| (*peer.ip(), peer.port()) == (from.ip, from.port);
-        port == self.port && self.peer.is_none_or(is_peer)
+        port == self.port && self.peer.is_none_or(|peer| peer == from)
     }
 
     /// Takes a datagram, whose payload is the buffer's content.
     pub(super) fn take(&self, payload: &mut Buffer, from: Peer, now_ns: u64) {
-        let bits = u64::from(from.ip.to_bits()) << 16 | u64::from(from.port);
+        let bits = u64::from(from.ip().to_bits()) << 16 | u64::from(from.port());
         self.last.store(bits, Ordering::Relaxed);
-        let from = SocketAddrV4::new(from.ip, from.port);
         if self.end.swap_in(payload, from, now_ns) {
             self.has_come.store(true, Ordering::Relaxed);
         }
@@ -63,10 +61,6 @@ impl UdpWire {
             let Some(to) = to.or(self.peer).or_else(|| self.last()) else {
                 // Nobody has sent anything yet, so there is nobody whom it could be for.
                 return true;
-            };
-            let to = Peer {
-                ip: *to.ip(),
-                port: to.port(),
             };
             let payload = packet.range();
             packet.set_range(payload.start - HEADERS..payload.end);
@@ -84,11 +78,11 @@ impl UdpWire {
         has_gone
     }
 
-    fn last(&self) -> Option<SocketAddrV4> {
+    fn last(&self) -> Option<Peer> {
         let bits = self.last.load(Ordering::Relaxed);
         let [.., a, b, c, d, high, low] = bits.to_be_bytes();
         let ip = Ipv4Addr::new(a, b, c, d);
-        (bits > 0).then(|| SocketAddrV4::new(ip, u16::from_be_bytes([high, low])))
+        (bits > 0).then(|| Peer::new(ip, u16::from_be_bytes([high, low])))
     }
 
     /// Tells the app's functions of what has come. In the card's interrupt, as it may release a DAG.
