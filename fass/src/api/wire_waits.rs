@@ -19,6 +19,7 @@
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use recording::Recordable;
 
@@ -109,13 +110,20 @@ impl Wire {
     }
 }
 
-/// Makes what the place where bytes arrive, or depart, does when the wait for them may end. There is
-/// one such place, so the driver is free.
+/// Makes what the place where bytes arrive, or depart, does when the wait for them may end. Of several
+/// cores that do so at once the first one does for all.
 fn telling<A: Send + Sync + 'static>(driver: DeviceDriver<(), A>) -> Box<dyn Fn() + Send + Sync> {
-    let driver = SharedCell::new(driver);
+    let (driver, asked) = (SharedCell::new(driver), AtomicU32::new(0));
     Box::new(move || {
-        if let Some(mut driver) = driver.change() {
-            driver.tell();
+        let mut seen = 1;
+        if asked.fetch_add(seen, Ordering::AcqRel) > 0 {
+            return;
+        }
+        while seen > 0 {
+            if let Some(mut driver) = driver.change() {
+                driver.tell();
+            }
+            seen = asked.fetch_sub(seen, Ordering::AcqRel) - seen;
         }
     })
 }

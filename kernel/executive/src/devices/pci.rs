@@ -322,7 +322,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::devices::registers::{RangeError, Registers};
+    use crate::devices::registers::Registers;
 
     /// The words of a function, and the sizes of its ranges, whose bits below stay 0.
     type Words = ([u32; 64], [u32; 6]);
@@ -463,7 +463,7 @@ mod tests {
         let words = [(1, command::MASTER), (4, 0xfebf_1000)];
         let fake = Fake::default().with(8, &words, [4096; 6]);
         let given = Registers::of(&fake.first(), 0);
-        assert_eq!(given.err(), Some(RangeError::Driven));
+        assert_eq!(given.err(), Some(PciError::Driven));
         fake.first().enable();
         assert!(!fake.first().reaches());
     }

@@ -40,7 +40,7 @@ pub(super) fn take_port(wire: &Wire) -> Result<(), UsageError> {
     if !SECOND.is_there() {
         return Err(UsageError::new(format!(
             "wire `{name}` has no device, as there is no second serial port; give --input FILE \
-             or --output FILE"
+             or --output FILE, or a network by --net and `wire.{name}=udp://:PORT`"
         )));
     }
     match IS_TAKEN.swap(true, Ordering::Relaxed) {

@@ -13,8 +13,9 @@
 //!
 //! # Locks
 //!
-//! The card's two halves have a lock each, so a core that sends waits for one frame to be heard at
-//! most. Neither is held where functions are told: a wait that ends needs the scheduler's.
+//! The card's two halves have a lock each. That of the sending half is held for a frame that is heard
+//! or a packet that is sent, not longer. Neither is held where functions are told: a wait that ends
+//! needs the scheduler's.
 
 mod wire;
 
@@ -65,7 +66,7 @@ impl Law {
     fn charged(options: &CommandLine<'static>) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
         // Not beyond a heartbeat, which sends as well.
-        let distance_us = options.number("net_us", 10..=1_000, 140)?;
+        let distance_us = options.number("net_us", 10..=1_000, 150)?;
         let mut overheads = KERNEL.terms().overheads;
         let is_stated = overheads.device_ns > 0;
         if !is_stated {
@@ -110,7 +111,7 @@ impl Law {
 /// frame of the longest ones, of a packet that is sent, and of the interrupt by which a core sends.
 const RELEASE_NS: u64 = 2_600;
 const WIRE_NS: u64 = 2_300;
-const FRAME_NS: u64 = 1_500;
+const FRAME_NS: u64 = 1_700;
 const SENT_NS: u64 = 1_300;
 const BELL_NS: u64 = 400;
 
@@ -296,8 +297,9 @@ impl Network {
 
     /// Takes the frames of an interrupt, and masks the card until the next one.
     fn receive(&self, now_ns: u64) {
-        // One that was on its way when the card was masked.
-        if self.unmask_ns.load(Ordering::Relaxed) != u64::MAX {
+        // One that was on its way when the card was masked, or the run ended.
+        let is_masked = self.unmask_ns.load(Ordering::Relaxed) != u64::MAX;
+        if is_masked || !self.is_run.load(Ordering::Relaxed) {
             return;
         }
         let until_ns = now_ns.saturating_add(self.law.distance_ns);
@@ -368,20 +370,20 @@ impl Network {
     }
 
     /// Sends what is to go, so many packets at most. Reports whether something has gone.
-    fn send(&self, most: u64) -> bool {
-        let mut sender = self.sender.lock();
+    pub(super) fn send(&self, most: u64) -> bool {
         let mut left = most;
         for wire in self.wires.iter() {
-            while left > 0 && wire.send(|packet, port, to| sender.send(packet, port, to)) {
+            let send = || {
+                let mut sender = self.sender.lock();
+                wire.send(|packet, port, to| sender.send(packet, port, to))
+            };
+            while left > 0 && wire.end.has_bytes_to_go() && send() {
                 left -= 1;
             }
         }
         let has_gone = left < most;
         if has_gone {
-            sender.transmitter.ring();
-        }
-        drop(sender);
-        if has_gone {
+            self.sender.lock().transmitter.ring();
             self.wires.iter().for_each(UdpWire::tell_gone);
         }
         has_gone
@@ -562,10 +564,7 @@ mod tests {
         };
         let has_gone = |sender: &mut NetworkSender, ip: [u8; 4]| {
             let mut packet = Buffer::from(&[0; net::HEADERS + 1][..]);
-            let peer = Peer {
-                ip: ip.into(),
-                port: 7,
-            };
+            let peer = Peer::new(ip.into(), 7);
             matches!(sender.send(&mut packet, 5000, peer), Sent::Gone)
         };
         assert!(!has_gone(&mut sender, [1, 2, 3, 4]));
