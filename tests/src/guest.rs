@@ -141,7 +141,6 @@ impl Guest {
     }
 
     /// Puts a card of that name in a network, given by QEMU's words. It is in a q35.
-    #[must_use]
     pub fn network(mut self, card: &'static str, words: &str) -> Guest {
         self.qemu.network = Some(Network {
             words: words.into(),

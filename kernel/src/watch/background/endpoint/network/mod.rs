@@ -400,13 +400,9 @@ impl Network {
         let has_asked = sender.ask_server(now_ns);
         let has_address = !sender.interface.address().ip.is_unspecified();
         drop(sender);
-        if self
-            .is_linked
-            .swap(is_linked && has_address, Ordering::Relaxed)
-            != (is_linked && has_address)
-        {
-            let wires = self.wires.iter();
-            wires.for_each(|wire| wire.end.set_link(is_linked && has_address));
+        let is_up = is_linked && has_address;
+        if self.is_linked.swap(is_up, Ordering::Relaxed) != is_up {
+            self.wires.iter().for_each(|wire| wire.end.set_link(is_up));
         }
         // What found no room, or no address, and what was more than a bell sends.
         if !has_asked {
@@ -453,20 +449,16 @@ impl Network {
 impl NetworkSender {
     /// Sends a packet, which has room for its headers in front.
     fn send(&mut self, packet: &mut Buffer, port: u16, to: Peer) -> Sent {
-        match self
-            .interface
-            .address_datagram(packet.content_mut(), port, to)
-        {
+        let interface = &mut self.interface;
+        match interface.address_datagram(packet.content_mut(), port, to) {
             Route::Ready if self.transmitter.send(packet) => Sent::Gone,
             // It has no way, and would keep those behind it.
-            Route::None if !self.interface.address().ip.is_unspecified() => Sent::Gone,
+            Route::None if !interface.address().ip.is_unspecified() => Sent::Gone,
             Route::Ready | Route::None => Sent::Waits,
             Route::Unresolved(neighbour) => {
-                self.interface.keep(neighbour, packet);
+                interface.keep(neighbour, packet);
                 let start = Buffer::HEADROOM;
-                let length = self
-                    .interface
-                    .question(&mut self.own.whole()[start..], neighbour);
+                let length = interface.question(&mut self.own.whole()[start..], neighbour);
                 self.own.set_range(start..start + length);
                 let _ = self.transmitter.send(&mut self.own);
                 Sent::Gone
@@ -484,11 +476,8 @@ impl NetworkSender {
 
     /// Sends the message to the server of addresses that is due, and reports whether one was.
     fn ask_server(&mut self, now_ns: u64) -> bool {
-        let Some(client) = self
-            .dhcp
-            .as_mut()
-            .filter(|client| client.due_ns() <= now_ns)
-        else {
+        let client = self.dhcp.as_mut();
+        let Some(client) = client.filter(|client| client.due_ns() <= now_ns) else {
             return false;
         };
         let start = Buffer::HEADROOM;
