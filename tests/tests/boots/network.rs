@@ -24,7 +24,7 @@ const E1000E: &str = "e1000e,romfile=";
 const MOST: usize = 1472;
 
 /// The longest interrupt that is charged, of those parts that its driver sees.
-const LONGEST_NS: u64 = 6_700;
+const LONGEST_NS: u64 = 8_300;
 
 /// How long a peer asks for what must come.
 const LIMIT: Duration = Duration::from_secs(120);

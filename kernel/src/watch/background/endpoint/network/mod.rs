@@ -66,7 +66,7 @@ impl Law {
     fn charged(options: &CommandLine<'static>) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
         // Not beyond a heartbeat, which sends as well.
-        let distance_us = options.number("net_us", 10..=1_000, 150)?;
+        let distance_us = options.number("net_us", 10..=1_000, 170)?;
         let mut overheads = KERNEL.terms().overheads;
         let is_stated = overheads.device_ns > 0;
         if !is_stated {
@@ -109,7 +109,7 @@ impl Law {
 
 /// The times of an interrupt of the card without its frames, of the release by another wire, of a
 /// frame of the longest ones, of a packet that is sent, and of the interrupt by which a core sends.
-const RELEASE_NS: u64 = 2_600;
+const RELEASE_NS: u64 = 3_600;
 const WIRE_NS: u64 = 2_300;
 const FRAME_NS: u64 = 1_700;
 const SENT_NS: u64 = 1_300;
