@@ -306,8 +306,7 @@ impl<Q, A> DeviceCell<Q, A> {
         }
     }
 
-    /// Panics where this is no turn of the subtask that asks: a question of another one, which was
-    /// passed the handle, would go out with a wait of this one's.
+    /// Panics where this is no turn of the subtask that asks: its question would wait in another's.
     fn check_turn(&self, context: &Context<'_>) {
         let turn = turn_of(context.waker()).map_or(0, TurnState::address);
         if turn != self.turn.load(Ordering::Relaxed) {
