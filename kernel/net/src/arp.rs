@@ -110,6 +110,11 @@ impl<B> Neighbours<B> {
         known.mac
     }
 
+    /// Forgets all Ethernet addresses, so that each neighbour is asked anew.
+    pub(crate) fn forget(&mut self) {
+        self.table.iter_mut().for_each(|known| known.mac = None);
+    }
+
     /// Keeps a frame until its neighbour has answered, by swapping it for the one that was kept
     /// before.
     pub(crate) fn keep(&mut self, ip: Ipv4Addr, frame: &mut B) {

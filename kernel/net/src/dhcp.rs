@@ -159,7 +159,7 @@ impl Client {
     /// Takes a message, and returns whether [`Client::lease`] has changed. A message that is
     /// malformed, or not for this client, changes nothing.
     pub fn take(&mut self, payload: &[u8], now_ns: u64) -> bool {
-        let Some((kind, lease)) = self.read(payload) else {
+        let Some((kind, server, lease)) = self.read(payload) else {
             return false;
         };
         match (self.state, kind, lease) {
@@ -180,7 +180,10 @@ impl Client {
                 self.enter(State::Bound { lease, end_ns }, renewal_ns);
                 before != Some(lease)
             }
-            (State::Requesting(_) | State::Bound { .. }, NAK, _) => {
+            // Not of anyone: who can send might else have this client ask without an end.
+            (State::Requesting(asked) | State::Bound { lease: asked, .. }, NAK, _)
+                if server == Some(asked.server) =>
+            {
                 let had = self.lease().is_some();
                 self.begin(now_ns);
                 had
@@ -189,8 +192,9 @@ impl Client {
         }
     }
 
-    /// Reads the kind of an answer to this client, and the lease in it if there is a whole one.
-    fn read(&self, message: &[u8]) -> Option<(u8, Option<Lease>)> {
+    /// Reads the kind of an answer to this client, its server, and the lease in it if there is a
+    /// whole one.
+    fn read(&self, message: &[u8]) -> Option<(u8, Option<Ipv4Addr>, Option<Lease>)> {
         let is_ours = array(message, 0)? == [2, 1, 6]
             && u32_at(message, 4)? == self.transaction
             && array(message, 28)? == self.mac.0
@@ -239,6 +243,6 @@ impl Client {
                 seconds,
             })
         };
-        Some((kind?, lease()))
+        Some((kind?, server, lease()))
     }
 }

@@ -299,6 +299,11 @@ impl<B: AsMut<[u8]>> Interface<B> {
         mac.map_or(Route::Unresolved(hop), |_| Route::Ready)
     }
 
+    /// Forgets the neighbours, which may be others behind a link that was down.
+    pub fn forget_neighbours(&mut self) {
+        self.neighbours.forget();
+    }
+
     /// Keeps a frame until its neighbour has answered, by swapping it for the one that was kept
     /// before: one is kept for each neighbour.
     pub fn keep(&mut self, neighbour: Ipv4Addr, frame: &mut B) {

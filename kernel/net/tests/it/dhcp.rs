@@ -110,6 +110,9 @@ fn a_silent_server_is_asked_ever_more_seldom() {
 fn an_offer_that_is_taken_back_is_given_up() {
     let mut client = bound(100);
     let (_, request) = sent(&mut client, 51 * S).unwrap();
+    let mut of_another = answer(&request, 6, 100);
+    of_another[250] ^= 1;
+    assert!(!client.take(&of_another, 51 * S), "it is another's word");
     assert!(
         client.take(&answer(&request, 6, 100), 51 * S),
         "the address is lost"

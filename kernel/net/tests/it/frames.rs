@@ -107,6 +107,9 @@ fn a_datagram_waits_for_its_neighbour_and_arrives_whole() {
         // Now both know each other, and a wrong bit anywhere behind the addresses is noticed.
         let (frame, route) = datagram(&mut there, peer(IP, 5000), &payload);
         assert_eq!(route, Route::Ready);
+        here.forget_neighbours();
+        let asks_anew = datagram(&mut here, peer(THERE, 7), &payload).1;
+        assert_eq!(asks_anew, Route::Unresolved(THERE));
         for at in ipv4_and_later(&frame) {
             let mut wrong = frame.clone();
             wrong[at] ^= 0x10;

@@ -10,7 +10,7 @@ use alloc::format;
 use executive::machine::this_core::Core;
 use fass::shared::{DeviceEnd, Wire};
 use front::app::endpoint::EndpointWord;
-use net::MOST_PAYLOAD;
+use net::{Client, MOST_PAYLOAD};
 
 use super::network::{self, Network, UdpWire};
 use super::{Endpoint, EndpointWords, Opened, end_of, failure};
@@ -40,6 +40,10 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
         let other = other.end.wire().name();
         let line = format!("has port {port} of wire `{other}`; give each one its own");
         return Err(failure(wire, &line));
+    }
+    if port == Client::PORT {
+        let line = "has the port at which the network asks for its address; give another than 68";
+        return Err(failure(wire, line));
     }
     let end = end_of(wire)?;
     end.begin_packets(MOST_PAYLOAD, network::ring);

@@ -402,6 +402,7 @@ impl Network {
         drop(sender);
         let is_up = is_linked && has_address;
         if self.is_linked.swap(is_up, Ordering::Relaxed) != is_up {
+            self.sender.lock().interface.forget_neighbours();
             self.wires.iter().for_each(|wire| wire.end.set_link(is_up));
         }
         // What found no room, or no address, and what was more than a bell sends.
