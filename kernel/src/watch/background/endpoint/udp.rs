@@ -68,6 +68,11 @@ impl Endpoint for UdpEndpoint {
         }
     }
 
+    fn step(&self) -> bool {
+        // What was more than a completion sends.
+        self.first.is_some_and(|network| network.send(1))
+    }
+
     fn end_run(&self) {
         if let Some(network) = self.first {
             network.end_run();
