@@ -63,6 +63,7 @@
 
 pub mod at_edge;
 pub(crate) mod clock;
+mod protocol;
 mod run_config;
 
 use alloc::string::String;
@@ -80,6 +81,7 @@ use crate::run::line::RecordedValue;
 use crate::run::log::{Field, Level, LogLine};
 
 pub use clock::Clock;
+pub use protocol::Protocol;
 pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::{Request, WaitLimit};
 
