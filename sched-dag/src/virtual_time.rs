@@ -113,7 +113,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
     ) -> Self {
         type Any<'a> = VirtualInstant<'a, ExecutionTimes<fn(Instance) -> u64>>;
         let none = task_set.clusters().map(|_| None).collect();
-        let no_journal = |_| Journal::none();
+        let no_journal = |_| Journal::default();
         let engines =
             Engine::of_clusters::<Any<'_>>(task_set, options, none, after_fault, no_journal);
         let clusters = engines.map(|engine| ClusterRun {
@@ -354,37 +354,27 @@ pub trait Workload<B = Instance> {
     /// Reports whether an instance fails, instead of finishing, when its
     /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
     /// instance, at its end, and where it would begin to wait.
-    fn fails(&mut self, instance: Instance) -> bool {
-        let _ = instance;
+    fn fails(&mut self, _instance: Instance) -> bool {
         false
     }
 
     /// Reports whether the function of an instance that fails could be replaced, if its body says
     /// so as well. Called once for each, right before the scheduler is told.
-    fn is_replaceable(&mut self, instance: Instance) -> bool {
-        let _ = instance;
+    fn is_replaceable(&mut self, _instance: Instance) -> bool {
         true
     }
 
     /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
-    fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
-        let _ = (instance, fault);
-    }
+    fn ended(&mut self, _instance: Instance, _fault: Option<FaultCost>) {}
 
     /// An instance has begun a wait, whose answer may be a [`Request::Answer`] from now on.
-    fn waits(&mut self, wait: WaitId, now_ns: u64) {
-        let _ = (wait, now_ns);
-    }
+    fn waits(&mut self, _wait: WaitId, _now_ns: u64) {}
 
     /// A job is released, skipped or completed, or a DAG ended.
-    fn hear(&mut self, notice: &DriverNotice) {
-        let _ = notice;
-    }
+    fn hear(&mut self, _notice: &DriverNotice) {}
 
     /// Takes a request that has come now, by a completion or a fault.
-    fn request(&mut self, request: Request, now_ns: u64) {
-        let _ = (request, now_ns);
-    }
+    fn request(&mut self, _request: Request, _now_ns: u64) {}
 
     /// Returns when the next request comes. Asked again at every instant.
     fn next_request_ns(&self) -> Option<u64> {
@@ -392,15 +382,13 @@ pub trait Workload<B = Instance> {
     }
 
     /// Returns the next request that has come by now, and forgets it.
-    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
-        let _ = now_ns;
+    fn take_request(&mut self, _now_ns: u64) -> Option<Request> {
         None
     }
 
     /// Returns how late the timer's interrupt is that is due then; what comes before it at the
     /// scheduler does what is due. Asked several times for one interrupt.
-    fn late_ns(&self, due_ns: u64) -> u64 {
-        let _ = due_ns;
+    fn late_ns(&self, _due_ns: u64) -> u64 {
         0
     }
 

@@ -40,7 +40,7 @@ use crate::file::File;
 const LIMIT: Duration = Duration::from_secs(600);
 
 /// A guest that a test describes and boots.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 #[must_use = "a guest does nothing until it boots"]
 pub struct Guest {
     package: String,
@@ -61,12 +61,8 @@ impl Guest {
     pub fn new(package: &str) -> Guest {
         Guest {
             package: package.into(),
-            image: None,
-            qemu: Qemu::default(),
-            altered: None,
-            words: Vec::new(),
             limit: LIMIT,
-            conversation: Vec::new(),
+            ..Guest::default()
         }
     }
 

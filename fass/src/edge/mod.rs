@@ -111,20 +111,16 @@ pub trait Crossing: Send {
 
     /// Takes note that an instance has failed, and what it had sampled: `at_ns` on the time of
     /// the run, `clock_ns` on that of [`crate::now_ns`].
-    fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
-        let _ = (instance, at_ns, clock_ns);
-    }
+    fn failed(&mut self, _instance: Instance, _at_ns: u64, _clock_ns: u64) {}
 
     /// Returns the time for an instance that asks for it, `clock_ns` on the clock of
     /// [`crate::now_ns`] and `at_ns` on the time of the run.
-    fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
-        let _ = (instance, at_ns);
+    fn tell_time(&mut self, _instance: Instance, clock_ns: u64, _at_ns: u64) -> u64 {
         clock_ns
     }
 
     /// Returns the recorded value of a channel and a job, if there is one.
-    fn find(&self, channel: u16, job: u64) -> Option<&'static [u8]> {
-        let _ = (channel, job);
+    fn find(&self, _channel: u16, _job: u64) -> Option<&'static [u8]> {
         None
     }
 
@@ -133,8 +129,7 @@ pub trait Crossing: Send {
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
     /// Returns the findings of a replay; if the run is over, also a value that it has not computed.
-    fn outcome(&self, is_over: bool) -> Option<ReplayOutcome> {
-        let _ = is_over;
+    fn outcome(&self, _is_over: bool) -> Option<ReplayOutcome> {
         None
     }
 }
@@ -202,9 +197,7 @@ pub trait Drain: Send {
     fn send_header(&mut self, to: &mut Record);
 
     /// Takes when the time of the run begins, on the clock of [`crate::now_ns`].
-    fn begin_run(&mut self, epoch_ns: u64) {
-        let _ = epoch_ns;
-    }
+    fn begin_run(&mut self, _epoch_ns: u64) {}
 
     /// Sends the next entry, if the file can take it now; `false`: nothing was sent.
     fn step(&mut self, to: Option<&mut Record>) -> bool;

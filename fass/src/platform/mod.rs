@@ -157,8 +157,7 @@ pub trait Platform: Sync {
     /// If called by a subtask's function. A platform that does not define this
     /// panics in any case: then only subtasks raise signals.
     #[track_caller]
-    fn raise(&self, plan: u64, dag: DagId) {
-        let _ = (plan, dag);
+    fn raise(&self, _plan: u64, _dag: DagId) {
         panic!("this platform takes no signals from outside; raise them in subtasks");
     }
 
@@ -170,8 +169,7 @@ pub trait Platform: Sync {
     /// # Panics
     ///
     /// On a platform that does not define this.
-    fn answer(&self, plan: u64, wait: WaitId) {
-        let _ = (plan, wait);
+    fn answer(&self, _plan: u64, _wait: WaitId) {
         panic!("this platform takes no answers of devices; let no subtask wait for one");
     }
 
@@ -192,8 +190,7 @@ pub trait Platform: Sync {
     /// [`LONGEST_SECTION`](crate::shared::LONGEST_SECTION) at most. Returns for how many nanoseconds;
     /// `None`, and does not call it, if the caller is in a section already. A platform of one thread,
     /// which runs function after function, need not define this.
-    fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
-        let _ = lock;
+    fn section(&self, _lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
         section();
         Some(0)
     }
@@ -201,9 +198,7 @@ pub trait Platform: Sync {
     /// Lends `work` what the platform keeps at its edge, under its lock; a platform that keeps
     /// nothing there, or has an edge of its own kind, does not define this. The questions below
     /// are answered by it.
-    fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {
-        let _ = work;
-    }
+    fn at_edge(&self, _work: &mut dyn FnMut(&mut Edge)) {}
 
     /// Reports whether the plan to come shall be recorded or replayed. If it shall not, recorded
     /// topics ([`Dag::record`](crate::Dag::record)) cost nothing.
@@ -249,9 +244,7 @@ pub trait Platform: Sync {
     /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
     /// instance that is, if it is one, and the time of the run, and [keeps](LogLine::keep) it for
     /// what shows it later; without a definition it is forgotten. Must not wait.
-    fn log(&self, line: LogLine) {
-        let _ = line;
-    }
+    fn log(&self, _line: LogLine) {}
 
     /// Takes a plan over. Its first release is the platform's to time.
     ///

@@ -573,9 +573,7 @@ pub trait SubtaskBody {
     fn discard(&mut self, job: u64);
 
     /// Learns, before its instance goes on, whether the wait has ended by its limit.
-    fn wake(&mut self, has_timed_out: bool) {
-        let _ = has_timed_out;
-    }
+    fn wake(&mut self, _has_timed_out: bool) {}
 
     /// Reports whether a completion has effects besides the scheduler's.
     fn has_effects(&self) -> bool;
@@ -680,9 +678,7 @@ pub trait PlatformPort<B> {
     fn start(&mut self, core: CoreId, body: &mut B) -> u64;
 
     /// The instance of a body gives its core up and begins a wait: a turn of it has ended then.
-    fn wait(&mut self, core: CoreId, body: &mut B, ended_ns: u64) {
-        let _ = (core, body, ended_ns);
-    }
+    fn wait(&mut self, _core: CoreId, _body: &mut B, _ended_ns: u64) {}
 
     /// A core goes on with a body whose wait has ended, as it [starts](Self::start) one. Returns
     /// when.
@@ -692,8 +688,7 @@ pub trait PlatformPort<B> {
 
     /// Forwards a request to the other clusters that it concerns, and reports whether it does not
     /// concern this one.
-    fn forward(&mut self, request: Request) -> bool {
-        let _ = request;
+    fn forward(&mut self, _request: Request) -> bool {
         false
     }
 
@@ -708,14 +703,10 @@ pub trait PlatformPort<B> {
     }
 
     /// A core may have to do something else than it does.
-    fn retarget(&mut self, core: CoreId) {
-        let _ = core;
-    }
+    fn retarget(&mut self, _core: CoreId) {}
 
     /// An event of a kind that it [hears](Self::HEARS) of was written down.
-    fn hear(&mut self, notice: &DriverNotice) {
-        let _ = notice;
-    }
+    fn hear(&mut self, _notice: &DriverNotice) {}
 }
 
 /// The next action of a core after a completion.

@@ -92,7 +92,7 @@ impl Run {
         proven: ProvenBounds,
         cores: u32,
     ) -> Self {
-        let journal = core::mem::replace(&mut engine.scheduler.log.journal, Journal::none());
+        let journal = core::mem::take(&mut engine.scheduler.log.journal);
         let run = Self::so_far(engine, journal, cores);
         Self { proven, ..run }
     }
@@ -123,7 +123,7 @@ impl Run {
 
     /// Takes over what the engine of another cluster has of the same run.
     pub fn absorb<B: SubtaskBody, P>(&mut self, other: &mut Engine<B, P>) {
-        let journal = core::mem::replace(&mut other.scheduler.log.journal, Journal::none());
+        let journal = core::mem::take(&mut other.scheduler.log.journal);
         self.add(other, journal);
     }
 

@@ -36,7 +36,7 @@ const EVENTS_WITHOUT_END: usize = 1 << 18;
 pub(crate) const FINEST: u32 = 5;
 
 /// The events of a run, the latest ones if it is long.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Journal {
     /// As many as there is room for; none while nothing is recorded.
     events: Vec<[u64; 3]>,
@@ -48,8 +48,8 @@ pub struct Journal {
     lost: u64,
     /// Statistics of the lost ones, if there can be any.
     tally: Option<RunTally>,
-    /// Whether each lost event is counted in the tally.
-    is_complete: bool,
+    /// Whether a lost event is not counted in the tally.
+    is_incomplete: bool,
     /// Whether there is room for all, as much as there is memory.
     grows: bool,
     /// Whether nothing more is written down.
@@ -85,21 +85,7 @@ impl Journal {
         Self {
             events,
             tally,
-            ..Self::none()
-        }
-    }
-
-    /// Makes one that has no room.
-    pub const fn none() -> Self {
-        Self {
-            events: Vec::new(),
-            put_away: Vec::new(),
-            oldest: 0,
-            lost: 0,
-            tally: None,
-            is_complete: true,
-            grows: false,
-            is_closed: false,
+            ..Self::default()
         }
     }
 
@@ -110,10 +96,11 @@ impl Journal {
     }
 
     /// Makes one that keeps all, as long as there is memory.
-    pub const fn growing() -> Self {
-        let mut journal = Self::none();
-        journal.grows = true;
-        journal
+    pub fn growing() -> Self {
+        Self {
+            grows: true,
+            ..Self::default()
+        }
     }
 
     /// Writes down that something has happened.
@@ -156,7 +143,7 @@ impl Journal {
         }
         self.lost += 1;
         let Some(oldest) = self.events.get_mut(self.oldest) else {
-            self.is_complete = false;
+            self.is_incomplete = true;
             return;
         };
         let words = core::mem::replace(oldest, words);
@@ -175,7 +162,7 @@ impl Journal {
             return;
         }
         self.lost += self.events.len() as u64;
-        self.is_complete = false;
+        self.is_incomplete = true;
         self.events.clear();
         self.oldest = 0;
         core::mem::swap(&mut self.events, &mut self.put_away);
@@ -261,7 +248,7 @@ impl Journal {
             None => RunTally::new(task_set, bits),
         };
         self.events().for_each(|event| tally.add(&event));
-        self.is_complete.then_some(tally)
+        (!self.is_incomplete).then_some(tally)
     }
 
     /// Measures what the platform's own work has cost, core by core; `None` if events are lost.
@@ -283,7 +270,7 @@ impl Journal {
         let both = self.events.len() + other.events.len();
         if merged.try_reserve_exact(both).is_err() {
             self.lost += other.written();
-            self.is_complete = false;
+            self.is_incomplete = true;
             return;
         }
         let theirs = other.words();
@@ -300,7 +287,7 @@ impl Journal {
         self.events = merged;
         self.oldest = 0;
         self.lost += other.lost;
-        self.is_complete &= other.is_complete;
+        self.is_incomplete |= other.is_incomplete;
         match (&mut self.tally, other.tally) {
             (Some(ours), Some(theirs)) => ours.adopt(theirs, cluster),
             // A cluster that has lost nothing has counted nothing yet.

@@ -95,9 +95,10 @@ impl<'a> DispatchModel<'a> {
 }
 
 /// The state of an instance for the dispatch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DispatchState {
     /// No event has made it ready yet.
+    #[default]
     Absent,
     /// It waits for a core and has not started.
     Ready,

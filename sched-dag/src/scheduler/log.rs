@@ -20,7 +20,7 @@ pub struct DriverNotice {
 }
 
 /// The journal with what the next events of it have in common.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct EventLog {
     /// The instant.
     pub(super) now_ns: u64,
@@ -40,21 +40,6 @@ pub struct EventLog {
 }
 
 impl EventLog {
-    /// Begins without room for events.
-    #[inline]
-    pub(super) const fn new() -> Self {
-        Self {
-            now_ns: 0,
-            here: CoreId(0),
-            has_job_event: false,
-            jobs_ended: 0,
-            heard: 0,
-            most_at_once: 0,
-            notices: Vec::new(),
-            journal: Journal::none(),
-        }
-    }
-
     /// Keeps events of these kinds as notices from now on, of which one change of the scheduler
     /// brings about so many at most. Returns how many there is room for.
     pub(super) fn hear(

@@ -188,7 +188,7 @@ impl Scheduler {
         let mut vertices = VertexTable::new(&task_set, options.preemption);
         Self {
             options,
-            log: EventLog::new(),
+            log: EventLog::default(),
             dags: states,
             ready: ReadyLines::new(&task_set, &options, cluster, &mut vertices),
             fresh: 0,

@@ -125,9 +125,10 @@ pub const SKIPS_EVERY_NS: u64 = 100_000;
 
 /// A phase of a DAG's life. A DAG is paused and goes on any number of times; it never comes back
 /// from a later phase to an earlier one of the other two.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum DagPhase {
     /// It releases its jobs.
+    #[default]
     Running,
     /// It skips its due jobs until it is resumed (P1 to P5).
     Paused,

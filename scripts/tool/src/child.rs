@@ -230,6 +230,7 @@ enum Step {
 }
 
 /// The state of a child as seen so far.
+#[derive(Default)]
 struct Asking {
     limit: Duration,
     /// The reason, and the number of signals at that time.
@@ -241,13 +242,10 @@ struct Asking {
 
 impl Asking {
     /// Makes the state at the child's start.
-    const fn new(limit: Duration) -> Asking {
+    fn new(limit: Duration) -> Asking {
         Asking {
             limit,
-            why: None,
-            is_asked: false,
-            printed_bytes: 0,
-            quiet_since: Duration::ZERO,
+            ..Asking::default()
         }
     }
 

@@ -134,6 +134,7 @@ pub fn parse_with_places<'t>(
     Ok((value, parser.places))
 }
 
+#[derive(Default)]
 struct Parser<'t> {
     text: &'t str,
     position: usize,
@@ -149,11 +150,7 @@ impl<'t> Parser<'t> {
     fn new(text: &'t str) -> Self {
         Parser {
             text,
-            position: 0,
-            depth: 0,
-            watched: None,
-            is_watched: false,
-            places: Vec::new(),
+            ..Parser::default()
         }
     }
 

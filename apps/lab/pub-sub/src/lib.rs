@@ -73,15 +73,11 @@ pub trait Outlet<M> {
 
     /// Takes a message that will be in no set. The order inside one arrival means
     /// nothing.
-    fn dropped(&mut self, topic: usize, message: Stamped<M>) {
-        let _ = (topic, message);
-    }
+    fn dropped(&mut self, _topic: usize, _message: Stamped<M>) {}
 
     /// Takes a message that a later one of the same topic and stamp superseded. The
     /// original gives no notice of these.
-    fn replaced(&mut self, topic: usize, message: Stamped<M>) {
-        let _ = (topic, message);
-    }
+    fn replaced(&mut self, _topic: usize, _message: Stamped<M>) {}
 }
 
 /// A set: one message of each topic, in the order of the topics.

@@ -250,6 +250,7 @@ impl JournalReplay<'_> {
 }
 
 /// The state of an instance as the events so far tell it.
+#[derive(Default)]
 struct InstanceLife {
     stage: DispatchState,
     /// Its latest event, and when that was.
@@ -263,14 +264,10 @@ struct InstanceLife {
 }
 
 impl InstanceLife {
-    const fn new(stage: DispatchState) -> Self {
+    fn new(stage: DispatchState) -> Self {
         Self {
             stage,
-            last: None,
-            ready: None,
-            finish: None,
-            dropped: None,
-            waits: (0, 0),
+            ..Self::default()
         }
     }
 

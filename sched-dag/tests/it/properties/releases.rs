@@ -40,7 +40,7 @@ struct Job {
 }
 
 /// The jobs of one DAG.
-#[derive(Clone, Hash)]
+#[derive(Clone, Default, Hash)]
 pub(crate) struct Releases {
     /// Of each job that was or may be due, when.
     due_ns: Vec<u64>,
@@ -69,16 +69,7 @@ impl Releases {
                 Activation::Periodic => due.collect(),
                 Activation::Sporadic => Vec::new(),
             },
-            next: 0,
-            waiting: VecDeque::new(),
-            in_flight: VecDeque::new(),
-            missed: BTreeSet::new(),
-            has_made_room: false,
-            phase: DagPhase::Running,
-            resumed_ns: 0,
-            survived: Vec::new(),
-            owed: None,
-            counted: DagStatistics::default(),
+            ..Self::default()
         }
     }
 

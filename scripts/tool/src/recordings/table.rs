@@ -150,6 +150,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
 }
 
 /// The roles of the columns, by their numbers.
+#[derive(Default)]
 struct Columns {
     job: Option<usize>,
     release_ns: Option<usize>,
@@ -172,13 +173,7 @@ impl Columns {
                 quoted(name)
             ));
         }
-        let mut columns = Self {
-            job: None,
-            release_ns: None,
-            at_ns: None,
-            values: Vec::new(),
-            names: Vec::new(),
-        };
+        let mut columns = Self::default();
         for (number, title) in titles.iter().enumerate() {
             match title.as_str() {
                 title if ignored.contains(&title) => {}

@@ -246,15 +246,13 @@ fn describe(
         cores: options.number(name::CORES).unwrap_or(1),
         memory_mib,
         guest_words: format!("mode={mode} {words}{budgets}").trim_end().into(),
-        module: None,
-        records: None,
         has_input: options.is_given(name::CONSOLE),
         stops: screen::can_stop(options),
         second: handed::second(options),
         devices: options.text(name::DEVICE).unwrap_or_default().into(),
         network: handed::network(options),
-        logs_instructions: false,
         debugger: options.is_given(name::GDB).then(|| "tcp::1234".into()),
+        ..Qemu::default()
     }
 }
 
