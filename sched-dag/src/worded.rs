@@ -44,6 +44,9 @@ macro_rules! worded {
             /// Every code that is a variant's own.
             pub const CODES: &'static [&'static str] = &[$($($code,)?)+];
 
+            /// The text of every variant, with braces where it varies.
+            pub const TEXTS: &'static [&'static str] = &[$($text,)+];
+
             /// The meaning of every variant, as it is documented.
             pub const MEANINGS: &'static [&'static str] = &[$(concat!($($doc),+),)+];
 
@@ -86,6 +89,11 @@ macro_rules! texts {
         #[allow(missing_docs, reason = "the fields' names are the words of the model")]
         pub enum $Table {
             $($(#[doc = $doc])+ $Kind $({ $($field: $Type),+ })? $(($Inner))?,)+
+        }
+
+        impl $Table {
+            /// The text of every variant, with braces where it varies.
+            pub const TEXTS: &'static [&'static str] = &[$($text,)+];
         }
 
         impl core::fmt::Display for $Table {

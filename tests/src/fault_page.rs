@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use lab::golden::Golden;
+use lab::golden;
 
 use crate::markdown::page;
 
@@ -37,31 +37,14 @@ pub fn table(head: &str) -> Vec<String> {
     texts.map(|text| text.trim().to_string()).collect()
 }
 
-/// Whether a text is what a pattern with `...` says.
-pub fn is_said_by(text: &str, pattern: &str) -> bool {
-    let mut rest = text;
-    for part in pattern.split("...") {
-        match rest.find(part) {
-            Some(place) => rest = &rest[place + part.len()..],
-            None => return false,
-        }
-    }
-    rest.is_empty()
-}
-
 /// Holds the text of a fault's entry to what is said now.
 ///
 /// # Panics
 ///
-/// Panics if it is another; see [`Golden::assert_is`].
+/// Panics if it is another; see [`golden::assert_is`].
 #[track_caller]
 pub fn assert_is(fault: &str, text: &str, now: &str) {
-    let golden = Golden {
-        file: PAGE,
-        below: &format!("\n| `{fault}` | "),
-        text,
-    };
-    golden.assert_is(now);
+    golden::assert_is(PAGE, &format!("\n| `{fault}` | "), text, now);
 }
 
 /// Returns a fault's text with the names, in backquotes, that another text has.

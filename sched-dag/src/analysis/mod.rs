@@ -97,7 +97,7 @@ use core::fmt;
 use core::time::Duration;
 
 use crate::ids::{DagId, SubtaskId};
-use crate::policies::Policy;
+use crate::policies::{Policy, SchedulerOptions};
 use crate::policy::Preemption;
 use crate::worded::texts;
 
@@ -128,6 +128,29 @@ pub struct AnalysisSettings {
     pub cores: u32,
     /// Costs of the platform, added to each WCET.
     pub overheads: Overheads,
+}
+
+impl AnalysisSettings {
+    /// Makes those of a scheduler, whose platform has these costs.
+    #[must_use]
+    pub const fn new(scheduler: SchedulerOptions, overheads: Overheads) -> Self {
+        Self {
+            policy: scheduler.policy,
+            preemption: scheduler.preemption,
+            cores: scheduler.cores,
+            overheads,
+        }
+    }
+
+    /// Returns the scheduler's options.
+    #[must_use]
+    pub const fn scheduler(&self) -> SchedulerOptions {
+        SchedulerOptions {
+            policy: self.policy,
+            preemption: self.preemption,
+            cores: self.cores,
+        }
+    }
 }
 
 /// The response-time bounds of a set of DAGs, as far as they are proven.
@@ -204,8 +227,6 @@ texts! {
     pub enum NotProvenReason {
         /// The DAG cannot be analysed: a WCET is missing or numbers overflow.
         Unknown(error: TaskError) = "{error}";
-        /// There are no cores.
-        NoCores = "there are no cores; give it at least one";
         /// Certain to miss at WCETs: the longest path is longer than the deadline.
         LengthBeyondDeadline { length_ns: u64 } =
             "its longest path alone takes {:?}, which is more than its relative deadline; shorten \
@@ -270,6 +291,8 @@ texts! {
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \
              periods";
+        /// There are no cores.
+        NoCores = "there are no cores; give it at least one";
     }
 }
 

@@ -29,20 +29,21 @@ pub struct Golden<'t> {
     pub text: &'t str,
 }
 
-impl Golden<'_> {
-    /// Compares the golden with the present output of a program.
-    ///
-    /// # Panics
-    ///
-    /// Panics if they differ and the golden is not rewritten.
-    #[track_caller]
-    pub fn assert_is(&self, said: &str) {
-        let list = env::var_os(BLESSED);
-        if let Err(why) = self.compare(said, list.as_deref().map(Path::new)) {
-            panic!("{why}");
-        }
+/// Compares a golden, whose file, place and text these are, with the present output of a program.
+///
+/// # Panics
+///
+/// Panics if they differ and the golden is not rewritten.
+#[track_caller]
+pub fn assert_is(file: &str, below: &str, text: &str, said: &str) {
+    let list = env::var_os(BLESSED);
+    let golden = Golden { file, below, text };
+    if let Err(why) = golden.compare(said, list.as_deref().map(Path::new)) {
+        panic!("{why}");
     }
+}
 
+impl Golden<'_> {
     /// Compares the golden with the present output of a program; rewrites it if there is a `list`
     /// of rewritten files.
     ///

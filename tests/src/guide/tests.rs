@@ -6,7 +6,7 @@ use std::fs;
 use super::PAGES;
 use crate::fault_page::{documented_faults, with_names_of};
 use crate::markdown::{Block, blocks, page};
-use lab::golden::Golden;
+use lab::golden;
 use lab::test::TEST;
 use tool::new_app::NEW_APP;
 use tool::options::Command;
@@ -108,8 +108,7 @@ fn what_they_say_of_a_fault_is_its_entrys_text_with_names_of_their_own() {
         let Block { info, text } = blocks.find(quoted).expect("it shows a fault");
         let fault = &faults[info.trim_start_matches("text fault-")];
         let said = with_names_of(&text, fault) + "\n";
-        let (below, text) = (&*info, &*text);
-        Golden { file, below, text }.assert_is(&said);
+        golden::assert_is(file, &info, &text, &said);
     }
 }
 
@@ -117,12 +116,12 @@ fn what_they_say_of_a_fault_is_its_entrys_text_with_names_of_their_own() {
 fn the_guide_shows_what_the_first_example_prints() {
     let mut blocks = blocks(&page("docs/guide.md")).into_iter();
     let shown = blocks.find(|block| block.info == "text output-vision");
-    let golden = Golden {
-        file: "docs/guide.md",
-        below: "cargo run --example vision",
-        text: &shown.expect("it is there").text,
-    };
-    golden.assert_is(&vision::run().expect("the DAG is sound"));
+    let (below, text) = (
+        "cargo run --example vision",
+        shown.expect("it is there").text,
+    );
+    let now = vision::run().expect("the DAG is sound");
+    golden::assert_is("docs/guide.md", below, &text, &now);
 }
 
 #[test]

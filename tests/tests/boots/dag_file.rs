@@ -9,7 +9,7 @@ use fass_dag_file::Length;
 use harness::file::File;
 use harness::markdown::{blocks, page};
 use harness::{Guest, Members, Said};
-use lab::golden::Golden;
+use lab::golden;
 use tool::dag_file::{Import, load};
 use tool::protocol::Status;
 use tool::{Outcome, system};
@@ -310,12 +310,8 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
         let path = system::workspace().join(words[1]);
         assert!(path.exists(), "{} is not there", words[1]);
     }
-    let golden = Golden {
-        file: "docs/dag-file.md",
-        below: "```text\n",
-        text: &of_info("text").expect("the example").text,
-    };
-    golden.assert_is(&page(commands[0][1]));
+    let text = &of_info("text").expect("the example").text;
+    golden::assert_is("docs/dag-file.md", "```text\n", text, &page(commands[0][1]));
 
     let written = ["dot", "trace"].map(|option| {
         let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("demo.{option}"));
@@ -369,12 +365,8 @@ fn assert_drawn(document: &str, pictures: usize) {
         let drawn = String::from_utf8(stdout).expect("text");
         let file = format!("docs/{picture}");
         let kept = page(&file);
-        let golden = Golden {
-            file: &file,
-            below: "<svg",
-            text: &kept["<svg".len()..],
-        };
-        golden.assert_is(&drawn["<svg".len()..]);
+        let [kept, drawn] = [&kept, &drawn].map(|text| &text["<svg".len()..]);
+        golden::assert_is(&file, "<svg", kept, drawn);
     }
 }
 

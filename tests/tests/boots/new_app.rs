@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 
 use harness::guide::{documented_output, without_numbers};
 use harness::markdown::{blocks, page};
-use lab::golden::Golden;
+use lab::golden;
 use tool::new_app::{self, CrateSource};
 use tool::system::{self, workspace};
 
@@ -117,12 +117,11 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
         true => line.into(),
         false => without_numbers(line),
     };
-    let golden = Golden {
-        file: "docs/guide.md",
-        below: "```text output-new-app\n",
-        text: &documented,
-    };
-    golden.assert_is(&excerpt(&documented, &said, shown));
+    let (below, now) = (
+        "```text output-new-app\n",
+        excerpt(&documented, &said, shown),
+    );
+    golden::assert_is("docs/guide.md", below, &documented, &now);
 
     // The same lines on Linux, whatever it takes there. Without preemption the bound is another.
     let said = cargo(&app, "run --quiet -- --on linux --jobs 20");
@@ -302,12 +301,8 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
     let shown = (blocks.iter().map(|block| &block.text))
         .find(|text| text.contains("vision: "))
         .expect("what the app says");
-    let golden = Golden {
-        file: "README.md",
-        below: place,
-        text: shown,
-    };
-    golden.assert_is(&excerpt(shown, &boot(&app), str::to_string));
+    let now = excerpt(shown, &boot(&app), str::to_string);
+    golden::assert_is("README.md", place, shown, &now);
 }
 
 #[test]
