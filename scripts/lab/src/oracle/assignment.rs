@@ -183,18 +183,15 @@ fn of_owner(owner: &CoreOwner, plan: &LendingPlan, period_ns: u64) -> Vec<String
 
 #[cfg(test)]
 mod tests {
-    use super::{check, parse, parse_sets};
-    use crate::tests::{altered, assert_malformed, rows};
+    use super::{ORACLE, parse, parse_sets};
+    use crate::oracle::judged::{assert_agree, assert_differs};
+    use crate::tests::{altered, assert_malformed};
 
     const FILE: &str = include_str!("../../../../tests/oracle/lent.txt");
 
     #[test]
     fn all_public_cases_agree() {
-        let cases = parse(FILE).unwrap();
-        assert_eq!(cases.len(), 60);
-        for case in &cases {
-            assert_eq!(check(case), Ok(()), "{}", case.name);
-        }
+        assert_agree(&ORACLE, FILE, 60);
     }
 
     fn first() -> &'static str {
@@ -213,11 +210,12 @@ dag 834 178 | dag 177 178 | D exceeds T, which the analysis does not cover";
 
     #[test]
     fn a_difference_names_the_record() {
-        let checked = |parts: [&str; 2]| check(&parse(&altered(first(), parts)).unwrap()[0]);
-        for [from, to, difference] in rows(WRONG) {
-            assert_eq!(checked([&from, &to]), Err(difference));
-        }
-        assert_eq!(checked(["guest 0 114", "guest 00 0114"]), Ok(()));
+        assert_differs(&ORACLE, first(), WRONG);
+        assert_agree(
+            &ORACLE,
+            &altered(first(), ["guest 0 114", "guest 00 0114"]),
+            1,
+        );
     }
 
     /// The same for refusals, with the line and the reason.

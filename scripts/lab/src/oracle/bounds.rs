@@ -446,21 +446,17 @@ pub(super) fn list<T: ToString>(values: &[T]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{check, parse};
-    use crate::tests::{altered, assert_malformed, rows};
+    use super::{ORACLE, parse};
+    use crate::oracle::judged::{assert_agree, assert_differs};
+    use crate::tests::assert_malformed;
 
     const FILE: &str = include_str!("../../../../tests/oracle/bounds.txt");
     const MULTI_PATH: &str = include_str!("../../../../tests/oracle/multi_path.txt");
 
     #[test]
     fn all_public_cases_agree() {
-        for file in [FILE, MULTI_PATH] {
-            let cases = parse(file).unwrap();
-            assert_eq!(cases.len(), 60);
-            for case in &cases {
-                assert_eq!(check(case), Ok(()), "{}", case.name);
-            }
-        }
+        assert_agree(&ORACLE, FILE, 60);
+        assert_agree(&ORACLE, MULTI_PATH, 60);
     }
 
     fn first() -> &'static str {
@@ -475,10 +471,7 @@ federated 7 | federated 6 0:1 | federated: expected 6 0:1, computed 7";
 
     #[test]
     fn a_difference_names_the_quantity() {
-        for [from, to, difference] in rows(WRONG) {
-            let cases = parse(&altered(first(), [&from, &to])).unwrap();
-            assert_eq!(check(&cases[0]), Err(difference));
-        }
+        assert_differs(&ORACLE, first(), WRONG);
     }
 
     /// The same for refusals: with the line, and the reason where it is worth a test.

@@ -154,3 +154,27 @@ fn equal(place: impl Display, what: &str, expected: u64, found: u64) -> Result<(
         )),
     }
 }
+
+#[cfg(test)]
+mod judged {
+    use super::FileOracle;
+    use crate::tests::{altered, rows};
+
+    /// Makes sure that a file has so many cases, all of which agree.
+    pub(super) fn assert_agree<Case>(oracle: &FileOracle<Case>, text: &str, count: usize) {
+        let cases = (oracle.parse)(text).unwrap();
+        assert_eq!(cases.len(), count);
+        for case in &cases {
+            assert_eq!((oracle.check)(case), Ok(()), "{}", (oracle.name)(case));
+        }
+    }
+
+    /// Makes sure that the first case of a text differs once it is altered: in each row are a part,
+    /// another in its place, and the difference.
+    pub(super) fn assert_differs<Case>(oracle: &FileOracle<Case>, text: &str, table: &str) {
+        for [from, to, difference] in rows(table) {
+            let cases = (oracle.parse)(&altered(text, [&from, &to])).expect("still well formed");
+            assert_eq!((oracle.check)(&cases[0]), Err(difference), "{to}");
+        }
+    }
+}

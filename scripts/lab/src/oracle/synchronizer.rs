@@ -263,8 +263,9 @@ fn compare(expected: &Departures, departures: &Departures) -> Result<(), String>
 
 #[cfg(test)]
 mod tests {
-    use super::{check, parse};
-    use crate::tests::{altered, assert_malformed, rows};
+    use super::{ORACLE, parse};
+    use crate::oracle::judged::{assert_agree, assert_differs};
+    use crate::tests::assert_malformed;
 
     const PUBLIC: &str = include_str!("../../../../tests/oracle/synchronizer.txt");
 
@@ -291,11 +292,7 @@ end
 
     #[test]
     fn all_public_traces_agree() {
-        let cases = parse(PUBLIC).unwrap();
-        assert_eq!(cases.len(), 40);
-        for case in &cases {
-            assert_eq!(check(case), Ok(()), "{}", case.name);
-        }
+        assert_agree(&ORACLE, PUBLIC, 40);
     }
 
     /// A part of a case, its replacement, and the difference that it makes.
@@ -309,12 +306,8 @@ a 0 1 19 | a 0 1 20 | arrival 2 (topic 0, message 1): set 0: expected 1 0, emitt
 
     #[test]
     fn the_first_difference_is_named() {
-        for (text, table) in [(EXACT, EXACT_WRONG), (APPROXIMATE, APPROXIMATE_WRONG)] {
-            for [from, to, difference] in rows(table) {
-                let cases = parse(&altered(text, [&from, &to])).expect("still well formed");
-                assert_eq!(check(&cases[0]), Err(difference));
-            }
-        }
+        assert_differs(&ORACLE, EXACT, EXACT_WRONG);
+        assert_differs(&ORACLE, APPROXIMATE, APPROXIMATE_WRONG);
     }
 
     #[test]
@@ -327,7 +320,7 @@ a 0 1 19 | a 0 1 20 | arrival 2 (topic 0, message 1): set 0: expected 1 0, emitt
         let [exact, approximate] =
             [EXACT, APPROXIMATE].map(|text| text.replacen("2 5", &largest, 1));
         for text in [in_any_order, &without_limit, &exact, &approximate] {
-            assert_eq!(check(&parse(text).unwrap()[0]), Ok(()), "{text}");
+            assert_agree(&ORACLE, text, 1);
         }
     }
 

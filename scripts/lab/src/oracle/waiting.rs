@@ -69,26 +69,18 @@ pub fn check(case: &WaitingCase) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{WaitingCase, check, parse};
-    use crate::tests::{altered, assert_malformed, rows};
+    use super::{ORACLE, WaitingCase, parse};
+    use crate::oracle::judged::{assert_agree, assert_differs};
+    use crate::tests::assert_malformed;
 
     const FILE: &str = include_str!("../../../../tests/oracle/waiting.txt");
-
-    /// Checks the sets of a text, and returns the differences.
-    fn differences(text: &str) -> Vec<String> {
-        let sets = parse(text).unwrap().into_iter();
-        let is_set = |case: &WaitingCase| matches!(case, WaitingCase::Bounds(_));
-        sets.filter(is_set)
-            .filter_map(|set| check(&set).err())
-            .collect()
-    }
 
     #[test]
     fn all_public_sets_agree() {
         let is_set = |case: &&WaitingCase| matches!(case, WaitingCase::Bounds(_));
         let cases = parse(FILE).unwrap();
-        assert_eq!((cases.len(), cases.iter().filter(is_set).count()), (80, 40));
-        assert_eq!(differences(FILE), Vec::<String>::new());
+        assert_eq!(cases.iter().filter(is_set).count(), 40);
+        assert_agree(&ORACLE, FILE, 80);
     }
 
     fn first() -> &'static str {
@@ -116,9 +108,7 @@ wait 5 2 1 7 1 10 1 | wait 5 2 1 7 1 9 1 | dag 0: span: expected 53, computed 52
 
     #[test]
     fn a_difference_names_the_quantity() {
-        for [from, to, difference] in rows(WRONG) {
-            assert_eq!(differences(&altered(first(), [&from, &to])), [difference]);
-        }
+        assert_differs(&ORACLE, first(), WRONG);
     }
 
     /// The same for refusals, with the line and the reason.

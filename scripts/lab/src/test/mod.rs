@@ -226,6 +226,15 @@ struct SourceFile {
     text: String,
 }
 
+#[cfg(test)]
+mod made {
+    /// Makes a file.
+    pub(super) fn file(name: &str, text: &str) -> super::SourceFile {
+        let [name, text] = [name, text].map(String::from);
+        super::SourceFile { name, text }
+    }
+}
+
 /// Returns all files of the workspace, sorted, without the generated ones and without those of
 /// packages that are not the project's own.
 fn sources() -> Vec<SourceFile> {

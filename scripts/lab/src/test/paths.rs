@@ -98,14 +98,11 @@ fn plain(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use super::{SourceFile, check};
+    use super::check;
+    use crate::test::made::file;
 
     #[test]
     fn a_path_that_leads_nowhere_is_named_with_its_line() {
-        let file = |name: &str, text: &str| SourceFile {
-            name: name.into(),
-            text: text.into(),
-        };
         let right = "`docs/a.md`, `./docs/`, [b](../a/b.rs#L1), `b.rs`, `a/b.rs`, `x / y`, `n/m`";
         let sources = [file("docs/a.md", right), file("a/b.rs", "// `../b`\n")];
         assert_eq!(check(&sources), Ok(()));

@@ -206,7 +206,7 @@ fn type_name(line: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::{asks, check_names, rooms};
-    use crate::test::SourceFile;
+    use crate::test::made::file;
 
     #[test]
     fn a_doc_sentence_that_asks_is_told_with_its_line() {
@@ -224,10 +224,7 @@ mod tests {
 
     #[test]
     fn pronouns_are_counted_by_room_and_words_of_pages_together() {
-        let file = |name: &str, text: &str| SourceFile {
-            name: name.into(),
-            text: text.replace('@', "//"),
-        };
+        let file = |name: &str, text: &str| file(name, &text.replace('@', "//"));
         let counted = rooms(&[
             file(
                 "fass/src/a.rs",
@@ -251,10 +248,6 @@ mod tests {
 
     #[test]
     fn types_of_one_crate_that_share_a_name_and_pronouns_are_told() {
-        let file = |name: &str, text: &str| SourceFile {
-            name: name.into(),
-            text: text.into(),
-        };
         let mut sources = vec![
             file("a/Cargo.toml", ""),
             file("a/b/Cargo.toml", ""),

@@ -17,44 +17,31 @@ use faults::crimes::{Crime, Unpunished};
 use faults::{JOBS, PERIOD, Policy, doomed, doomed_at_leisure, healthy};
 use kernel::{AppError, Machine, json};
 
-/// Whether the crime has a budget.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Time {
-    /// The budget is 6 ms.
-    Limited,
-    /// There is none.
-    Unlimited,
-}
-
-/// An attack, by its name.
-type Attack = (&'static str, Crime, Time);
+/// An attack, by its name, and whether it has a budget, of 6 ms.
+type Attack = (&'static str, Crime, bool);
 
 /// Those that leave what they attack to the next one.
 const TOGETHER: [Attack; 12] = [
-    (
-        "allocator_stack",
-        heap::overflow_in_the_allocator,
-        Time::Limited,
-    ),
-    ("display_panics", output::display_panics, Time::Limited),
-    ("display_prints", output::display_prints, Time::Limited),
-    ("display_loops", output::display_loops, Time::Limited),
-    ("message_1_mb", output::message_1_mb, Time::Unlimited),
-    ("message_10_mb", output::message_10_mb, Time::Unlimited),
-    ("forge_lines", output::forge_lines, Time::Limited),
-    ("forge_message", output::forge_message, Time::Limited),
-    ("forge_kind", output::forge_kind, Time::Limited),
-    ("lock_twice", locks::lock_twice, Time::Limited),
-    ("lock_loop", locks::loop_in_section, Time::Limited),
-    ("flood", output::flood, Time::Unlimited),
+    ("allocator_stack", heap::overflow_in_the_allocator, true),
+    ("display_panics", output::display_panics, true),
+    ("display_prints", output::display_prints, true),
+    ("display_loops", output::display_loops, true),
+    ("message_1_mb", || output::panic_with(1_000_000), false),
+    ("message_10_mb", || output::panic_with(10_000_000), false),
+    ("forge_lines", output::forge_lines, true),
+    ("forge_message", output::forge_message, true),
+    ("forge_kind", output::forge_kind, true),
+    ("lock_twice", locks::lock_twice, true),
+    ("lock_loop", locks::loop_in_section, true),
+    ("flood", output::flood, false),
 ];
 
 /// The others.
 const ALONE: [Attack; 4] = [
-    ("commit", commit, Time::Unlimited),
-    ("leak_strings", heap::leak_strings, Time::Unlimited),
-    ("keep_boxes", heap::keep_boxes, Time::Unlimited),
-    ("forge_list", output::forge_list, Time::Limited),
+    ("commit", commit, false),
+    ("leak_strings", heap::leak_strings, false),
+    ("keep_boxes", heap::keep_boxes, false),
+    ("forge_list", output::forge_list, true),
 ];
 
 /// Commits DAGs while others run, which the kernel refuses.
@@ -76,10 +63,10 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
         Some(name) => ALONE.into_iter().filter(|it| it.0 == name).collect(),
     };
     machine.accept_faults(); // here they are what is wanted
-    for (name, crime, time) in attacks {
-        let attacker = match time {
-            Time::Limited => doomed(crime, Policy::End),
-            Time::Unlimited => doomed_at_leisure(crime),
+    for (name, crime, is_limited) in attacks {
+        let attacker = match is_limited {
+            true => doomed(crime, Policy::End),
+            false => doomed_at_leisure(crime),
         };
         finish_create_dags(&[healthy(), attacker])?;
         let run = machine.run()?;

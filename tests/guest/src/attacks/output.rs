@@ -48,17 +48,8 @@ pub(super) fn display_loops() -> Unpunished {
     Unpunished
 }
 
-/// Panics with a message of 1 MB.
-pub(super) fn message_1_mb() -> Unpunished {
-    panic_with(1_000_000)
-}
-
-/// Panics with a message of 10 MB.
-pub(super) fn message_10_mb() -> Unpunished {
-    panic_with(10_000_000)
-}
-
-fn panic_with(bytes: usize) -> Unpunished {
+/// Panics with a message of so many bytes.
+pub(super) fn panic_with(bytes: usize) -> Unpunished {
     let mut message = String::with_capacity(bytes);
     for _ in 0..bytes / 1000 {
         message.push_str(&"x".repeat(1000));
