@@ -49,6 +49,13 @@ pub struct Instance {
     pub subtask: SubtaskId,
 }
 
+impl Instance {
+    /// Names an execution by its parts.
+    pub const fn new(dag: DagId, job: u64, subtask: SubtaskId) -> Self {
+        Self { dag, job, subtask }
+    }
+}
+
 impl fmt::Display for Instance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { dag, job, subtask } = self;

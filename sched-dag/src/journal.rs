@@ -76,11 +76,8 @@ impl EventSubject {
     /// Unpacks an instance.
     #[allow(clippy::cast_possible_truncation, reason = "20 bits are left")]
     pub const fn instance(self) -> Instance {
-        Instance {
-            dag: DagId((self.ids >> DAG) as u32),
-            job: self.job,
-            subtask: SubtaskId((self.ids >> SUBTASK & ID) as u32),
-        }
+        let subtask = SubtaskId((self.ids >> SUBTASK & ID) as u32);
+        Instance::new(DagId((self.ids >> DAG) as u32), self.job, subtask)
     }
 }
 

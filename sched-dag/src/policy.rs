@@ -90,6 +90,18 @@ pub struct FaultLimit {
     pub in_all: u32,
 }
 
+impl FaultLimit {
+    /// Makes a limit of so many faults within so many jobs, and in all.
+    #[must_use]
+    pub const fn new(faults: u32, window: u64, in_all: u32) -> Self {
+        Self {
+            faults,
+            window,
+            in_all,
+        }
+    }
+}
+
 /// Whether the commit may fix an order in which a DAG's subtasks use the cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum SubtaskOrder {

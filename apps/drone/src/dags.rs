@@ -210,11 +210,7 @@ impl Workload {
             }
         };
         if self.survived > 0 {
-            dag.survive_faults(FaultLimit {
-                faults: 1,
-                window: 30,
-                in_all: self.survived,
-            });
+            dag.survive_faults(FaultLimit::new(1, 30, self.survived));
             dag.restarting(make)
                 .reads(&["image"])
                 .writes(&["beacon"])

@@ -39,11 +39,7 @@ pub const BUDGET: Duration = Duration::from_millis(6);
 pub const FATAL_JOB: u64 = 10;
 
 /// The faults that the doomed DAG survives, unless it is ended.
-const FAULT_LIMIT: FaultLimit = FaultLimit {
-    faults: 1,
-    window: 10,
-    in_all: 2,
-};
+const FAULT_LIMIT: FaultLimit = FaultLimit::new(1, 10, 2);
 
 /// The jobs of each DAG.
 pub const JOBS: u64 = 30;
@@ -82,11 +78,8 @@ pub fn restless(faults: u32) -> [Dag; 2] {
     let healthy = create_dag();
     healthy.name("healthy").jobs(jobs);
     let dag = create_dag();
-    dag.name("restless").jobs(jobs).survive_faults(FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: faults,
-    });
+    let limit = FaultLimit::new(1, 1, faults);
+    dag.name("restless").jobs(jobs).survive_faults(limit);
     for (dag, name, priority) in [(&healthy, "healthy", 0), (&dag, "restless", 1)] {
         let mut jobs = 0_u64..;
         let attributes = SubtaskAttributes::named("read").priority(priority);

@@ -101,17 +101,7 @@ impl RunConfig {
 
     /// Returns the settings for the analysis of a commit.
     pub(crate) fn settings(&self) -> AnalysisSettings {
-        let SchedulerOptions {
-            policy,
-            preemption,
-            cores,
-        } = self.scheduler;
-        AnalysisSettings {
-            policy,
-            preemption,
-            cores,
-            overheads: self.overheads,
-        }
+        AnalysisSettings::new(self.scheduler, self.overheads)
     }
 }
 

@@ -133,11 +133,8 @@ impl CoreSupply {
     /// Returns the busy time as work of one core, as far as it surely grows.
     fn at(&self, window_ns: u64) -> WorkloadSegment {
         let (value, more) = self.busiest(window_ns);
-        WorkloadSegment {
-            value: value.into(),
-            slope: u128::from(more > 0),
-            span: (more > 0).then_some(more.into()),
-        }
+        let span = (more > 0).then_some(more.into());
+        WorkloadSegment::new(value.into(), u128::from(more > 0), span)
     }
 }
 
@@ -202,9 +199,8 @@ impl<'a> MemberTask<'a> {
 
     /// Returns how much longer a window has to be at least on one core; `None`: it is enough.
     fn on_one(&self, core: &CoreSupply, above: &[(&Self, u64)], window_ns: u64) -> Option<u128> {
-        let steady = |work_ns: u64, jobs: u64| WorkloadSegment {
-            value: u128::from(work_ns) * u128::from(jobs),
-            ..WorkloadSegment::NONE
+        let steady = |work_ns: u64, jobs: u64| {
+            WorkloadSegment::new(u128::from(work_ns) * u128::from(jobs), 0, None)
         };
         let lost = self.bursts.on(1, window_ns);
         let own = core.at(window_ns).and(lost);
@@ -242,11 +238,7 @@ impl<'a> MemberTask<'a> {
         window_ns: u64,
     ) -> impl Iterator<Item = LentForm> + 'c {
         let waiting_ns = window_ns - self.task.length_ns();
-        let all_waiting = WorkloadSegment {
-            value: waiting_ns.into(),
-            slope: 1,
-            span: None,
-        };
+        let all_waiting = WorkloadSegment::new(waiting_ns.into(), 1, None);
         let mut busy = [WorkloadSegment::NONE; 2];
         let mut bursts = self.bursts.clone();
         for core in cores {
@@ -260,10 +252,7 @@ impl<'a> MemberTask<'a> {
         let forms = (1..=cores.len()).rev().zip(&self.covers);
         forms.flat_map(move |(free, &cover)| {
             let left = self.task.volume_ns() - cover;
-            let own = |left: u64| WorkloadSegment {
-                value: left.into(),
-                ..WorkloadSegment::NONE
-            };
+            let own = |left: u64| WorkloadSegment::new(left.into(), 0, None);
             let [mut plain, mut clipped] =
                 [[own(left), busy[0]], [own(left.max(1)), busy[1]]].map(Vec::from);
             for &(other, response_ns) in above {

@@ -113,6 +113,14 @@ impl<'a> EquationSet<'a> {
         }
     }
 
+    /// Solves the equations of DAGs that are given from the highest priority to the lowest.
+    pub(super) fn in_order(&self) -> Option<Vec<u64>> {
+        let order: Vec<usize> = (0..self.tasks.len()).collect();
+        let none = alloc::vec![None; order.len()];
+        let solution = self.solve(&none, &order, |other, dag| other < dag);
+        solution.responses.into_iter().collect()
+    }
+
     /// Counts fewer cores in the equations of a DAG.
     pub(super) fn count_on(&mut self, dag: usize, cores: u32) {
         let own = GraphSummary::of(self.tasks[dag], cores);
@@ -439,11 +447,7 @@ pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Op
     if tasks.iter().any(|task| task.has_waits()) {
         set.forbid_overlap(alloc::vec![true; tasks.len()]);
     }
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    let solution = set.solve(&alloc::vec![None; tasks.len()], &order, |other, dag| {
-        other < dag
-    });
-    solution.responses.into_iter().collect()
+    set.in_order()
 }
 
 /// Bounds the response times under global EDF, in the order given: down from the

@@ -52,12 +52,7 @@ pub enum WaitingForm {
 /// within its deadline and its period.
 #[must_use]
 pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
-    let set = in_units(tasks, cores, form)?;
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    let solution = set.solve(&alloc::vec![None; tasks.len()], &order, |other, dag| {
-        other < dag
-    });
-    solution.responses.into_iter().collect()
+    in_units(tasks, cores, form)?.in_order()
 }
 
 /// Bounds the response times under global EDF, in whole units of time and in the order given: down

@@ -173,11 +173,7 @@ impl InterferingWorkload {
 
     /// Returns the work that all cores of the jobs could execute in a time.
     pub(super) fn over(&self, time_ns: u64) -> WorkloadSegment {
-        WorkloadSegment {
-            value: self.cap * u128::from(time_ns),
-            slope: self.cap,
-            span: None,
-        }
+        WorkloadSegment::new(self.cap * u128::from(time_ns), self.cap, None)
     }
 
     /// Returns the closed form for one lane, without the cap.
@@ -193,29 +189,23 @@ impl InterferingWorkload {
         let (jobs, rest) = (area / pitch, area % pitch);
         let whole = jobs.saturating_mul(self.volume);
         if rest < self.volume {
-            let piece = WorkloadSegment {
-                value: whole.saturating_add(rest),
-                slope: self.parallelism,
-                span: Some((self.volume - rest) / self.parallelism),
-            };
-            piece.or_one_flat_step()
+            let span = (self.volume - rest) / self.parallelism;
+            let value = whole.saturating_add(rest);
+            WorkloadSegment::new(value, self.parallelism, Some(span)).or_one_flat_step()
         } else {
-            WorkloadSegment {
-                value: whole.saturating_add(self.volume),
-                slope: 0,
-                span: Some((pitch - rest).div_ceil(self.parallelism)),
-            }
+            let span = (pitch - rest).div_ceil(self.parallelism);
+            WorkloadSegment::new(whole.saturating_add(self.volume), 0, Some(span))
         }
     }
 }
 
 impl WorkloadSegment {
     /// Nothing, for all windows.
-    pub(super) const NONE: Self = Self {
-        value: 0,
-        slope: 0,
-        span: None,
-    };
+    pub(super) const NONE: Self = Self::new(0, 0, None);
+
+    pub(super) const fn new(value: u128, slope: u128, span: Option<u128>) -> Self {
+        Self { value, slope, span }
+    }
 
     /// Returns the smaller of two pieces, as far as it surely stays so.
     pub(super) fn least(self, other: Self) -> Self {
@@ -399,11 +389,8 @@ impl WorkloadBursts {
         let time = u128::from(window_ns) + u128::from(self.late_ns);
         let spans = self.repeated.iter();
         let spans = spans.map(|[period, carry, _]| period - (time + carry) % period);
-        WorkloadSegment {
-            value: self.during(window_ns.into()).saturating_mul(cores as u128),
-            slope: 0,
-            span: spans.min(),
-        }
+        let value = self.during(window_ns.into()).saturating_mul(cores as u128);
+        WorkloadSegment::new(value, 0, spans.min())
     }
 
     /// Returns the time after which so much time is left besides the losses.

@@ -82,6 +82,18 @@ pub struct Decision {
     pub instance: Instance,
 }
 
+impl Decision {
+    /// Makes the decision.
+    #[inline]
+    pub const fn new(what: EventKind, core: CoreId, instance: Instance) -> Self {
+        Self {
+            what,
+            core,
+            instance,
+        }
+    }
+}
+
 impl Scheduler {
     /// Fills `decisions`.
     #[inline]
@@ -128,11 +140,7 @@ impl Scheduler {
         };
         vertex.phase = InstancePhase::Running(core);
         (self.cores).run(core, key, vertex.yields_to_the_unpinned());
-        Decision {
-            what,
-            core,
-            instance,
-        }
+        Decision::new(what, core, instance)
     }
 
     /// Puts the instance that runs on a core back in line.
@@ -141,11 +149,8 @@ impl Scheduler {
         let vertex = self.vertices.get_mut(running.vertex());
         vertex.phase = InstancePhase::Preempted;
         let (line, instance) = (vertex.line, vertex.present_instance());
-        self.decisions.push(Decision {
-            what: EventKind::Suspend,
-            core,
-            instance,
-        });
+        let decision = Decision::new(EventKind::Suspend, core, instance);
+        self.decisions.push(decision);
         // With the key that it had: a preempted instance keeps its place in the order.
         self.ready.insert(line, running);
     }
@@ -280,11 +285,7 @@ impl Scheduler {
         next.phase = InstancePhase::Running(core);
         (self.cores).run(core, key, next.yields_to_the_unpinned());
         // Never a resumption: it has become ready by this very end, so it has not run before.
-        let decision = Decision {
-            what: EventKind::Start,
-            core,
-            instance,
-        };
+        let decision = Decision::new(EventKind::Start, core, instance);
         (HandOff::To(Vertex(number), decision), true)
     }
 

@@ -295,21 +295,13 @@ impl Vertex {
     /// Returns the vertex's part of a job.
     #[inline]
     pub(super) const fn instance(&self, job: &Job) -> Instance {
-        Instance {
-            dag: self.dag,
-            job: job.number,
-            subtask: self.subtask,
-        }
+        Instance::new(self.dag, job.number, self.subtask)
     }
 
     /// Returns the instance that it is doing, which is ready or has started.
     #[inline]
     pub(super) const fn present_instance(&self) -> Instance {
-        Instance {
-            dag: self.dag,
-            job: self.job,
-            subtask: self.subtask,
-        }
+        Instance::new(self.dag, self.job, self.subtask)
     }
 
     /// Returns the counter of a job, which is its own or one of `counters`.

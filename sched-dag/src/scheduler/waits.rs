@@ -160,12 +160,7 @@ impl Scheduler {
                 false => self.ready.peek_in(waiting.line).is_none_or(is_first),
             };
             if is_next {
-                let what = EventKind::Resume;
-                let decision = Decision {
-                    what,
-                    core,
-                    instance,
-                };
+                let decision = Decision::new(EventKind::Resume, core, instance);
                 return Some(HandOff::To(vertex, decision));
             }
             waiting.phase = InstancePhase::Preempted;

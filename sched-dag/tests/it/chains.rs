@@ -108,11 +108,7 @@ fn the_times_of_a_small_run_are_those_computed_by_hand() {
     };
     assert_eq!(latencies, expected);
     let sampled = SampledJobs::new(&samplings, events(RUN).into_iter());
-    let plan = |job| Instance {
-        dag: DagId(1),
-        job,
-        subtask: SubtaskId(0),
-    };
+    let plan = |job| Instance::new(DagId(1), job, SubtaskId(0));
     let images = [0, 1, 2, 3].map(|job| sampled.job(plan(job), place(0, 1)));
     assert_eq!(images, [None, Some(0), Some(0), Some(1)]);
 }
@@ -157,12 +153,7 @@ fn pauses_do_not_count_and_jobs_that_faults_may_take_do() {
     // Of 3 jobs 2 may be lost, with a window of 2 all that may be in all.
     for (window, period_ns) in [(3, 300), (2, 600)] {
         let mut spec = dag("camera", 100, &["expose"]);
-        let limit = FaultLimit {
-            faults: 2,
-            window,
-            in_all: 5,
-        };
-        spec.on_fault = OnFault::DropJob(limit);
+        spec.on_fault = OnFault::DropJob(FaultLimit::new(2, window, 5));
         let dags = [spec, dag("motor", 20, &["drive"])];
         let task_set = verify(&dags, &CommitOptions::new(Policy::Edf, 2))
             .unwrap()

@@ -185,11 +185,7 @@ fn a_whole_journal_keeps_all_rules_and_its_record_has_the_statistics() {
                     Some((instance, *record.instance(instance)?))
                 };
                 let times: Vec<_> = record.numbered(dag).filter_map(of_job).collect();
-                let vertex = run.task_set.vertex(Instance {
-                    dag,
-                    job: 0,
-                    subtask,
-                });
+                let vertex = run.task_set.vertex(Instance::new(dag, 0, subtask));
                 let statistics = tally.subtask(vertex);
                 let join_ns = |&(instance, times): &(Instance, InstanceRecord)| {
                     let join_ns = record.join_ns(&run.task_set, instance)?;

@@ -173,11 +173,7 @@ fn wakes() -> Vec<Dag> {
 /// Each job is lost to a fault.
 fn faults(budget_us: u64, work: fn()) -> Vec<Dag> {
     let dag = disturbance("faulty");
-    dag.survive_faults(FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: 1_000,
-    });
+    dag.survive_faults(FaultLimit::new(1, 1, 1_000));
     let attributes = named("fails").priority(5).wcet(us(budget_us));
     let made = move || move |()| work();
     (dag.restarting(made)).register(attributes.budget(us(budget_us)));

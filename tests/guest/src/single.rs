@@ -119,11 +119,7 @@ pub(crate) fn keep(machine: &Machine) -> Result<(), AppError> {
     let tidy = single("tidy", 3, named("keep"), keep);
     let careless = create_dag();
     careless.name("careless").jobs(3).relative_deadline(PERIOD);
-    careless.survive_faults(FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: 3,
-    });
+    careless.survive_faults(FaultLimit::new(1, 1, 3));
     let lose = |()| {
         let bytes = black_box(vec![1_u8; 1000]);
         assert!(bytes.is_empty(), "they are lost");

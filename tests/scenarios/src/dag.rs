@@ -191,11 +191,8 @@ impl DagText {
                         return Err("`survives` takes FAULTS/WINDOW/ALL".into());
                     };
                     let narrow = |number| u32::try_from(number).unwrap_or(u32::MAX);
-                    dag.survives = Some(FaultLimit {
-                        faults: narrow(faults),
-                        window,
-                        in_all: narrow(in_all),
-                    });
+                    let limit = FaultLimit::new(narrow(faults), window, narrow(in_all));
+                    dag.survives = Some(limit);
                 }
                 "cluster" => dag.cluster = Some(number(value(words)?)?),
                 "affinity" => dag.affinity = numbers(words)?,

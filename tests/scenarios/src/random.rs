@@ -260,11 +260,7 @@ impl DagText {
     fn fail(&mut self, random: &mut Random) {
         const REPLACED: [Replaced; 3] = [Replaced::Never, Replaced::Anew, Replaced::ByFallback];
         let replaced = REPLACED[random.index(REPLACED.len())];
-        self.survives = (replaced != Replaced::Never).then_some(FaultLimit {
-            faults: 1,
-            window: 1,
-            in_all: 1,
-        });
+        self.survives = (replaced != Replaced::Never).then_some(FaultLimit::new(1, 1, 1));
         let before = random.index(self.subtasks.len());
         self.subtasks.push(SubtaskText {
             name: format!("{}-frail", self.name),

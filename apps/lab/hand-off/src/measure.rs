@@ -185,11 +185,7 @@ pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let [period_ns, offset_ns] =
         [PERIOD, OFFSET].map(|time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
     let core = |job| {
-        let instance = Instance {
-            dag: run.task_set().find(&dags[0]),
-            job,
-            subtask: SubtaskId(0),
-        };
+        let instance = Instance::new(run.task_set().find(&dags[0]), job, SubtaskId(0));
         run.record().instance(instance)?.core
     };
     // Of the lowest priority is the last, wherever it runs.
@@ -406,11 +402,9 @@ impl Measured {
 
     /// Returns what the scheduler did with an instance.
     fn instance(&self, subtask: usize, job: u64) -> Option<&InstanceRecord> {
-        self.run.record().instance(Instance {
-            dag: self.dag,
-            job,
-            subtask: SubtaskId(u32::try_from(subtask).ok()?),
-        })
+        let subtask = SubtaskId(u32::try_from(subtask).ok()?);
+        let instance = Instance::new(self.dag, job, subtask);
+        self.run.record().instance(instance)
     }
 }
 

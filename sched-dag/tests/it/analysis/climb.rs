@@ -10,7 +10,7 @@ use sched_dag::journal::{Event, EventKind, EventSubject};
 use sched_dag::law::{JudgeOptions, dispatch_violations, violations};
 use sched_dag::lifecycle::{LifecyclePlan, ModeEntry, Request, WaitId, WaitLimit};
 use sched_dag::virtual_time::{VirtualTime, Workload};
-use sched_dag::{Dag, DagId, Instance, ModeId, SchedulerOptions, Subtask, SubtaskId, TaskSet};
+use sched_dag::{Dag, DagId, Instance, ModeId, Subtask, SubtaskId, TaskSet};
 
 use super::random::mask;
 
@@ -231,11 +231,7 @@ impl Case {
         is_judged: bool,
         climbed: &mut Climbed,
     ) -> Result<u64, String> {
-        let options = SchedulerOptions {
-            policy: self.settings.policy,
-            preemption: self.settings.preemption,
-            cores: self.settings.cores,
-        };
+        let options = self.settings.scheduler();
         let drawn = Drawn {
             case: self,
             scenario,
@@ -245,11 +241,7 @@ impl Case {
             let subtasks = (0..).map(SubtaskId).zip(model.subtasks());
             let drawn = &drawn;
             subtasks.map(move |(subtask, model)| Body {
-                instance: Instance {
-                    dag,
-                    job: 0,
-                    subtask,
-                },
+                instance: Instance::new(dag, 0, subtask),
                 turn: 0,
                 model,
                 drawn,

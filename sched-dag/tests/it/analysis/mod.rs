@@ -20,7 +20,7 @@ use sched_dag::analysis::{
 };
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, OverrunPolicy,
-    Policy, Preemption, SubtaskId, SubtaskOrder, verify,
+    Policy, Preemption, SchedulerOptions, SubtaskId, SubtaskOrder, verify,
 };
 
 use self::random::sample_with;
@@ -30,12 +30,12 @@ const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
 const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
 
 pub(crate) fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> AnalysisSettings {
-    AnalysisSettings {
+    let scheduler = SchedulerOptions {
         policy,
         preemption,
         cores,
-        overheads: Overheads::default(),
-    }
+    };
+    AnalysisSettings::new(scheduler, Overheads::default())
 }
 
 /// Commits DAGs of any shape, and analyses them.

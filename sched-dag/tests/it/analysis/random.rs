@@ -234,11 +234,7 @@ fn add(spec: &mut DagSpec, own: u32, random: &mut Random) {
     if random.once_in(2) {
         let [faults, in_all] = [9, 20].map(|most| random.within(1..=most));
         let window = random.within(1..=9);
-        spec.on_fault = OnFault::DropJob(FaultLimit {
-            faults,
-            window,
-            in_all,
-        });
+        spec.on_fault = OnFault::DropJob(FaultLimit::new(faults, window, in_all));
     }
     use OverrunPolicy::{Abort, Queue, Skip};
     spec.overrun = random.one_of(&[Queue, Skip, Abort]);

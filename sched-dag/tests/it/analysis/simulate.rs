@@ -4,12 +4,9 @@ use std::sync::Arc;
 
 use sched_dag::law::RunRecord;
 use sched_dag::virtual_time::{RunOutcome, VirtualTime};
-use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, Preemption, Priority,
-    SchedulerOptions, SubtaskSpec, TaskSet, verify,
-};
+use sched_dag::{DagId, DagSpec, Instance, Policy, Preemption, TaskSet};
 
-use crate::support::{Script, Takes};
+use crate::support::{self, Script, Spec, Takes};
 
 /// Returns the spec of a DAG whose subtasks all have one priority.
 pub(crate) fn spec(
@@ -19,28 +16,15 @@ pub(crate) fn spec(
     edges: &[(usize, usize)],
     priority: u32,
 ) -> DagSpec {
-    let subtask = |&wcet_ns: &u64| SubtaskSpec {
-        wcet_ns: Some(wcet_ns),
-        priority: Some(Priority(priority)),
-        ..SubtaskSpec::default()
-    };
-    DagSpec {
-        period_ns: Some(period_ns),
-        relative_deadline_ns: Some(deadline_ns),
-        subtasks: wcets_ns.iter().map(subtask).collect(),
-        edges: edges.to_vec(),
-        ..DagSpec::default()
-    }
+    let alike = vec![priority; wcets_ns.len()];
+    let spec = support::dag(period_ns, deadline_ns, 1, &alike, edges).wcets(wcets_ns);
+    spec.with(|spec| (spec.jobs, spec.in_flight) = (None, None))
 }
 
 /// Verifies specs of any shape.
 pub(crate) fn commit(specs: &[DagSpec], policy: Policy, cores: u32) -> TaskSet {
-    let options =
-        CommitOptions::new(policy, cores).with_construction(ConstructionPolicy::any_graph());
-    match verify(specs, &options) {
-        Ok(verified) => verified.task_set,
-        Err(rejected) => panic!("{rejected}"),
-    }
+    let options = super::settings((policy, Preemption::Enabled), cores).scheduler();
+    Arc::unwrap_or_clone(support::commit(specs, options))
 }
 
 /// The largest response times that were seen.
@@ -70,11 +54,7 @@ pub(crate) fn observe(
     until_ns: u64,
     mut script: Script<'_, impl Takes>,
 ) -> Observed {
-    let options = SchedulerOptions {
-        policy,
-        preemption,
-        cores,
-    };
+    let options = super::settings((policy, preemption), cores).scheduler();
     let driver = VirtualTime::new(&Arc::new(task_set.clone()), options);
     let mut driver = driver.recording();
     let end = driver.run_until(until_ns, &mut script);

@@ -171,11 +171,9 @@ impl<'s> Walk<'s> {
         let (specs, releases) = (&self.set.specs, &mut self.releases);
         match step {
             Step::Complete(_) => {}
-            Step::Fail(Instance { dag, job, .. }) => {
-                releases[dag.index()].fault(&specs[dag.index()], job, false);
-            }
-            Step::Replace(Instance { dag, job, .. }) => {
-                releases[dag.index()].fault(&specs[dag.index()], job, true);
+            Step::Fail(Instance { dag, job, .. }) | Step::Replace(Instance { dag, job, .. }) => {
+                let is_replaceable = matches!(step, Step::Replace(_));
+                releases[dag.index()].fault(&specs[dag.index()], job, is_replaceable);
             }
             Step::Ask(request) => {
                 let (dag, answer) = match request {
@@ -268,11 +266,10 @@ impl<'s> Walk<'s> {
         let (now_ns, mut shortly) = (self.now_ns, self.scheduler.clone());
         let woken = shortly.wake_shortly(now_ns, shortly.log.here);
         let found = match woken {
-            Some((core, vertex)) => vec![Decision {
-                what: EventKind::Resume,
-                core,
-                instance: shortly.instance_of(vertex),
-            }],
+            Some((core, vertex)) => {
+                let instance = shortly.instance_of(vertex);
+                vec![Decision::new(EventKind::Resume, core, instance)]
+            }
             None => shortly.at(now_ns).dispatch().to_vec(),
         };
         let decisions = self.scheduler.at(now_ns).dispatch().to_vec();
@@ -328,22 +325,18 @@ impl<'s> Walk<'s> {
                     };
                     let is_free = free == Some(core) && may_be.contains(&core.0);
                     let is_free = is_free && place.replace(instance).is_none();
-                    match self.preempted.iter().position(|it| *it == instance) {
-                        Some(at) => {
-                            self.preempted.remove(at);
-                            let is_resumed = decision.what == EventKind::Resume;
-                            (EventKind::Resume, is_free && is_resumed)
-                        }
-                        None if self.waits.go_on(instance) => {
-                            let is_resumed = decision.what == EventKind::Resume;
-                            (EventKind::Resume, is_free && is_resumed)
-                        }
-                        None => {
-                            let is_cut = self.releases[instance.dag.index()].is_cut(instance.job);
-                            let is_started = decision.what == EventKind::Start;
-                            (EventKind::Start, is_free && is_started && !is_cut)
-                        }
-                    }
+                    let known = self.preempted.iter().position(|it| *it == instance);
+                    let is_known = match known {
+                        Some(at) => self.preempted.remove(at) == instance,
+                        None => self.waits.go_on(instance),
+                    };
+                    let is_cut = self.releases[instance.dag.index()].is_cut(instance.job);
+                    let what = match is_known {
+                        true => EventKind::Resume,
+                        false => EventKind::Start,
+                    };
+                    let is_right = decision.what == what && (is_known || !is_cut);
+                    (what, is_free && is_right)
                 }
             };
             if !is_right {
@@ -403,11 +396,7 @@ impl<'s> Walk<'s> {
             for &sink in model.sinks() {
                 let relative_ns = model.subtask(sink).relative_deadline_ns();
                 let is_late = |&(number, job): &(u64, &JobRecord)| {
-                    let instance = Instance {
-                        dag,
-                        job: number,
-                        subtask: sink,
-                    };
+                    let instance = Instance::new(dag, number, sink);
                     let finish_ns = record.instances(dag, number)[sink.index()].finish_ns;
                     let is_late_end = u64::from(late_ends.contains(&instance));
                     let finish_ns = finish_ns.map(|ns| ns + is_late_end);

@@ -120,11 +120,7 @@ pub(crate) trait Spec: Sized {
 
     /// Survives `faults` within `window` jobs, `in_all` in all.
     fn surviving(self, faults: u32, window: u64, in_all: u32) -> DagSpec {
-        let limit = FaultLimit {
-            faults,
-            window,
-            in_all,
-        };
+        let limit = FaultLimit::new(faults, window, in_all);
         self.with(|dag| dag.on_fault = OnFault::DropJob(limit))
     }
 
@@ -183,11 +179,7 @@ pub(crate) fn pass_on(
 }
 
 pub(crate) fn instance(dag: u32, job: u64, subtask: u32) -> Instance {
-    Instance {
-        dag: DagId(dag),
-        job,
-        subtask: SubtaskId(subtask),
-    }
+    Instance::new(DagId(dag), job, SubtaskId(subtask))
 }
 
 /// Returns an instance by its name.

@@ -210,14 +210,13 @@ fn draw_dag(random: &mut Random, limits: &Limits, overruns: Overruns) -> DagSpec
         let is_own = is_sink && has_own_deadlines && random.chance(70);
         subtask.relative_deadline_ns = is_own.then(|| random.within(1..=deadline_ns));
     }
-    let policies = [
-        OverrunPolicy::Queue,
-        OverrunPolicy::Skip,
-        OverrunPolicy::Abort,
-    ];
+    use OverrunPolicy::{Abort, Queue, Skip};
     let (in_flight, overrun) = match overruns {
-        Overruns::Never => (jobs, OverrunPolicy::Queue),
-        Overruns::Often => (random.within(1..=jobs.min(3)), random.one_of(&policies)),
+        Overruns::Never => (jobs, Queue),
+        Overruns::Often => (
+            random.within(1..=jobs.min(3)),
+            random.one_of(&[Queue, Skip, Abort]),
+        ),
     };
     let limit = FaultLimit {
         faults: random.within(1..=3),

@@ -114,11 +114,7 @@ fn case_bodies(task_set: &TaskSet) -> impl Iterator<Item = CaseBody> {
     dags.flat_map(|(dag, model)| {
         let subtasks = (0..).map(SubtaskId).zip(model.subtasks());
         subtasks.map(move |(id, subtask)| CaseBody {
-            instance: Instance {
-                dag,
-                job: 0,
-                subtask: id,
-            },
+            instance: Instance::new(dag, 0, id),
             limits_ns: subtask.waits().iter().map(|wait| wait.limit_ns).collect(),
             turn: 0,
             has_timed_out: false,

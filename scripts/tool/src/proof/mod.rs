@@ -28,7 +28,7 @@ pub mod observed;
 use std::path::{Path, PathBuf};
 
 use sched_dag::analysis::{self, AnalysisSettings, Overheads};
-use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
+use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption};
 
 use crate::files;
 use crate::json::Object;
@@ -198,12 +198,8 @@ pub type Slack = [Option<u64>; PARTS.len()];
 /// Splits the bound of a DAG of a commit into its parts.
 pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
-        let options = SchedulerOptions {
-            policy: settings.policy,
-            preemption: settings.preemption,
-            cores: settings.cores,
-        };
-        let task_set = record::task_set(options, CoreDivision::Undivided, dags).ok()?;
+        let task_set =
+            record::task_set(settings.scheduler(), CoreDivision::Undivided, dags).ok()?;
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };

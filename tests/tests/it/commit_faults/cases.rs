@@ -14,11 +14,7 @@ type Case = (&'static str, fn() -> Vec<Dag>);
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
 /// One fault within 100 jobs, and 8 in all.
-const FAULT_LIMIT: FaultLimit = FaultLimit {
-    faults: 1,
-    window: 100,
-    in_all: 8,
-};
+const FAULT_LIMIT: FaultLimit = FaultLimit::new(1, 100, 8);
 
 /// Graphs that are wrong, each behind the name of its fault.
 pub(crate) const GRAPHS: &str = "\
@@ -136,20 +132,8 @@ pub(crate) const CASES: &[Case] = &[
     }),
     ("zero_jobs", || changed(|dag| _ = dag.jobs(0))),
     ("zero_in_flight", || changed(|dag| _ = dag.in_flight(0))),
-    ("zero_faults", || {
-        let in_all = 0;
-        surviving(FaultLimit {
-            in_all,
-            ..FAULT_LIMIT
-        })
-    }),
-    ("zero_window", || {
-        let window = 0;
-        surviving(FaultLimit {
-            window,
-            ..FAULT_LIMIT
-        })
-    }),
+    ("zero_faults", || surviving(FaultLimit::new(1, 100, 0))),
+    ("zero_window", || surviving(FaultLimit::new(1, 0, 8))),
     ("too_many_instances", || {
         changed(|dag| _ = dag.in_flight(u32::MAX))
     }),
