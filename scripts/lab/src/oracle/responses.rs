@@ -277,16 +277,10 @@ impl Costs {
 
     /// Returns the settings of an analysis that charges them.
     const fn charged(&self, options: SchedulerOptions) -> AnalysisSettings {
-        AnalysisSettings {
-            policy: options.policy,
-            preemption: options.preemption,
-            cores: options.cores,
-            overheads: Overheads {
-                // Lateness of a release is charged with the dispatch.
-                dispatch_ns: self.overheads.dispatch_ns + self.late_ns,
-                ..self.overheads
-            },
-        }
+        // Lateness of a release is charged with the dispatch.
+        let mut overheads = self.overheads;
+        overheads.dispatch_ns += self.late_ns;
+        AnalysisSettings::new(options, overheads)
     }
 }
 
