@@ -152,7 +152,8 @@ pub mod shared {
     pub use crate::api::waiting::TimedOut;
     pub use crate::api::wall_clock::{UnixTime, WallClock, WallClockUse};
     pub use crate::api::wire::{
-        DeviceEnd, Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions,
+        DeviceEnd, Packet, ReceiveUse, Received, SendUse, SendValuesUse, Sender, ValueSender, Wire,
+        WireCounts, WireOptions,
     };
     pub use crate::api::wire_waits::{ReadUse, WireReader, WireWriter, WriteUse};
     pub use crate::run::wire::Framing;

@@ -2,7 +2,8 @@
 
 use core::fmt;
 
-/// Writes values one after the other into a buffer, and counts what does not fit.
+/// Writes values one after the other into a buffer, and counts what does not fit. Which of both forms
+/// they have is of the type: so recording has no code for the other.
 ///
 /// ```
 /// use recording::{Encoder, Full, Recordable};
@@ -18,7 +19,7 @@ use core::fmt;
 /// assert_eq!(out.finish(), Err(Full { needed: 8 }));
 /// ```
 #[derive(Debug)]
-pub struct Encoder<'b> {
+pub struct Encoder<'b, const CDR: bool = false> {
     buffer: &'b mut [u8],
     /// The bytes so far, with those that did not fit; `usize::MAX`: more than can be.
     written: usize,
@@ -38,6 +39,33 @@ impl<'b> Encoder<'b> {
     #[inline]
     pub const fn new(buffer: &'b mut [u8]) -> Self {
         Self { buffer, written: 0 }
+    }
+}
+
+impl<'b> Encoder<'b, true> {
+    /// Begins a value in the form of [CDR](crate#cdr).
+    #[must_use]
+    pub const fn cdr(buffer: &'b mut [u8]) -> Self {
+        Self { buffer, written: 0 }
+    }
+}
+
+impl<const CDR: bool> Encoder<'_, CDR> {
+    /// Aligns what follows to its size, if that is the form.
+    #[inline]
+    pub(crate) fn align(&mut self, bytes: usize) {
+        if CDR && let Some(places) = self.places(padding(self.written, bytes)) {
+            places.fill(0);
+        }
+    }
+
+    /// Writes text, and how many bytes it has.
+    pub(crate) fn text(&mut self, text: &str) {
+        self.count(text.len() + usize::from(CDR));
+        self.put(text.as_bytes());
+        if CDR {
+            self.put(&[0]);
+        }
     }
 
     /// Writes bytes as they are.
@@ -61,6 +89,7 @@ impl<'b> Encoder<'b> {
 
     /// Writes how many elements or bytes follow. More than 2^32 - 1 fit into no buffer.
     pub(crate) fn count(&mut self, count: usize) {
+        self.align(4);
         match u32::try_from(count) {
             Ok(count) => self.put(&count.to_le_bytes()),
             // Cut short it would be another value; `finish` reports a buffer that is too small.
@@ -82,6 +111,19 @@ impl<'b> Encoder<'b> {
             }),
         }
     }
+}
+
+/// Refuses a type when it is compiled, if it is to be in a form that it does not have.
+pub(crate) const fn require(has_form: bool) {
+    assert!(
+        has_form,
+        "an option, a `char`, and a number of 16 bytes have no form in CDR"
+    );
+}
+
+/// Returns how many bytes there are up to the next multiple, of 8 at most.
+const fn padding(offset: usize, bytes: usize) -> usize {
+    offset.wrapping_neg() & (bytes - 1) & 7
 }
 
 impl fmt::Display for Full {
@@ -107,7 +149,7 @@ impl core::error::Error for Full {}
 /// assert_eq!(malformed.to_string(), "at byte 3: expected a truth value, 0 or 1");
 /// ```
 #[derive(Clone, Debug)]
-pub struct Decoder<'b> {
+pub struct Decoder<'b, const CDR: bool = false> {
     bytes: &'b [u8],
     offset: usize,
 }
@@ -127,6 +169,39 @@ impl<'b> Decoder<'b> {
     /// Begins at the start of these bytes.
     pub const fn new(bytes: &'b [u8]) -> Self {
         Self { bytes, offset: 0 }
+    }
+}
+
+impl<'b> Decoder<'b, true> {
+    /// Begins a value in the form of [CDR](crate#cdr).
+    #[must_use]
+    pub const fn cdr(bytes: &'b [u8]) -> Self {
+        Self { bytes, offset: 0 }
+    }
+}
+
+impl<'b, const CDR: bool> Decoder<'b, CDR> {
+    /// Leaves out what stands before a number of so many bytes. Other programs leave there what was in
+    /// their memory.
+    #[inline]
+    fn align(&mut self, bytes: usize) {
+        if CDR {
+            let end = self.offset + padding(self.offset, bytes);
+            self.offset = end.min(self.bytes.len());
+        }
+    }
+
+    /// Takes text without a copy.
+    pub(crate) fn text(&mut self) -> Result<&'b str, Malformed> {
+        let count = self.count(1)?;
+        let malformed = self.expected("UTF-8 text");
+        let bytes = self.take(count, malformed.expected)?;
+        let bytes = match bytes {
+            [text @ .., 0] if CDR => text,
+            _ if CDR => return Err(self.expected("text with a zero at its end")),
+            text => text,
+        };
+        core::str::from_utf8(bytes).map_err(|error| malformed.behind(error.valid_up_to()))
     }
 
     /// Returns the offset of the next byte.
@@ -166,11 +241,13 @@ impl<'b> Decoder<'b> {
         }
     }
 
-    /// Takes the next bytes as an array.
+    /// Takes the bytes of a number, or an array of others in the form of recordings.
     pub(crate) fn array<const N: usize>(
         &mut self,
         expected: &'static str,
     ) -> Result<[u8; N], Malformed> {
+        const { require(!CDR || N <= 8) }
+        self.align(N);
         let offset = self.offset;
         let taken = self.take(N, expected)?;
         (taken.try_into()).map_err(|_| Malformed { offset, expected })

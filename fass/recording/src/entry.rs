@@ -84,12 +84,12 @@ macro_rules! kinds {
                 u8::schema()
             }
 
-            fn encode(&self, out: &mut Encoder<'_>) {
+            fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
                 // The number is the place in the declaration: new kinds are added at the end only.
                 out.put(&[*self as u8]);
             }
 
-            fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+            fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
                 // Taken before the byte is read, so that it names the place of the number itself.
                 let malformed = input.expected($expected);
                 let number = usize::from(u8::decode(input)?);
@@ -203,7 +203,7 @@ pub fn release_ns_of(bytes: &[u8], value: usize) -> Option<u64> {
 }
 
 impl<'v> Entry<'v> {
-    pub(super) fn encode(&self, out: &mut Encoder<'_>) {
+    pub(super) fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
         // The value comes last and has no length: the frame's length says where it ends.
         self.what.encode(out);
         (self.dag, self.place, self.job, self.release_ns, self.at_ns).encode(out);

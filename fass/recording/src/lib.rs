@@ -24,12 +24,22 @@
 //! | `bool` | 1: 0 or 1 |
 //! | `char` | 4: the scalar value |
 //! | `Option<T>` | 1: 0, or 1 and the value |
-//! | `Vec<T>` | 4: how many, and these |
-//! | `String` | 4: how many bytes of UTF-8, and these |
+//! | `Vec<T>`, [`List<T, N>`](List) | 4: how many, and these |
+//! | `String`, [`Text`] | 4: how many bytes of UTF-8, and these |
 //! | array, tuple, struct | the elements or fields, one after the other |
 //! | `Arc<T>`, `Box<T>` | as `T` |
 //!
 //! `usize` and `isize` have no width of their own, so they cannot be recorded.
+//!
+//! # CDR
+//!
+//! The same types have a second form, for the wires of others: that of XCDR1, the Common Data
+//! Representation of ROS 2, little-endian and without its header of 4 bytes. It differs in two points.
+//! A number, or how many elements follow, begins at a multiple of its size, behind zeros; of lists
+//! and arrays of numbers only the first one needs it, and an empty one does not. Text has a zero at
+//! its end, which is counted. [`Encoder::cdr`] writes it, and [`Decoder::cdr`] reads it, whatever
+//! stands in place of the zeros. Options, characters and numbers of 16 bytes have no such form over
+//! there.
 //!
 //! # What is guaranteed
 //!
@@ -53,6 +63,7 @@ extern crate alloc;
 
 mod bytes;
 mod entry;
+mod inline;
 mod read;
 mod recordable;
 mod schema;
@@ -64,6 +75,7 @@ pub use entry::{Channel, DagHeader, Entry, EntryKind, Header, Role, release_ns_o
 pub use entry::{
     Commit, CommittedDag, CommittedSubtask, CommittedTopic, Counted, DagTimes, SubtaskTimes, Times,
 };
+pub use inline::{List, Text};
 pub use read::{Chunk, Events, Mismatch, Recording, completed, mended};
 #[doc(hidden)]
 pub use recordable::deepest;

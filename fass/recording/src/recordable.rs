@@ -10,7 +10,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use super::bytes::{Decoder, Encoder, Full, Malformed};
+use super::bytes::{Decoder, Encoder, Full, Malformed, require};
 use super::schema;
 use super::schema::{DEEP, Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
 
@@ -56,11 +56,11 @@ pub trait Recordable: Sized {
     /// Writes the value. Allocates nothing.
     ///
     /// See [`Encoder`].
-    fn encode(&self, out: &mut Encoder<'_>);
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>);
 
     /// Writes values one after the other; numbers at once, for that is many times as fast.
     #[doc(hidden)]
-    fn encode_all(values: &[Self], out: &mut Encoder<'_>) {
+    fn encode_all<const CDR: bool>(values: &[Self], out: &mut Encoder<'_, CDR>) {
         values.iter().for_each(|value| value.encode(out));
     }
 
@@ -71,7 +71,7 @@ pub trait Recordable: Sized {
     /// Where the bytes are none of this type.
     ///
     /// See [`Decoder`].
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed>;
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed>;
 
     /// Reads the value that these bytes are.
     ///
@@ -118,15 +118,20 @@ macro_rules! implement_number {
             }
 
             #[inline]
-            fn encode(&self, out: &mut Encoder<'_>) {
+            fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
+                const { require(!CDR || Self::LEAST_BYTES <= 8) }
+                out.align(size_of::<Self>());
                 out.put(&self.to_le_bytes());
             }
 
             #[inline]
-            fn encode_all(values: &[Self], out: &mut Encoder<'_>) {
+            fn encode_all<const CDR: bool>(values: &[Self], out: &mut Encoder<'_, CDR>) {
                 /// As many as are copied at once: each block by way of a place of its own, so
                 /// the compiler knows that it does not overlap where it goes.
                 const BLOCK: usize = 8;
+                if !values.is_empty() {
+                    out.align(size_of::<Self>());
+                }
                 let Some(places) = out.places(size_of_val(values)) else {
                     return;
                 };
@@ -141,7 +146,7 @@ macro_rules! implement_number {
                 }
             }
 
-            fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+            fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
                 input.array($expected).map(Self::from_le_bytes)
             }
         })*
@@ -171,11 +176,11 @@ impl Recordable for bool {
         Schema::Scalar(Scalar::Bool)
     }
 
-    fn encode(&self, out: &mut Encoder<'_>) {
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
         out.put(&[u8::from(*self)]);
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
         let malformed = input.expected("a truth value, 0 or 1");
         // Other bytes are refused, not taken for true: each of both values has one form.
         match input.array(malformed.expected)? {
@@ -194,11 +199,13 @@ impl Recordable for char {
         Schema::Scalar(Scalar::Char)
     }
 
-    fn encode(&self, out: &mut Encoder<'_>) {
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
+        const { require(!CDR) }
         u32::from(*self).encode(out);
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
+        const { require(!CDR) }
         let malformed = input.expected("a character, 4 bytes");
         let value = u32::from_le_bytes(input.array(malformed.expected)?);
         Self::from_u32(value).ok_or(malformed)
@@ -213,22 +220,13 @@ impl Recordable for String {
         Schema::Scalar(Scalar::Text)
     }
 
-    fn encode(&self, out: &mut Encoder<'_>) {
-        out.count(self.len());
-        out.put(self.as_bytes());
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
+        out.text(self);
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        text(input).map(Self::from)
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
+        input.text().map(Self::from)
     }
-}
-
-/// Reads text without a copy.
-pub(crate) fn text<'b>(input: &mut Decoder<'b>) -> Result<&'b str, Malformed> {
-    let count = input.count(1)?;
-    let malformed = input.expected("UTF-8 text");
-    let bytes = input.take(count, malformed.expected)?;
-    core::str::from_utf8(bytes).map_err(|error| malformed.behind(error.valid_up_to()))
 }
 
 /// Defines structs whose values can be written down: a struct is written field by field.
@@ -279,11 +277,11 @@ macro_rules! recordable {
                     )
                 }
 
-                fn encode(&self, out: &mut $crate::Encoder<'_>) {
+                fn encode<const CDR: bool>(&self, out: &mut $crate::Encoder<'_, CDR>) {
                     $($crate::Recordable::encode(&self.$field, out);)*
                 }
 
-                fn decode(input: &mut $crate::Decoder<'_>) -> Result<Self, $crate::Malformed> {
+                fn decode<const CDR: bool>(input: &mut $crate::Decoder<'_, CDR>) -> Result<Self, $crate::Malformed> {
                     Ok(Self { $($field: $crate::Recordable::decode(input)?),* })
                 }
             }
@@ -304,14 +302,16 @@ impl<T: Recordable> Recordable for Option<T> {
         Schema::Option(Box::new(T::schema()))
     }
 
-    fn encode(&self, out: &mut Encoder<'_>) {
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
+        const { require(!CDR) }
         self.is_some().encode(out);
         if let Some(value) = self {
             value.encode(out);
         }
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
+        const { require(!CDR) }
         match bool::decode(input)? {
             true => T::decode(input).map(Some),
             false => Ok(None),
@@ -327,12 +327,12 @@ impl<T: Recordable> Recordable for Vec<T> {
         Schema::List(Box::new(T::schema()))
     }
 
-    fn encode(&self, out: &mut Encoder<'_>) {
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
         out.count(self.len());
         T::encode_all(self, out);
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
         const {
             assert!(
                 T::LEAST_BYTES > 0,
@@ -362,11 +362,11 @@ impl<T: Recordable, const N: usize> Recordable for [T; N] {
     }
 
     #[inline]
-    fn encode(&self, out: &mut Encoder<'_>) {
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
         T::encode_all(self, out);
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
         const {
             assert!(
                 T::LEAST_BYTES > 0,
@@ -398,11 +398,11 @@ macro_rules! implement_pointer {
                 T::schema()
             }
 
-            fn encode(&self, out: &mut Encoder<'_>) {
+            fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
                 T::encode(self, out);
             }
 
-            fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+            fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
                 const {
                     assert!(is_moderate::<T>(), "few bytes would become much memory; box what is optional");
                 }
@@ -425,13 +425,13 @@ macro_rules! implement_tuple {
             }
 
             #[allow(unused_variables, reason = "the empty tuple takes no bytes")]
-            fn encode(&self, out: &mut Encoder<'_>) {
+            fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
                 let ($($item,)*) = self;
                 $($item.encode(out);)*
             }
 
             #[allow(unused_variables, reason = "the empty tuple takes no bytes")]
-            fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+            fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
                 Ok(($($Item::decode(input)?,)*))
             }
         }
@@ -479,7 +479,7 @@ impl Recordable for Schema {
         Schema::Tuple(Vec::new())
     }
 
-    fn encode(&self, out: &mut Encoder<'_>) {
+    fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
         match self {
             Self::Scalar(scalar) => {
                 out.put(&[*scalar as u8]);
@@ -514,7 +514,7 @@ impl Recordable for Schema {
         }
     }
 
-    fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+    fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
         let malformed = input.expected(schema::WEIGHTLESS);
         let schema = Self::decode_at(input, 0)?;
         match schema.weightless() <= MOST_WEIGHTLESS {
@@ -525,7 +525,10 @@ impl Recordable for Schema {
 }
 
 impl Schema {
-    fn decode_at(input: &mut Decoder<'_>, depth: usize) -> Result<Self, Malformed> {
+    fn decode_at<const CDR: bool>(
+        input: &mut Decoder<'_, CDR>,
+        depth: usize,
+    ) -> Result<Self, Malformed> {
         let start = input.clone();
         // Before anything is read: each level is a call, and the stack has an end.
         if depth == MOST_DEPTH {
@@ -535,8 +538,8 @@ impl Schema {
         if let Some(scalar) = Scalar::ALL.get(usize::from(kind)) {
             return Ok(Self::Scalar(*scalar));
         }
-        let inner = |input: &mut Decoder<'_>| Self::decode_at(input, depth + 1);
-        let element = |input: &mut Decoder<'_>| {
+        let inner = |input: &mut Decoder<'_, CDR>| Self::decode_at(input, depth + 1);
+        let element = |input: &mut Decoder<'_, CDR>| {
             let malformed = input.expected(WEIGHTLESS);
             let element = inner(input)?;
             match element.least_bytes() {

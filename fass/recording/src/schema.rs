@@ -63,7 +63,7 @@ macro_rules! of_scalars {
         $define!(
             Bool "bool" 1 bool bool::decode;
             Char "char" 4 char char::decode;
-            Text "text" 4 String text;
+            Text "text" 4 String Decoder::text;
             U8 "u8" 1 u8 u8::decode;
             U16 "u16" 2 u16 u16::decode;
             U32 "u32" 4 u32 u32::decode;

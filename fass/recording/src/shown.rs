@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
 use super::bytes::{Decoder, Malformed};
-use super::recordable::{Recordable, text, to_bytes};
+use super::recordable::{Recordable, to_bytes};
 use super::schema::{Field, Scalar, Schema, of_scalars};
 
 /// A part of a value, in the order of its bytes.

@@ -87,6 +87,13 @@ impl WallClock {
         WallClockUse(self.clone())
     }
 
+    /// Returns the Unix time of an instant on the clock of [`now_ns`](crate::now_ns), in nanoseconds,
+    /// for a platform: a DAG [reads](Self::reading) it.
+    pub fn at(&self, instant_ns: u64) -> Option<u64> {
+        let offset_ns = self.0.load(Ordering::Relaxed);
+        UnixTime { offset_ns }.of(instant_ns)
+    }
+
     /// States the Unix time of an instant, for the jobs to come: by what a peer has said, say, whose
     /// word need not be right. The first time counts as it is. A later one moves the clock by `most`
     /// at most, also backwards: intervals are those of [`now_ns`](crate::now_ns).

@@ -227,6 +227,36 @@ impl Wire {
         SendUse(self.clone())
     }
 
+    /// Returns the use of the subtask that sends values, each as one packet: `encode` writes a value
+    /// into the packet's place, and returns how many bytes it has. If these are more than the place,
+    /// the instance's packets are lost.
+    ///
+    /// ```
+    /// use fass::shared::{ValueSender, Wire};
+    ///
+    /// fn encode(value: &u32, place: &mut [u8]) -> usize {
+    ///     if let Some(place) = place.first_chunk_mut() {
+    ///         *place = value.to_le_bytes();
+    ///     }
+    ///     4
+    /// }
+    /// fn square(mut out: ValueSender<'_, u32>, (number,): (u32,)) {
+    ///     out.put(&(number * number));
+    /// }
+    /// let wire = Wire::new("squares");
+    /// let dag = fass::create_dag();
+    /// let sink = dag.using(wire.sending_values(encode)).subtask(square).reads(&["number"]);
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If another subtask sends on the wire.
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    #[track_caller]
+    pub fn sending_values<T>(&self, encode: fn(&T, &mut [u8]) -> usize) -> SendValuesUse<T> {
+        SendValuesUse(self.sending(), encode)
+    }
+
     /// Claims the way in.
     #[track_caller]
     pub(super) fn claim_in(&self) {
@@ -326,6 +356,14 @@ impl DeviceEnd {
     pub fn swap_in(&self, packet: &mut Buffer, from: SocketAddrV4, now_ns: u64) -> bool {
         let incoming = &self.0.shared.incoming;
         incoming.swap(packet, Some(from), now_ns)
+    }
+
+    /// Takes a packet by a copy of its bytes, and counts one that is too long or finds no room.
+    ///
+    /// See [`swap_in`](Self::swap_in).
+    #[must_use]
+    pub fn copy_in(&self, packet: &[u8], now_ns: u64) -> bool {
+        self.0.shared.incoming.arrive(packet, now_ns)
     }
 
     /// Ends the wait for a packet, if there is one, and returns what
@@ -429,6 +467,12 @@ pub struct ReceiveUse<T> {
 #[derive(Debug)]
 pub struct SendUse(Wire);
 
+/// The use of a wire by the subtask that sends values. Made by [`Wire::sending_values`].
+///
+/// See [`Wire`].
+#[derive(Debug)]
+pub struct SendValuesUse<T>(SendUse, fn(&T, &mut [u8]) -> usize);
+
 /// The packets that an instance is given, the oldest first. Those that it does not take stay
 /// for the next one.
 ///
@@ -456,6 +500,21 @@ pub struct Packet<T> {
 /// See [`Wire`].
 #[derive(Debug)]
 pub struct Sender<'a>(&'a Wire);
+
+/// The handle by which a function sends values. See [`Wire::sending_values`].
+#[derive(Debug)]
+pub struct ValueSender<'a, T>(&'a Wire, fn(&T, &mut [u8]) -> usize);
+
+impl<T> ValueSender<'_, T> {
+    /// Sends a value as one packet, when this instance is complete.
+    ///
+    /// See [`Wire::sending_values`].
+    pub fn put(&mut self, value: &T) {
+        let Self(wire, encode) = self;
+        let outgoing = &wire.shared.outgoing;
+        outgoing.stage_packet(|place| encode(value, place));
+    }
+}
 
 impl<T> Iterator for Received<'_, T> {
     type Item = Packet<T>;
@@ -618,5 +677,25 @@ impl Uses for SendUse {
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
         Sender(guard)
+    }
+}
+
+impl<T> sealed::Sealed for SendValuesUse<T> {}
+
+impl<T: 'static> Uses for SendValuesUse<T> {
+    type Borrowed<'a> = ValueSender<'a, T>;
+    type Held = (Wire, fn(&T, &mut [u8]) -> usize);
+    type Guard<'a> = (&'a Wire, fn(&T, &mut [u8]) -> usize);
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+        (self.0.hold(dag, subtask), self.1)
+    }
+
+    fn enter((wire, encode): &mut Self::Held) -> Self::Guard<'_> {
+        (SendUse::enter(wire), *encode)
+    }
+
+    fn borrow<'a, 'g>((wire, encode): &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+        ValueSender(wire, *encode)
     }
 }

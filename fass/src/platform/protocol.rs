@@ -15,6 +15,8 @@ use crate::shared::DeviceEnd;
 ///
 /// Its methods are called in interrupts, so none waits, allocates or loops without a bound, but
 /// [`begin`](Self::begin).
+///
+/// See [`Wire`](crate::shared::Wire).
 pub trait Protocol: Send {
     /// Begins, before the commit: takes the devices' ends of its wires, 64 at most. Datagrams have
     /// so many bytes at most. `ready` is called when a wire has a packet to go, in the completion of
@@ -30,14 +32,19 @@ pub trait Protocol: Send {
     fn hear(&mut self, datagram: &[u8], now_ns: u64) -> u64;
 
     /// Hands over the next datagram to go, if there is one. `send` reports whether it has gone, as
-    /// does this; one that has not is handed over again.
+    /// does this; one that has not is handed over again. `send` may swap the buffer.
     fn send(&mut self, now_ns: u64, send: &mut dyn FnMut(&mut Buffer) -> bool) -> bool;
 
-    /// Says whether the device has a link.
+    /// Says whether the device has a link, at the start of a run and when that changes. After
+    /// [`close`](Self::close) it begins anew.
     fn set_link(&mut self, is_up: bool);
 
     /// Ends: what is sent afterwards says goodbye to the peer.
     fn close(&mut self);
+
+    /// Says in the log what people should know, such as that a session was lost, once. Not in an
+    /// instance.
+    fn tell_news(&mut self) {}
 
     /// Tells what it has counted, each count with its name.
     fn counts(&self, tell: &mut dyn FnMut(&'static str, u64));

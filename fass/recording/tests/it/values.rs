@@ -263,3 +263,49 @@ fn a_value_is_shown_as_json() {
         r#"{"id":0,"label":"","place":null}"#
     );
 }
+
+#[test]
+fn in_cdr_numbers_are_aligned_lists_once_and_text_has_a_zero() {
+    fn is<T: Recordable + PartialEq + Debug>(value: T, bytes: &[u8]) {
+        let mut place = [0xee; 64];
+        let mut out = Encoder::cdr(&mut place);
+        value.encode(&mut out);
+        assert_eq!(out.finish(), Ok(bytes.len()));
+        assert_eq!(&place[..bytes.len()], bytes);
+        let mut input = Decoder::cdr(bytes);
+        assert_eq!(T::decode(&mut input), Ok(value));
+        assert_eq!(input.expect_end(), Ok(()));
+    }
+    is(
+        (7_u8, 8_u64),
+        &[7, 0, 0, 0, 0, 0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0],
+    );
+    is((7_u8, [8_u16, 9], 1_u8), &[7, 0, 8, 0, 9, 0, 1]);
+    is(
+        (7_u8, Vec::<f64>::new(), 1_u8),
+        &[7, 0, 0, 0, 0, 0, 0, 0, 1],
+    );
+    let one = [0, 0, 0, 0, 0, 0, 0xf0, 0x3f];
+    is(
+        (7_u8, vec![1.0_f64]),
+        &[&[7, 0, 0, 0, 1, 0, 0, 0][..], &one].concat(),
+    );
+    is(
+        (true, 7_u32, vec![1.0_f64]),
+        &[&[1, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0][..], &one].concat(),
+    );
+    is(
+        ("a".to_owned(), String::new(), 7_u8),
+        &[2, 0, 0, 0, b'a', 0, 0, 0, 1, 0, 0, 0, 0, 7],
+    );
+    is(
+        vec![vec![1_u16], vec![]],
+        &[2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0],
+    );
+    // Cut in the padding.
+    let malformed = <(u8, u32)>::decode(&mut Decoder::cdr(&[7, 0])).unwrap_err();
+    assert_eq!(
+        (malformed.offset, malformed.expected),
+        (2, "a u32, 4 bytes")
+    );
+}

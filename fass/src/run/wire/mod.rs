@@ -478,6 +478,34 @@ impl WireOutput {
         !staging.is_lost
     }
 
+    /// Has `write` put a whole packet into its place, and return how many bytes it has.
+    pub(crate) fn stage_packet(&self, write: impl FnOnce(&mut [u8]) -> usize) {
+        let Some(mut staging) = self.staging.change() else {
+            return;
+        };
+        let staging = &mut *staging;
+        staging.end_packet();
+        let most = self.most.load(Ordering::Relaxed);
+        let place = staging.putter.place(staging.packets);
+        let buffer = place.map(|place| &mut place.buffer);
+        let length = match buffer {
+            Some(buffer) => {
+                let room = most.min(buffer.whole().len() - Buffer::HEADROOM);
+                let length = write(&mut buffer.whole()[Buffer::HEADROOM..][..room]);
+                staging.is_lost |= length > room;
+                buffer.set_range(Buffer::HEADROOM..Buffer::HEADROOM + length.min(room));
+                length
+            }
+            // For the count of what is lost.
+            None => {
+                staging.is_lost = true;
+                write(&mut [])
+            }
+        };
+        (staging.open, staging.bytes) = (length, staging.bytes.saturating_add(length));
+        staging.end_packet();
+    }
+
     /// Ends the instance's open packet.
     pub(crate) fn end_packet(&self) {
         if let Some(mut staging) = self.staging.change() {

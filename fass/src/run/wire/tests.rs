@@ -187,3 +187,34 @@ fn what_an_instance_sends_is_one_packet_unless_it_ends_more() {
     assert_eq!(next().as_deref(), Some(&b"at last"[..]));
     assert_eq!(READY.load(Ordering::Relaxed), 3, "not for what is lost");
 }
+
+#[test]
+fn a_value_is_written_into_its_place_and_lost_with_all_others_if_it_has_none() {
+    let outgoing = Arc::new(WireOutput::new(8, 2));
+    outgoing.begin_packets(9, || ());
+    let mut completion = SendCompletion(Arc::clone(&outgoing));
+    let mut put = |values: &[&[u8]]| {
+        for value in values {
+            outgoing.stage_packet(|place| {
+                let place = place.get_mut(..value.len());
+                _ = place.map(|place| place.copy_from_slice(value));
+                value.len()
+            });
+        }
+        completion.happen(0, &mut |_| ());
+        let mut sent = Vec::new();
+        while outgoing.take_packet(|packet| {
+            sent.push(packet.buffer.content().to_vec());
+            true
+        }) {}
+        (sent.concat(), outgoing.lost.get())
+    };
+    assert_eq!(put(&[b"nine more", b"a"]), (b"nine morea".to_vec(), 0));
+    assert_eq!(put(&[b"a", b"ten bytes."]), (vec![], 11));
+    assert_eq!(
+        put(&[b"a", b"b", b"c"]),
+        (vec![], 14),
+        "there is room for two"
+    );
+    assert_eq!(put(&[b"a"]), (b"a".to_vec(), 14));
+}

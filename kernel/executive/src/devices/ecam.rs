@@ -35,7 +35,7 @@ impl core::fmt::Display for EcamError {
         match self {
             Self::Absent => f.write_str(
                 "the machine has no PCI configuration space in memory; boot a PC with PCI \
-                 Express, in QEMU by `--machine q35`",
+                 Express, in QEMU by `--machine q35`, with a network by `--net user`",
             ),
             Self::Taken(start) => write!(
                 f,
