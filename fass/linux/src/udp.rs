@@ -2,8 +2,10 @@
 //!
 //! Each wire has a socket, bound to all addresses of this computer, and a thread waiting for
 //! datagrams. Another thread sends for all wires. A completion wakes the sender, by an exchange and,
-//! while the sender sleeps, a call of the kernel. Neither thread has a level, as with bytes.
+//! while the sender sleeps, a call of the kernel. Neither thread has a level, as with bytes. A
+//! [protocol](Protocol) stands in the place of a wire, before wires of its own.
 
+use std::fmt;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +13,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::{self, JoinHandle, Thread};
 use std::time::Duration;
 
-use fass::platform::{Buffer, Platform as _};
+use fass::platform::{Buffer, Platform as _, Protocol};
 use fass::shared::{DeviceEnd, Wire};
 
 use crate::edge::unpoisoned;
@@ -24,18 +26,25 @@ const MOST_BYTES: usize = 1472;
 /// The most bytes of a datagram.
 const MOST_RECEIVED: usize = 65_536;
 
-/// A wire's connection to UDP. Dropping this sends the rest, and ends the connection.
+/// The port of a protocol (RFC 6335, 6), unless somebody has it.
+const FIRST_OWN_PORT: u16 = 49_152;
+
+/// How long the sender sleeps while a protocol may have something to say.
+const PROTOCOL_PERIOD: Duration = Duration::from_millis(5);
+
+/// A wire's or a protocol's connection to UDP. Dropping this closes it.
 ///
 /// See [`Linux::connect_udp`].
 #[derive(Debug)]
 pub struct UdpConnection {
-    wire: Arc<UdpWire>,
+    place: Arc<UdpPlace>,
     receiver: Option<JoinHandle<()>>,
 }
 
-#[derive(Debug)]
-struct UdpWire {
-    end: DeviceEnd,
+struct UdpPlace {
+    /// The wires: of a protocol, or one.
+    ends: Box<[Arc<DeviceEnd>]>,
+    protocol: Option<Mutex<Box<dyn Protocol>>>,
     socket: UdpSocket,
     peer: Option<SocketAddrV4>,
     /// The latest peer.
@@ -43,10 +52,10 @@ struct UdpWire {
     has_ended: AtomicBool,
 }
 
-/// The connected wires, locked while sending.
-static WIRES: Mutex<Vec<Arc<UdpWire>>> = Mutex::new(Vec::new());
+/// The connected places, locked while sending.
+static PLACES: Mutex<Vec<Arc<UdpPlace>>> = Mutex::new(Vec::new());
 
-/// The sending thread, once there is a wire.
+/// The sending thread, once there is one.
 static SENDER: OnceLock<Thread> = OnceLock::new();
 
 impl Linux {
@@ -87,59 +96,140 @@ impl Linux {
         peer: Option<SocketAddrV4>,
     ) -> io::Result<UdpConnection> {
         let end = end_of(wire)?;
-        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).map_err(|why| {
-            let remedy = "choose another one, or end the program that has it";
-            let line = format!("UDP port {port} cannot be had ({why}); {remedy}");
-            io::Error::new(why.kind(), line)
-        })?;
-        // The end of a run wakes the receiver by a datagram, which a firewall may stop.
-        socket.set_read_timeout(Some(Duration::from_secs(1)))?;
-        end.begin_packets(MOST_BYTES, || _ = SENDER.get().map(Thread::unpark));
-        let (last, has_ended) = (Mutex::new(None), AtomicBool::new(false));
-        let wire = Arc::new(UdpWire {
-            end,
-            socket,
-            peer,
-            last,
-            has_ended,
-        });
-        let mut wires = unpoisoned(&WIRES);
-        if SENDER.get().is_none() {
-            let sender = thread::Builder::new().name("fass-udp".into()).spawn(send)?;
-            let _ = SENDER.set(sender.thread().clone());
-        }
-        let own = Arc::clone(&wire);
-        let receiver = thread::Builder::new().spawn(move || own.receive())?;
-        wires.push(Arc::clone(&wire));
-        drop(wires);
-        wire.end.set_link(true);
-        let receiver = Some(receiver);
-        Ok(UdpConnection { wire, receiver })
+        let socket = bind(port)?;
+        end.begin_packets(MOST_BYTES, wake_sender);
+        connect(Box::new([Arc::new(end)]), None, socket, peer)
+    }
+
+    /// Connects a protocol to its peer, from port 49,152 of this computer if that is free, or another.
+    /// To be called before the commit of its wires' DAGs, and once a run.
+    ///
+    /// See [`connect_udp`](Self::connect_udp).
+    ///
+    /// # Errors
+    ///
+    /// A wire of the protocol's is connected already, or the system has no more threads.
+    pub fn connect_protocol(
+        &self,
+        mut protocol: Box<dyn Protocol>,
+        peer: SocketAddrV4,
+    ) -> io::Result<UdpConnection> {
+        // From the same port a node that begins again ends the session of the one before at once.
+        let socket = bind(FIRST_OWN_PORT).or_else(|_| bind(0))?;
+        let ends = protocol.begin(MOST_BYTES, wake_sender);
+        let ends = ends.map_err(io::Error::other)?;
+        connect(ends, Some(Mutex::new(protocol)), socket, Some(peer))
     }
 }
 
-/// Sends packets of all wires, again and again.
+fn bind(port: u16) -> io::Result<UdpSocket> {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).map_err(|why| {
+        let remedy = "choose another one, or end the program that has it";
+        let line = format!("UDP port {port} cannot be had ({why}); {remedy}");
+        io::Error::new(why.kind(), line)
+    })?;
+    // The end of a run wakes the receiver by a datagram, which a firewall may stop.
+    socket.set_read_timeout(Some(Duration::from_secs(1)))?;
+    Ok(socket)
+}
+
+fn wake_sender() {
+    let _ = SENDER.get().map(Thread::unpark);
+}
+
+fn connect(
+    ends: Box<[Arc<DeviceEnd>]>,
+    protocol: Option<Mutex<Box<dyn Protocol>>>,
+    socket: UdpSocket,
+    peer: Option<SocketAddrV4>,
+) -> io::Result<UdpConnection> {
+    let place = Arc::new(UdpPlace {
+        ends,
+        protocol,
+        socket,
+        peer,
+        last: Mutex::new(None),
+        has_ended: AtomicBool::new(false),
+    });
+    let mut places = unpoisoned(&PLACES);
+    if SENDER.get().is_none() {
+        let sender = thread::Builder::new().name("fass-udp".into()).spawn(send)?;
+        let _ = SENDER.set(sender.thread().clone());
+    }
+    let own = Arc::clone(&place);
+    let receiver = thread::Builder::new().spawn(move || own.receive())?;
+    places.push(Arc::clone(&place));
+    drop(places);
+    place.set_link(true);
+    // A protocol may have something to say at once.
+    wake_sender();
+    let receiver = Some(receiver);
+    Ok(UdpConnection { place, receiver })
+}
+
+/// Sends what is to go, again and again.
 fn send() {
     loop {
-        unpoisoned(&WIRES).iter().for_each(|wire| wire.send());
-        thread::park();
+        let places = unpoisoned(&PLACES);
+        places.iter().for_each(|place| place.send());
+        let may_be_due = places.iter().any(|place| place.protocol.is_some());
+        drop(places);
+        match may_be_due {
+            true => thread::park_timeout(PROTOCOL_PERIOD),
+            false => thread::park(),
+        }
     }
 }
 
-impl UdpWire {
+impl UdpPlace {
     /// Sends all packets.
     fn send(&self) {
-        let send = |packet: &mut Buffer, to: Option<SocketAddrV4>| {
-            let last = || *unpoisoned(&self.last);
+        let say = |packet: &mut Buffer, to: Option<SocketAddrV4>| {
             // Without a peer the packet is for nobody. If the kernel refuses a packet, that is lost, as
             // on any way.
-            if let Some(to) = to.or(self.peer).or_else(last) {
-                let _ = self.socket.send_to(packet.content(), to);
-            }
+            let _ = to.map(|to| self.socket.send_to(packet.content(), to));
             true
         };
-        while self.end.swap_out(send) {
-            self.end.tell_gone();
+        let last = || *unpoisoned(&self.last);
+        let next = || match &self.protocol {
+            None => self.ends[0].swap_out(|packet, to| say(packet, to.or(self.peer).or_else(last))),
+            Some(protocol) => {
+                let mut protocol = unpoisoned(protocol);
+                let has_gone = protocol.send(fass::now_ns(), &mut |packet| say(packet, self.peer));
+                protocol.tell_news();
+                has_gone
+            }
+        };
+        while next() {
+            self.ends.iter().for_each(|end| end.tell_gone());
+        }
+    }
+
+    fn set_link(&self, is_up: bool) {
+        match &self.protocol {
+            None => self.ends[0].set_link(is_up),
+            Some(protocol) => unpoisoned(protocol).set_link(is_up),
+        }
+    }
+
+    /// Takes a datagram.
+    fn take(&self, packet: &mut Buffer, from: SocketAddrV4) {
+        *unpoisoned(&self.last) = Some(from);
+        let now_ns = fass::now_ns();
+        let come = match &self.protocol {
+            None => self.ends[0].swap_in(packet, from, now_ns).into(),
+            Some(protocol) => unpoisoned(protocol).hear(packet.content(), now_ns),
+        };
+        for (place, end) in self.ends.iter().enumerate() {
+            if come >> place & 1 > 0
+                && let Some((plan, dag)) = end.announce()
+            {
+                HOST.raise(plan, dag);
+            }
+        }
+        if come == 0 {
+            // It may be a question of a protocol's peer.
+            wake_sender();
         }
     }
 
@@ -158,38 +248,62 @@ impl UdpWire {
             if let Ok((count, SocketAddr::V4(from))) = received
                 && self.peer.is_none_or(|peer| peer == from)
             {
-                *unpoisoned(&self.last) = Some(from);
                 buffer.set_range(START..START + count);
-                if self.end.swap_in(&mut buffer, from, fass::now_ns())
-                    && let Some((plan, dag)) = self.end.announce()
-                {
-                    HOST.raise(plan, dag);
-                }
+                self.take(&mut buffer, from);
             }
         }
     }
 }
 
 impl UdpConnection {
-    /// Returns the wire's port of this computer.
+    /// Returns the port of this computer.
     #[must_use]
     pub fn port(&self) -> u16 {
-        let address = self.wire.socket.local_addr();
+        let address = self.place.socket.local_addr();
         address.map_or(0, |address| address.port())
+    }
+
+    /// Sends the rest, says goodbye by a protocol, and ends the connection. A second time does nothing.
+    ///
+    /// See [`Linux::connect_udp`].
+    pub fn close(&mut self) {
+        let Some(receiver) = self.receiver.take() else {
+            return;
+        };
+        let place = &self.place;
+        let mut places = unpoisoned(&PLACES);
+        places.retain(|other| !Arc::ptr_eq(other, place));
+        place.send();
+        if let Some(protocol) = &place.protocol {
+            unpoisoned(protocol).close();
+            place.send();
+        }
+        drop(places);
+        place.set_link(false);
+        place.has_ended.store(true, Ordering::Release);
+        let _ = (place.socket).send_to(&[], (Ipv4Addr::LOCALHOST, self.port()));
+        // Then the port is free. The thread does not panic.
+        let _ = receiver.join();
+    }
+
+    /// Shows the protocol, if it is the connection of one, and its wires.
+    ///
+    /// See [`Linux::connect_protocol`].
+    pub fn with_protocol(&self, look: impl FnOnce(&dyn Protocol, &[Arc<DeviceEnd>])) {
+        if let Some(protocol) = &self.place.protocol {
+            look(&**unpoisoned(protocol), &self.place.ends);
+        }
     }
 }
 
 impl Drop for UdpConnection {
     fn drop(&mut self) {
-        let wire = &self.wire;
-        let mut wires = unpoisoned(&WIRES);
-        wires.retain(|other| !Arc::ptr_eq(other, wire));
-        wire.send();
-        drop(wires);
-        wire.end.set_link(false);
-        wire.has_ended.store(true, Ordering::Release);
-        let _ = wire.socket.send_to(&[], (Ipv4Addr::LOCALHOST, self.port()));
-        // Then the port is free. The thread does not panic.
-        let _ = self.receiver.take().map(JoinHandle::join);
+        self.close();
+    }
+}
+
+impl fmt::Debug for UdpPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("UdpPlace").field(&self.socket).finish()
     }
 }

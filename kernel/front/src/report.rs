@@ -7,6 +7,7 @@ use core::iter;
 
 use fass::edge::{RecordingState, ReplayOutcome, Sink};
 use fass::log::LogLine;
+use fass::platform::Protocol;
 use fass::shared::{Wire, WireCounts};
 use sched_dag::engine::{FaultCost, Run};
 use sched_dag::{Dag, DagId, DagSnapshot, Instance, TaskSet};
@@ -267,6 +268,17 @@ pub fn tell_wire(wire: &Wire) {
             .number("malformed", malformed)
             .number("sent_bytes", sent_bytes)
             .number("unsent_bytes", unsent_bytes);
+    });
+}
+
+/// Says it of a protocol in a line for people and in one for programs.
+pub fn tell_protocol(peer: &dyn Display, protocol: &dyn Protocol) {
+    crate::print!("router {peer}");
+    protocol.counts(&mut |name, count| crate::print!(", {name} {count}"));
+    crate::println!();
+    json::emit("session", |line| {
+        let line = line.text("peer", peer);
+        protocol.counts(&mut |name, count| _ = line.number(name, count));
     });
 }
 

@@ -107,6 +107,7 @@ fn run(
     let system = LinuxSystem {
         linux,
         wires: RefCell::default(),
+        protocols: RefCell::default(),
         refusal: RefCell::new(None),
         signals,
         has_console: options.choice("console", &[("off", false), ("on", true)])?,

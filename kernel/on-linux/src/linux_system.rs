@@ -15,7 +15,7 @@ use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use fass::platform::RunConfig;
+use fass::platform::{Protocol, RunConfig};
 use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
 use front::app::endpoint::{EndpointWord, word_of};
@@ -23,7 +23,7 @@ use front::app::machine::System;
 use front::options::{CommandLine, UsageError};
 use front::report::{self, HeapUsage, tell_log};
 use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, ShellSession};
-use linux::{Control, EndSignals, Linux};
+use linux::{Control, EndSignals, Linux, UdpConnection};
 use sched_dag::engine::Run;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, SchedulerQuery, TaskSet};
@@ -38,6 +38,8 @@ pub type Machine = front::app::machine::Machine<LinuxSystem>;
 pub struct LinuxSystem {
     pub(crate) linux: Linux,
     pub(crate) wires: RefCell<Vec<WireEnds>>,
+    /// Protocols with their peers, until the end of a run.
+    pub(crate) protocols: RefCell<Vec<(SocketAddrV4, UdpConnection)>>,
     /// The refusal of a request that Linux cannot serve.
     pub(crate) refusal: RefCell<Option<UsageError>>,
     /// The reasons that end a run before its time.
@@ -151,6 +153,13 @@ impl System for LinuxSystem {
             report::recorded(drained);
         }
         wires.iter().for_each(|ends| report::tell_wire(&ends.wire));
+        for (peer, connection) in self.protocols.take().iter_mut() {
+            connection.close();
+            connection.with_protocol(|protocol, ends| {
+                ends.iter().for_each(|end| report::tell_wire(end.wire()));
+                report::tell_protocol(peer, protocol);
+            });
+        }
         Ok(run.into_run())
     }
 
@@ -204,6 +213,27 @@ impl System for LinuxSystem {
             ends,
         });
         Ok(())
+    }
+
+    fn connect_protocol(
+        &self,
+        protocol: Box<dyn Protocol>,
+        peer: SocketAddrV4,
+        _options: &CommandLine<'static>,
+    ) -> Result<(), AppError> {
+        let connected = self.linux.connect_protocol(protocol, peer);
+        let failure = |why| AppError::Failure(format!("`router=udp://{peer}`: {why}"));
+        let connection = connected.map_err(failure)?;
+        self.protocols.borrow_mut().push((peer, connection));
+        Ok(())
+    }
+
+    fn seed() -> u128 {
+        let mut bytes = [0; 16];
+        let read = File::open("/dev/urandom").and_then(|mut file| file.read_exact(&mut bytes));
+        // Where there is none, the time has to do.
+        let time = || Self::unix_ns().unwrap_or(0).into();
+        read.map_or_else(|_| time(), |()| u128::from_le_bytes(bytes))
     }
 
     fn unix_ns() -> Option<u64> {

@@ -1,11 +1,13 @@
 //! The kernel as the system below an app's machine.
 
+use alloc::boxed::Box;
 use core::cell::Cell;
 use core::fmt;
+use core::net::SocketAddrV4;
 use core::panic::Location;
 use core::time::Duration;
 
-use fass::platform::{Platform, RunConfig};
+use fass::platform::{Platform, Protocol, RunConfig};
 use fass::shared::{Signal, Wire};
 
 use super::calibration;
@@ -98,10 +100,7 @@ impl System for BareMachine {
         });
         record::end_run(&run);
         report::tell_left(&run);
-        for endpoint in CONNECTED.iter() {
-            front::report::tell_wire(endpoint.end().wire());
-            endpoint.tell();
-        }
+        CONNECTED.iter().for_each(|endpoint| endpoint.tell());
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }
@@ -126,6 +125,21 @@ impl System for BareMachine {
             word,
         };
         endpoint::connect(wire, &words)
+    }
+
+    fn connect_protocol(
+        &self,
+        protocol: Box<dyn Protocol>,
+        peer: SocketAddrV4,
+        options: &CommandLine<'static>,
+    ) -> Result<(), AppError> {
+        endpoint::connect_protocol(protocol, peer, options)
+    }
+
+    fn seed() -> u128 {
+        let second = u128::from(machine::date::unix_s().unwrap_or(0));
+        // How long a boot takes, by so fine a clock, is hardly twice the same.
+        second << 64 | u128::from(machine::cpu::time_stamp())
     }
 
     fn unix_ns() -> Option<u64> {

@@ -44,6 +44,12 @@ pub fn word_of(wire: &Wire, options: &CommandLine<'_>) -> Result<Option<Endpoint
     })
 }
 
+/// Reads a peer, such as `udp://10.0.2.2:7447`.
+pub(super) fn peer(value: &str) -> Option<SocketAddrV4> {
+    let peer: SocketAddrV4 = value.strip_prefix("udp://")?.parse().ok()?;
+    Some(peer).filter(|peer| !peer.ip().is_unspecified() && peer.port() > 0)
+}
+
 fn read(value: &str) -> Option<EndpointWord> {
     Some(match value {
         "serial" => EndpointWord::Serial,
@@ -52,11 +58,7 @@ fn read(value: &str) -> Option<EndpointWord> {
             let place = value.strip_prefix("udp://")?;
             match place.strip_prefix(':') {
                 Some(port) => EndpointWord::Port(port.parse().ok().filter(|port| *port > 0)?),
-                None => {
-                    let peer: SocketAddrV4 = place.parse().ok()?;
-                    let is_host = !peer.ip().is_unspecified() && peer.port() > 0;
-                    is_host.then_some(EndpointWord::Peer(peer))?
-                }
+                None => EndpointWord::Peer(peer(value)?),
             }
         }
     })

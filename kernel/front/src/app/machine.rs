@@ -9,10 +9,11 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
+use core::net::SocketAddrV4;
 use core::time::Duration;
 
 use fass::commit::CoreDivision;
-use fass::platform::{self, RunConfig, call_app};
+use fass::platform::{self, Protocol, RunConfig, call_app};
 use fass::shared::{Signal, Tunable, WallClock, Wire};
 use fass::{Dag, Policy, Preemption};
 use sched_dag::engine::Run;
@@ -61,6 +62,17 @@ pub trait System: Sized {
         options: &CommandLine<'static>,
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError>;
+
+    /// Connects a protocol to its peer, by the words for the network.
+    fn connect_protocol(
+        &self,
+        protocol: Box<dyn Protocol>,
+        peer: SocketAddrV4,
+        options: &CommandLine<'static>,
+    ) -> Result<(), AppError>;
+
+    /// Returns a number that is hardly another machine's, or one of this machine's before.
+    fn seed() -> u128;
 
     /// Returns the Unix time now, in nanoseconds, if the system knows it.
     fn unix_ns() -> Option<u64>;

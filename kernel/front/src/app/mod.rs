@@ -4,4 +4,5 @@
 pub mod ending;
 pub mod endpoint;
 pub mod machine;
+mod ros;
 pub mod terms;

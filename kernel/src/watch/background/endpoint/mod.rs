@@ -9,8 +9,11 @@ mod script;
 mod serial;
 mod udp;
 
+pub(crate) use network::protocol::connect as connect_protocol;
+
 use alloc::boxed::Box;
 use alloc::format;
+use alloc::string::String;
 use core::cell::Cell;
 
 use fass::platform::SetOnce;
@@ -38,11 +41,8 @@ pub(crate) trait Endpoint: Send + Sync {
     /// Ends the run: sends the rest.
     fn end_run(&self) {}
 
-    /// Tells of the run that has ended, besides the wire's counts.
-    fn tell(&self) {}
-
-    /// Returns the wire's other end.
-    fn end(&self) -> &DeviceEnd;
+    /// Tells of the run that has ended.
+    fn tell(&self);
 }
 
 /// The words that say which endpoint is meant: the app's command line, and the loader's module.
@@ -53,14 +53,14 @@ pub(crate) struct EndpointWords<'a> {
     pub(crate) word: Option<EndpointWord>,
 }
 
-/// Makes an endpoint of a wire, if the words mean this one.
+/// Adds an endpoint of a wire, if the words mean this one, and reports whether they do.
 ///
 /// # Errors
 ///
 /// The machine lacks the device, or the wire has one.
 type Open = fn(&Wire, &EndpointWords<'_>) -> Opened;
 
-type Opened = Result<Option<Box<dyn Endpoint>>, AppError>;
+type Opened = Result<bool, AppError>;
 
 /// Every endpoint, in the order in which they are asked. The last one takes any words.
 const ENDPOINTS: &[Open] = &[udp::open, script::open, serial::open];
@@ -106,11 +106,10 @@ impl<T: Send + Sync> Chain<T> {
 
 /// Connects a wire to the endpoint that the words name.
 pub(crate) fn connect(wire: &Wire, words: &EndpointWords<'_>) -> Result<(), AppError> {
-    let mut opened = ENDPOINTS
-        .iter()
-        .filter_map(|open| open(wire, words).transpose());
-    if let Some(endpoint) = opened.next().transpose()? {
-        CONNECTED.add(endpoint);
+    for open in ENDPOINTS {
+        if open(wire, words)? {
+            break;
+        }
     }
     Ok(())
 }
@@ -118,11 +117,15 @@ pub(crate) fn connect(wire: &Wire, words: &EndpointWords<'_>) -> Result<(), AppE
 /// Returns the other end of a wire, for an endpoint.
 fn end_of(wire: &Wire) -> Result<DeviceEnd, AppError> {
     let end = DeviceEnd::of(wire);
-    end.ok_or_else(|| failure(wire, "has a device already; connect it once"))
+    end.ok_or_else(|| failure(&name_of(wire), "has a device already; connect it once"))
 }
 
-fn failure(wire: &Wire, why: &str) -> AppError {
-    AppError::Failure(format!("wire `{}` {why}", wire.name()))
+fn name_of(wire: &Wire) -> String {
+    format!("wire `{}`", wire.name())
+}
+
+fn failure(who: &str, why: &str) -> AppError {
+    AppError::Failure(format!("{who} {why}"))
 }
 
 /// Lets bytes arrive on a wire.

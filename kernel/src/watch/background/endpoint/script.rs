@@ -30,7 +30,7 @@ use fass::shared::{DeviceEnd, Wire};
 use net::MOST_PAYLOAD;
 
 use super::serial::{self, FIFO_BYTES};
-use super::{Endpoint, EndpointWords, Opened, arrive, end_of};
+use super::{CONNECTED, Endpoint, EndpointWords, Opened, arrive, end_of};
 use crate::options::UsageError;
 use executive::machine::serial::SECOND;
 use executive::machine::spinlock::SpinLock;
@@ -38,6 +38,7 @@ use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
 use front::app::endpoint::EndpointWord;
+use front::report;
 
 /// The most bytes of a line: those of a packet, its peer, and a name.
 const MOST_OF_LINE: usize = 512 + 4 * MOST_PAYLOAD;
@@ -88,7 +89,7 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
             let line = format!("`wire.{}=file` has no file; give --input FILE", wire.name());
             return Err(UsageError::new(line).into());
         }
-        return Ok(None);
+        return Ok(false);
     };
     let sends_lines = words.word.is_some();
     if !sends_lines || !script.has_port.swap(true, Ordering::Relaxed) {
@@ -103,13 +104,14 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
         rest: &[],
         packet: Buffer::new(Buffer::LEAST_BYTES),
     });
-    Ok(Some(Box::new(ScriptEndpoint {
+    CONNECTED.add(Box::new(ScriptEndpoint {
         end,
         script,
         is_first: !script.has_wire.swap(true, Ordering::Relaxed),
         sends_lines,
         playing,
-    })))
+    }));
+    Ok(true)
 }
 
 /// Cuts the script off the module: it stands behind the app's own bytes.
@@ -242,8 +244,8 @@ impl Endpoint for ScriptEndpoint {
         serial::send_rest(&self.end);
     }
 
-    fn end(&self) -> &DeviceEnd {
-        &self.end
+    fn tell(&self) {
+        report::tell_wire(self.end.wire());
     }
 }
 

@@ -11,11 +11,12 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::shared::{DeviceEnd, Wire};
 
-use super::{Endpoint, EndpointWords, Opened, arrive, end_of};
+use super::{CONNECTED, Endpoint, EndpointWords, Opened, arrive, end_of};
 use crate::options::UsageError;
 use executive::machine::serial::SECOND;
 use executive::machine::this_core::{self, Core};
 use executive::machine::timer::{self, Alarm};
+use front::report;
 
 /// The capacity of the port's FIFO, in bytes.
 pub(super) const FIFO_BYTES: usize = 16;
@@ -30,7 +31,8 @@ struct SerialEndpoint {
 pub(super) fn open(wire: &Wire, _words: &EndpointWords<'_>) -> Opened {
     take_port(wire)?;
     let (end, is_run) = (end_of(wire)?, AtomicBool::new(false));
-    Ok(Some(Box::new(SerialEndpoint { end, is_run })))
+    CONNECTED.add(Box::new(SerialEndpoint { end, is_run }));
+    Ok(true)
 }
 
 /// Takes the port for a wire, once.
@@ -100,7 +102,7 @@ impl Endpoint for SerialEndpoint {
         send_rest(&self.end);
     }
 
-    fn end(&self) -> &DeviceEnd {
-        &self.end
+    fn tell(&self) {
+        report::tell_wire(self.end.wire());
     }
 }

@@ -15,8 +15,10 @@
 //!
 //! The card's two halves have a lock each. That of the sending half is held for a frame that is heard
 //! or a packet that is sent, not longer. Neither is held where functions are told: a wait that ends
-//! needs the scheduler's.
+//! needs the scheduler's. A [protocol] has a lock of its own, which is taken within the
+//! receiving half's, and the sending half's within it.
 
+pub(super) mod protocol;
 mod wire;
 
 use alloc::boxed::Box;
@@ -34,14 +36,13 @@ use executive::run::execution;
 use executive::run::platform::KERNEL;
 use fass::commit::Overheads;
 use fass::platform::{Buffer, Platform as _, SetOnce};
-use fass::shared::Wire;
 use front::app::ending::AppError;
-use front::json;
+use front::{json, report};
 use net::{Address, Client, Heard, Interface, Kept, Mac, Peer, Route};
-use sched_dag::DagId;
 
-use super::{Chain, failure};
+use super::{CONNECTED, Chain, Endpoint, failure};
 use crate::options::{CommandLine, UsageError};
+use protocol::PROTOCOLS;
 use wire::Sent;
 pub(super) use wire::UdpWire;
 
@@ -63,10 +64,10 @@ impl Law {
     /// exit, the release of a DAG, the alarm, and the packet that a heartbeat sends. What a core sends
     /// behind a completion is charged as a part of the dispatch. What cores wait for each other, where
     /// they have the card at once, is not charged.
-    fn charged(options: &CommandLine<'static>) -> Result<Self, UsageError> {
+    fn charged(options: &CommandLine<'static>, distance_us: u64) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
         // Not beyond a heartbeat, which sends as well.
-        let distance_us = options.number("net_us", 10..=1_000, 170)?;
+        let distance_us = options.number("net_us", 10..=1_000, distance_us)?;
         let mut overheads = KERNEL.terms().overheads;
         let is_stated = overheads.device_ns > 0;
         if !is_stated {
@@ -83,12 +84,12 @@ impl Law {
         Ok(law)
     }
 
-    /// Charges one more wire, as so many others have been: each of an interrupt's packets may release
-    /// another DAG.
-    fn charge_wire(&self, others: usize) -> Result<(), UsageError> {
+    /// Charges so much more for an interrupt, and for what is sent behind a completion.
+    fn charge_more(&self, device_ns: u64, dispatch_ns: u64) -> Result<(), UsageError> {
         let mut overheads = KERNEL.terms().overheads;
-        if !self.is_stated && (others as u64) < self.most {
-            overheads.device_ns += WIRE_NS;
+        if !self.is_stated {
+            overheads.device_ns += device_ns;
+            overheads.dispatch_ns += dispatch_ns;
         }
         self.charge(overheads)
     }
@@ -117,7 +118,7 @@ const BELL_NS: u64 = 400;
 
 pub(super) struct Network {
     mac: Mac,
-    pub(super) wires: Chain<UdpWire>,
+    wires: Chain<UdpWire>,
     receiver: SpinLock<Box<dyn Receive>>,
     sender: SpinLock<NetworkSender>,
     law: Law,
@@ -148,18 +149,21 @@ static NETWORK: SetOnce<Network> = SetOnce::new();
 static LINE: SetOnce<Line> = SetOnce::new();
 static BELL: SetOnce<Bell> = SetOnce::new();
 
-/// Returns the network, which the first wire opens.
+/// The first port of what has none by its word (RFC 6335, 6).
+const FIRST_OWN_PORT: u16 = 49_152;
+
+/// Returns the network, which is opened for the first one, with that distance if no word says so.
 pub(super) fn open(
-    wire: &Wire,
+    who: &str,
     options: &CommandLine<'static>,
+    distance_us: u64,
 ) -> Result<&'static Network, AppError> {
     if let Some(network) = NETWORK.get() {
-        network.law.charge_wire(network.wires.iter().count())?;
         return Ok(network);
     }
     let address = address(options)?;
-    let law = Law::charged(options)?;
-    let space = ecam::configuration().map_err(|why| failure(wire, &format!("finds that {why}")))?;
+    let law = Law::charged(options, distance_us)?;
+    let space = ecam::configuration().map_err(|why| failure(who, &format!("finds that {why}")))?;
     let mut opened = None;
     pci::find(space, &mut |function| {
         if opened.is_none() {
@@ -169,16 +173,17 @@ pub(super) fn open(
     let Some((function, card)) = opened else {
         let line = "finds no network card that is known, virtio-net or an 82574; give one, in QEMU \
                     by `--net user`";
-        return Err(failure(wire, line));
+        return Err(failure(who, line));
     };
     let card = card.map_err(|why| AppError::Failure(format!("{why}")))?;
     let message = card.message;
     NETWORK.set(Network::new(card, address, law));
     let network = NETWORK.get();
-    let network = network.ok_or_else(|| failure(wire, "finds the network being opened"))?;
+    let network = network.ok_or_else(|| failure(who, "finds the network being opened"))?;
     let line_error = |why| AppError::Failure(format!("network card at {} {why}", function.place));
     BELL.set(Bell::new(&SendLine).map_err(line_error)?);
     LINE.set(tie(&function, message, &CardLine, 0).map_err(line_error)?);
+    CONNECTED.add(Box::new(network));
     Ok(network)
 }
 
@@ -232,7 +237,7 @@ impl DeviceLine for SendLine {
         if let Some(network) = NETWORK.get() {
             // At the begin of a run there may be frames already.
             network.unmask(this_core::get(), now_ns);
-            network.send(network.law.most);
+            network.send(network.law.most, now_ns);
         }
     }
 }
@@ -268,38 +273,39 @@ impl Network {
         }
     }
 
-    /// Begins a run, in which the first wire's packets release that DAG.
-    pub(super) fn begin_run(&self, dag: Option<DagId>) {
-        let core = dag.map_or(0, execution::first_core_of);
-        let routed = LINE.get().map(|line| line.route(core));
-        // A core that messages do not reach leaves the card to core 0.
-        let core = if matches!(routed, Some(Ok(()))) {
-            core
-        } else {
-            0
+    /// Returns the port that is stated, or a free one.
+    pub(super) fn port(&self, who: &str, stated: Option<u16>) -> Result<u16, AppError> {
+        let taken = || {
+            let wires = self.wires.iter().map(|wire| wire.port);
+            wires.chain(PROTOCOLS.iter().map(|place| place.port()))
         };
-        self.core.store(core, Ordering::Relaxed);
-        self.is_run.store(true, Ordering::Relaxed);
-        // There may be frames already, of which there is no message.
-        self.unmask_ns.store(0, Ordering::Relaxed);
-        if let (Some(bell), Some(core)) = (BELL.get(), this_core::all().get(core as usize)) {
-            bell.ring(core);
+        let count = u16::try_from(taken().count()).unwrap_or(u16::MAX);
+        let port = stated.unwrap_or(FIRST_OWN_PORT.saturating_add(count));
+        if taken().any(|other| other == port) {
+            let line = format!("has port {port} of another one; give each one its own");
+            return Err(failure(who, &line));
         }
+        if port == Client::PORT {
+            let line =
+                "has the port at which the network asks for its address; give another than 68";
+            return Err(failure(who, line));
+        }
+        Ok(port)
     }
 
-    /// Ends the run: sends the rest, and hears nothing any more.
-    pub(super) fn end_run(&self) {
-        self.is_run.store(false, Ordering::Relaxed);
-        self.unmask_ns.store(u64::MAX, Ordering::Relaxed);
-        self.receiver.lock().set_interrupt(false);
-        while self.send(self.law.most) {}
+    /// Adds a wire, and charges it: each of an interrupt's packets may release another DAG.
+    pub(super) fn add(&self, wire: UdpWire) -> Result<(), UsageError> {
+        let others = self.wires.iter().count() as u64;
+        self.wires.add(wire);
+        let releases_more = others > 0 && others < self.law.most;
+        self.law
+            .charge_more(if releases_more { WIRE_NS } else { 0 }, 0)
     }
 
     /// Takes the frames of an interrupt, and masks the card until the next one.
     fn receive(&self, now_ns: u64) {
         // One that was on its way when the card was masked, or the run ended.
-        let is_masked = self.unmask_ns.load(Ordering::Relaxed) != u64::MAX;
-        if is_masked || !self.is_run.load(Ordering::Relaxed) {
+        if self.unmask_ns.load(Ordering::Relaxed) != u64::MAX {
             return;
         }
         let until_ns = now_ns.saturating_add(self.law.distance_ns);
@@ -307,6 +313,10 @@ impl Network {
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, until_ns);
         let mut receiver = self.receiver.lock();
         receiver.set_interrupt(false);
+        // The run's end waits for the lock, and then nothing more is heard.
+        if !self.is_run.load(Ordering::Relaxed) {
+            return;
+        }
         for _ in 0..self.law.most {
             if !receiver.receive(&mut |frame| self.hear(frame, now_ns)) {
                 break;
@@ -314,6 +324,9 @@ impl Network {
         }
         drop(receiver);
         self.wires.iter().for_each(UdpWire::tell_come);
+        if !PROTOCOLS.is_empty() {
+            Self::tell_elsewhere();
+        }
         let took_ns = clock::now_ns().saturating_sub(now_ns);
         self.longest_ns.fetch_max(took_ns, Ordering::Relaxed);
         self.interrupts.fetch_add(1, Ordering::Relaxed);
@@ -361,16 +374,16 @@ impl Network {
                 drop(sender);
                 let mut wires = self.wires.iter();
                 let heard = wires.find(|wire| wire.hears(datagram.port, datagram.from));
-                match heard.filter(|_| self.is_run.load(Ordering::Relaxed)) {
-                    Some(wire) => wire.take(frame, datagram.from, now_ns),
-                    None => _ = self.unheard.fetch_add(1, Ordering::Relaxed),
+                if let Some(wire) = heard {
+                    return wire.take(frame, datagram.from, now_ns);
                 }
+                self.hear_elsewhere(frame.content(), datagram.port, datagram.from, now_ns);
             }
         }
     }
 
     /// Sends what is to go, so many packets at most. Reports whether something has gone.
-    pub(super) fn send(&self, most: u64) -> bool {
+    fn send(&self, most: u64, now_ns: u64) -> bool {
         let mut left = most;
         for wire in self.wires.iter() {
             let send = || {
@@ -381,6 +394,9 @@ impl Network {
                 left -= 1;
             }
         }
+        if !PROTOCOLS.is_empty() {
+            left = self.send_elsewhere(left, now_ns);
+        }
         let has_gone = left < most;
         if has_gone {
             self.sender.lock().transmitter.ring();
@@ -389,8 +405,62 @@ impl Network {
         has_gone
     }
 
-    /// Does what is due now and then.
-    pub(super) fn beat(&self, core: &Core, now_ns: u64) {
+    // What follows is not within the ways of wires, which it would make longer.
+
+    /// Has a protocol hear a datagram that is no wire's.
+    #[inline(never)]
+    fn hear_elsewhere(&self, datagram: &[u8], port: u16, from: Peer, now_ns: u64) {
+        let mut places = PROTOCOLS.iter();
+        if !places.any(|place| place.hear(datagram, port, from, now_ns)) {
+            self.unheard.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Sends what protocols have to say, so many datagrams at most. Returns how many are left.
+    #[inline(never)]
+    fn send_elsewhere(&self, mut left: u64, now_ns: u64) -> u64 {
+        let mut send = |packet: &mut Buffer, port, to| self.sender.lock().send(packet, port, to);
+        for place in PROTOCOLS.iter() {
+            while left > 0 && place.send(now_ns, &mut send) {
+                left -= 1;
+            }
+        }
+        left
+    }
+
+    #[inline(never)]
+    fn tell_elsewhere() {
+        PROTOCOLS.iter().for_each(|place| place.tell_come());
+    }
+}
+
+impl Endpoint for &'static Network {
+    fn begin_run(&self, _now_ns: u64) {
+        // By the first wire, or else by what a protocol hears first.
+        let released = match self.wires.iter().next() {
+            Some(wire) => wire.end.released(),
+            None => PROTOCOLS.iter().find_map(|place| place.released()),
+        };
+        let core = released.map_or(0, |(_, dag)| execution::first_core_of(dag));
+        let routed = LINE.get().map(|line| line.route(core));
+        // A core that messages do not reach leaves the card to core 0.
+        let core = if matches!(routed, Some(Ok(()))) {
+            core
+        } else {
+            0
+        };
+        self.core.store(core, Ordering::Relaxed);
+        let is_up = self.is_linked.load(Ordering::Relaxed);
+        PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
+        self.is_run.store(true, Ordering::Relaxed);
+        // There may be frames already, of which there is no message.
+        self.unmask_ns.store(0, Ordering::Relaxed);
+        if let (Some(bell), Some(core)) = (BELL.get(), this_core::all().get(core as usize)) {
+            bell.ring(core);
+        }
+    }
+
+    fn beat(&self, core: &Core, now_ns: u64) {
         self.unmask(core, now_ns);
         if core.index > 0 || !self.is_run.load(Ordering::Relaxed) {
             return;
@@ -404,15 +474,36 @@ impl Network {
         if self.is_linked.swap(is_up, Ordering::Relaxed) != is_up {
             self.sender.lock().interface.forget_neighbours();
             self.wires.iter().for_each(|wire| wire.end.set_link(is_up));
+            PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
         }
-        // What found no room, or no address, and what was more than a bell sends.
+        // What found no room, or no address, what was more than a bell sends, and what is due to a
+        // protocol's peer.
         if !has_asked {
-            self.send(1);
+            self.send(1, now_ns);
         }
     }
 
-    /// Tells of the run that has ended.
-    pub(super) fn tell(&self) {
+    fn step(&self) -> bool {
+        PROTOCOLS.iter().for_each(|place| place.tell_news());
+        // What was more than a completion sends.
+        self.send(1, clock::now_ns())
+    }
+
+    /// Sends the rest, and hears nothing any more.
+    fn end_run(&self) {
+        self.is_run.store(false, Ordering::Relaxed);
+        self.unmask_ns.store(u64::MAX, Ordering::Relaxed);
+        self.receiver.lock().set_interrupt(false);
+        let send_rest = || while self.send(self.law.most, clock::now_ns()) {};
+        send_rest();
+        PROTOCOLS.iter().for_each(|place| place.close());
+        send_rest();
+    }
+
+    fn tell(&self) {
+        let wires = self.wires.iter().map(|wire| wire.end.wire());
+        wires.for_each(report::tell_wire);
+        PROTOCOLS.iter().for_each(|place| place.tell());
         let dropped = self.receiver.lock().dropped();
         let sender = self.sender.lock();
         let (address, counts) = (sender.interface.address(), sender.interface.counts());

@@ -10,8 +10,8 @@ use net::{HEADERS, Peer};
 
 /// The wire's place in the network.
 pub(in super::super) struct UdpWire {
-    pub(in super::super) end: DeviceEnd,
-    pub(in super::super) port: u16,
+    pub(super) end: DeviceEnd,
+    pub(super) port: u16,
     peer: Option<Peer>,
     /// The peer that has sent last: its address and port, or 0.
     last: AtomicU64,
@@ -26,6 +26,19 @@ pub(super) enum Sent {
     Gone,
     /// It waits for room, or for an address.
     Waits,
+}
+
+/// Lets `send` have a packet with room for its headers. Reports whether it has gone.
+pub(super) fn with_headers(packet: &mut Buffer, send: impl FnOnce(&mut Buffer) -> Sent) -> bool {
+    let payload = packet.range();
+    packet.set_range(payload.start - HEADERS..payload.end);
+    match send(packet) {
+        Sent::Gone => true,
+        Sent::Waits => {
+            packet.set_range(payload);
+            false
+        }
+    }
 }
 
 impl UdpWire {
@@ -62,15 +75,7 @@ impl UdpWire {
                 // Nobody has sent anything yet, so there is nobody whom it could be for.
                 return true;
             };
-            let payload = packet.range();
-            packet.set_range(payload.start - HEADERS..payload.end);
-            match send(packet, self.port, to) {
-                Sent::Gone => true,
-                Sent::Waits => {
-                    packet.set_range(payload);
-                    false
-                }
-            }
+            with_headers(packet, |packet| send(packet, self.port, to))
         });
         if has_gone {
             self.has_gone.store(true, Ordering::Relaxed);
