@@ -365,7 +365,7 @@ pub trait Workload<B = Instance> {
     }
 
     /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
-    fn ended(&mut self, _instance: Instance, _fault: Option<FaultCost>) {}
+    fn ended(&mut self, _instance: Instance, _now_ns: u64, _fault: Option<FaultCost>) {}
 
     /// An instance has begun a wait, whose answer may be a [`Request::Answer`] from now on.
     fn waits(&mut self, _wait: WaitId, _now_ns: u64) {}
@@ -542,7 +542,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         let done = engine.complete((core, vertex), body, now_ns, is_alone, now);
         let waits = matches!(done, NextAction::Step(Some(turn)) if turn.limit_ns.is_some());
         if !waits {
-            now.workload.ended(instance, None);
+            now.workload.ended(instance, now_ns, None);
         }
         match done {
             NextAction::Run(body) => self.run(core, body, now_ns, now.begun_ns)?,
@@ -567,7 +567,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         if let Some(vertex) = self.engine.placement.lose(core.index()) {
             let body = Some(body).filter(|_| now.workload.is_replaceable(instance));
             let cost = (self.engine).tell_fault((now.now_ns, core), vertex, body, now);
-            now.workload.ended(instance, Some(cost));
+            now.workload.ended(instance, now.now_ns, Some(cost));
         }
     }
 

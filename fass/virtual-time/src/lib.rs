@@ -35,6 +35,7 @@
 mod command;
 mod edge;
 mod job;
+mod link;
 mod machine;
 mod platform;
 mod report;
@@ -55,6 +56,7 @@ pub use sched_dag::{
 pub use command::replay_command;
 pub use edge::Divergence;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
+pub use link::{Link, LinkOptions};
 use machine::Machine;
 pub use machine::{RunError, SentPacket};
 pub use report::{DagReport, InstanceRecord, JobRecord, PanicRecord, Report};

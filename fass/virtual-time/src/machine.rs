@@ -85,8 +85,8 @@ pub(crate) enum Arrival {
     Answer(Box<dyn FnOnce()>),
 }
 
-/// The device's end of a wire, and what has been sent if the wire is connected.
-pub(crate) type WireEnd = (Rc<DeviceEnd>, Option<Vec<SentPacket>>);
+/// The device's end of a wire, and what has been sent, and when, if the wire is connected.
+pub(crate) type WireEnd = (Rc<DeviceEnd>, Option<Vec<(u64, SentPacket)>>);
 
 /// A packet that was sent, and whom it is to, if that is stated.
 pub type SentPacket = (Vec<u8>, Option<SocketAddrV4>);
@@ -163,12 +163,12 @@ impl Machine {
         }
     }
 
-    /// Takes what has been sent on wires.
-    pub(crate) fn collect(&self) {
+    /// Takes what has been sent on wires by now.
+    pub(crate) fn collect(&self, now_ns: u64) {
         for (end, sent) in self.wires.borrow_mut().iter_mut() {
             if let Some(sent) = sent {
                 let mut keep = |packet: &mut Buffer, to: Option<_>| {
-                    sent.push((packet.content().to_vec(), to));
+                    sent.push((now_ns, (packet.content().to_vec(), to)));
                     true
                 };
                 while end.swap_out(&mut keep) {}
@@ -250,7 +250,6 @@ impl Session {
         duration: Option<Duration>,
         until: Option<(&str, u64)>,
     ) -> Result<Report, RunError> {
-        let machine = Rc::clone(&self.calls.machine);
         let until_ns = match duration {
             Some(duration) => self.until_ns.saturating_add(nanoseconds(duration)),
             None => u64::MAX,
@@ -267,6 +266,12 @@ impl Session {
             let mut jobs = run.record().numbered(dag);
             jobs.any(|(job, times)| job >= last && times.ended_ns.is_some())
         });
+        let end = self.go_on(until_ns);
+        self.report(end)
+    }
+
+    /// Runs up to a time.
+    fn go_on(&mut self, until_ns: u64) -> RunOutcome {
         let end = self.driver.run_until(until_ns, &mut self.calls);
         let now_ns = self.driver.now_ns();
         // What has no event any more has run as far as it was asked to.
@@ -276,8 +281,24 @@ impl Session {
             RunOutcome::Stopped => (now_ns, now_ns),
         };
         // Between two calls the clock stands here: an arrival at an earlier time comes at once.
-        machine.now_ns.set(clock_ns);
+        self.calls.machine.now_ns.set(clock_ns);
         self.until_ns = reached_ns;
+        end
+    }
+
+    /// Runs up to a time, and reports what the run cannot go on from.
+    pub(crate) fn run_up_to(&mut self, until_ns: u64) -> Result<(), RunError> {
+        let end = self.go_on(until_ns);
+        match end {
+            RunOutcome::TimeReached | RunOutcome::Finished => Ok(()),
+            _ => self.report(end).map(drop),
+        }
+    }
+
+    /// Reports on a run that has ended so.
+    fn report(&mut self, end: RunOutcome) -> Result<Report, RunError> {
+        let machine = Rc::clone(&self.calls.machine);
+        let now_ns = self.driver.now_ns();
         let is_over = end == RunOutcome::Finished;
         let outcome = (machine.edge).of_replay(|replay| replay.outcome(is_over));
         let (run, calls) = (self.driver.run_so_far(), &self.calls);
@@ -458,9 +479,9 @@ impl Workload<SubtaskRunner> for Calls {
             && panics.any(|panic| panic.instance == instance)
     }
 
-    fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
+    fn ended(&mut self, instance: Instance, now_ns: u64, fault: Option<FaultCost>) {
         self.degraded[instance.dag.index()] |= fault == Some(FaultCost::Degraded);
-        self.machine.collect();
+        self.machine.collect(now_ns);
     }
 
     fn waits(&mut self, wait: WaitId, now_ns: u64) {
@@ -468,7 +489,7 @@ impl Workload<SubtaskRunner> for Calls {
             .insert(wait.instance, wait.number as usize + 1);
         let machine = &*self.machine;
         machine.now_ns.set(now_ns);
-        machine.collect();
+        machine.collect(now_ns);
         let mut devices = machine.devices.borrow_mut();
         devices.iter_mut().for_each(|look| look(machine, now_ns));
     }

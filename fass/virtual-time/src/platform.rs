@@ -102,10 +102,18 @@ impl VirtualTime {
         duration: Option<Duration>,
         until: Option<(&str, u64)>,
     ) -> Result<Report, RunError> {
+        self.with_session(|session| session.run(duration, until))
+    }
+
+    /// Runs a part of the session.
+    pub(crate) fn with_session<R>(
+        &self,
+        run: impl FnOnce(&mut Session) -> Result<R, RunError>,
+    ) -> Result<R, RunError> {
         let kept = &self.machine.session;
         let mut session = kept.take().ok_or(RunError::NothingToRun)?;
         let newest = CURRENT.replace(Rc::downgrade(&self.machine));
-        let result = session.run(duration, until);
+        let result = run(&mut session);
         CURRENT.set(newest);
         // A failed session is not put back: its functions cannot continue.
         if let Ok(_) | Err(RunError::Endless { .. } | RunError::NoSuchDag { .. }) = result {
@@ -233,7 +241,14 @@ impl VirtualTime {
         let wires = self.machine.wires.borrow();
         let of_wire = wires.iter().find(|(end, _)| end.wire() == wire);
         of_wire
-            .and_then(|(_, sent)| sent.clone())
+            .and_then(|(_, sent)| {
+                Some(
+                    sent.as_ref()?
+                        .iter()
+                        .map(|(_, sent)| sent.clone())
+                        .collect(),
+                )
+            })
             .unwrap_or_else(|| {
                 let name = wire.name();
                 panic!("wire `{name}` is not connected; call `connect` before the run");

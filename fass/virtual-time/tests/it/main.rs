@@ -6,6 +6,7 @@ mod devices;
 mod faults;
 mod latest;
 mod lifecycle;
+mod link;
 mod locks;
 mod machine;
 mod parameters;
