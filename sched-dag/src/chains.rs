@@ -30,7 +30,8 @@
 //! # Parts
 //!
 //! [`Chain::all`] and [`Chain::between`] find chains, [`Chain::latencies`] measures one in the
-//! events of a run, [`Chain::output_age_bound_ns`] and [`Chain::reaction_bound_ns`] bound it.
+//! events of a run, [`Chain::output_age_bound_ns`] and [`Chain::reaction_bound_ns`] bound it;
+//! [`Chain::output_age_bound_over_links_ns`] bounds one that crosses machines.
 //!
 //! # Bounds: how long the times of a chain can be, where each of its DAGs has a bound
 //!
@@ -58,6 +59,36 @@
 //! It holds for as long as jobs come: none is skipped in a pause, and the DAGs go on. (With bounds
 //! none is skipped or aborted for another reason.) A sporadic DAG has no longest distance of releases, so its T is none; as the last
 //! DAG of a chain it still has an age of outputs.
+//!
+//! # Links: chains that cross machines
+//!
+//! A subtask of DAG i-1 sends a message when it is complete, and one of DAG i, on another machine,
+//! *receives* it: an edge that is a *link* instead of a sampling. The app *states* the link's delay
+//! N, from a message's writing to its arrival, which nothing proves. A bound with N in it holds of
+//! the outputs that go back over no message that took longer. For a link the first bound above has,
+//! in place of T(i-1) + R(i-1),
+//!
+//! - R(i-1) + N, if DAG i is sporadic, each message raises its signal, nothing else does, each job
+//!   takes all messages that have come, and T(i-1) by the slower clock is not less than T(i);
+//! - R(i-1) + N + T(i), if DAG i is periodic; for the first job that has the message.
+//!
+//! *Proof.* The message of job k is sent r(k) + R(i-1) at the latest, and so arrives at d(k) = r(k) +
+//! R(i-1) + N at the latest. A *periodic* DAG has a job that is not lost, and whose release is T(i)
+//! after the arrival at most; the message is taken by this one, or by an earlier one.
+//!
+//! Of a *sporadic* DAG the arrival may be nearer to the one before than T(i), and the job is then
+//! released later (`scheduler::signals`, S1). Let messages arrive each once, in the order of jobs;
+//! some may be lost. Message k is taken by the job whose signal it raised, or by an earlier one.
+//! That job is released at its signal, or T(i) after the job before; let q be the number of jobs
+//! since the latest one of the first kind, which was released at an arrival a. So this one is
+//! released at a + q T(i). The q + 1 jobs have the signals of as many messages, k the last of them.
+//! The first of these, k', came at a, so a <= d(k'). As releases of DAG i-1 are T(i-1) apart at least,
+//! d(k) >= d(k') + q T(i-1) >= a + q T(i): so T(i-1) has to be longer by what clocks drift, or each job
+//! would be put off a bit more. A signal that is dropped (S2) leaves its message to a job of
+//! an earlier message, which has not started: its release is d(k) at the latest all the more. ∎
+//!
+//! After a message that took longer, jobs that are released T(i) after the one before may be late,
+//! too. Since messages may be lost, nothing bounds data age and reaction time over a link.
 //!
 //! # Which outputs count
 //!
@@ -122,6 +153,9 @@ pub struct Chain {
     segments: Vec<ChainSegment>,
 }
 
+/// Two clocks drift apart by one part in so many at most: each crystal by 100 millionths.
+const DRIFT: u64 = 5_000;
+
 impl Chain {
     /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
     pub fn find(task_set: &TaskSet, name: &str) -> Option<SubtaskRef> {
@@ -148,6 +182,19 @@ impl Chain {
         })
     }
 
+    /// Returns the DAGs in which it begins and ends.
+    pub fn ends(&self) -> [DagId; 2] {
+        [self.segments[0], self.segments[self.segments.len() - 1]].map(|segment| segment.dag)
+    }
+
+    /// Returns the samplings by which it leads from DAG to DAG.
+    pub fn edges(&self) -> impl Iterator<Item = SampledEdge> {
+        self.segments.windows(2).map(|pair| SampledEdge {
+            writer: (pair[0].dag, pair[0].exit),
+            reader: (pair[1].dag, pair[1].entry),
+        })
+    }
+
     /// Returns how old an output can be at its finish.
     ///
     /// # Errors
@@ -159,11 +206,44 @@ impl Chain {
         task_set: &TaskSet,
         responses_ns: &[Option<u64>],
     ) -> Result<u64, DagId> {
-        let last = self.segments.len() - 1;
-        let before = sum(&self.segments[..last], task_set, responses_ns)?;
-        let dag = self.segments[last].dag;
-        let response_ns = responses_ns.get(dag.index()).copied().flatten();
-        Ok(before.saturating_add(response_ns.ok_or(dag)?))
+        self.output_age_bound_over_links_ns(task_set, responses_ns, &[])
+    }
+
+    /// Returns the same of a chain of which some edges are links between machines, each with its
+    /// stated delay.
+    ///
+    /// # Errors
+    ///
+    /// As above; also a sporadic DAG behind a link, if its jobs may be rarer than messages, as clocks
+    /// drift.
+    pub fn output_age_bound_over_links_ns(
+        &self,
+        task_set: &TaskSet,
+        responses_ns: &[Option<u64>],
+        links: &[(SampledEdge, u64)],
+    ) -> Result<u64, DagId> {
+        let response = |dag: DagId| responses_ns.get(dag.index()).copied().flatten().ok_or(dag);
+        let mut sum: u64 = 0;
+        for edge in self.edges() {
+            let dags = [edge.writer.0, edge.reader.0];
+            let [from, to] = dags.map(|dag| task_set.dag(dag));
+            let response_ns = response(dags[0])?;
+            let way_ns = match links.iter().find(|link| link.0 == edge) {
+                // Of a sporadic DAG nobody knows when the next job comes, so nothing bounds the
+                // way through it.
+                None if from.is_sporadic() => return Err(dags[0]),
+                None => from.renewal_ns(),
+                Some((_, stated_ns)) if !to.is_sporadic() => {
+                    stated_ns.saturating_add(to.renewal_ns())
+                }
+                Some(_) if from.period_ns() - from.period_ns().div_ceil(DRIFT) < to.period_ns() => {
+                    return Err(dags[1]);
+                }
+                Some((_, stated_ns)) => *stated_ns,
+            };
+            sum = sum.saturating_add(response_ns).saturating_add(way_ns);
+        }
+        Ok(sum.saturating_add(response(self.ends()[1])?))
     }
 
     /// Returns the longest reaction time, which is the longest data age.
@@ -176,27 +256,12 @@ impl Chain {
         task_set: &TaskSet,
         responses_ns: &[Option<u64>],
     ) -> Result<u64, DagId> {
-        sum(&self.segments, task_set, responses_ns)
+        let age_ns = self.output_age_bound_ns(task_set, responses_ns)?;
+        let last = task_set.dag(self.ends()[1]);
+        let is_bounded = !last.is_sporadic();
+        let bound_ns = age_ns.saturating_add(last.renewal_ns());
+        is_bounded.then_some(bound_ns).ok_or(self.ends()[1])
     }
-}
-
-/// Returns the sum of period and response time over DAGs.
-fn sum(
-    segments: &[ChainSegment],
-    task_set: &TaskSet,
-    responses_ns: &[Option<u64>],
-) -> Result<u64, DagId> {
-    segments.iter().try_fold(0, |sum: u64, segment| {
-        let model = task_set.dag(segment.dag);
-        let response_ns = responses_ns.get(segment.dag.index()).copied().flatten();
-        // Of a sporadic DAG nobody knows when the next job comes, so nothing bounds the way
-        // through it.
-        let response_ns = response_ns.filter(|_| !model.is_sporadic());
-        let of_dag = model
-            .renewal_ns()
-            .saturating_add(response_ns.ok_or(segment.dag)?);
-        Ok(sum.saturating_add(of_dag))
-    })
 }
 
 /// Returns the position of what has this name, or else the number that is written there.
@@ -355,12 +420,19 @@ impl Chain {
         task_set: &TaskSet,
         events: impl Iterator<Item = Event> + Clone,
     ) -> ChainLatencies {
-        let hops = self.segments.windows(2).map(|hop| SampledEdge {
-            writer: (hop[0].dag, hop[0].exit),
-            reader: (hop[1].dag, hop[1].entry),
-        });
-        let hops: Vec<SampledEdge> = hops.collect();
-        let sampled = SampledJobs::new(&hops, events.clone());
+        let edges: Vec<SampledEdge> = self.edges().collect();
+        let sampled = SampledJobs::new(&edges, events.clone());
+        self.latencies_by(&sampled, task_set, events)
+    }
+
+    /// Measures the chain as above, by what is known of the samples.
+    pub fn latencies_by(
+        &self,
+        sampled: &SampledJobs,
+        task_set: &TaskSet,
+        events: impl Iterator<Item = Event> + Clone,
+    ) -> ChainLatencies {
+        let hops: Vec<SampledEdge> = self.edges().collect();
         let releases = NominalReleases::of(task_set, events.clone());
         let pauses = PausedJobs::of(task_set, events.clone());
         let end_ns = self.segments.iter().map(|segment| {
@@ -521,6 +593,12 @@ impl SampledJobs {
             }
         }
         Self { jobs }
+    }
+
+    /// Adds that an instance has got the value of another one, such as by a message.
+    pub fn add(&mut self, reader: Instance, writer: Instance) {
+        let place = (writer.dag, writer.subtask);
+        self.jobs.insert((reader, place), writer.job);
     }
 
     /// Returns the job whose value an instance has sampled of a writer; `None`: it has not

@@ -2,8 +2,8 @@
 
 use sched_dag::chains::{Chain, ChainLatencies, SampledEdge, SampledJobs};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, FaultLimit, Instance, OnFault, Policy,
-    SubtaskId, SubtaskSpec, TaskSet, verify,
+    Activation, CommitOptions, ConstructionPolicy, DagId, DagSpec, FaultLimit, Instance, OnFault,
+    Policy, SubtaskId, SubtaskSpec, TaskSet, verify,
 };
 
 use crate::support::events::events;
@@ -174,6 +174,25 @@ fn bounds_are_sums_and_name_the_dag_that_has_none() {
     assert_eq!((age, reaction), (Ok(150 + 80 + 5), Ok(150 + 80 + 25)));
     let lacking = [Some(50), None, Some(5)];
     assert_eq!(chain.reaction_bound_ns(&task_set, &lacking), Err(DagId(1)));
+}
+
+#[test]
+fn a_link_adds_its_stated_delay_and_a_periodic_receiver_its_period() {
+    let bound = |activation, period_ns| {
+        let mut behind = dag("act", period_ns, &["hear"]);
+        behind.activation = activation;
+        let options = CommitOptions::new(Policy::Edf, 2);
+        let task_set = verify(&[dag("sense", 60, &["tell"]), behind], &options)
+            .unwrap()
+            .task_set;
+        let edge = sampling(place(0, 0), place(1, 0));
+        let chain = &Chain::all(&task_set, &[edge])[0];
+        chain.output_age_bound_over_links_ns(&task_set, &[Some(30), Some(9)], &[(edge, 500)])
+    };
+    assert_eq!(bound(Activation::Sporadic, 59), Ok(30 + 500 + 9));
+    // With a clock that is a bit slower its jobs would be rarer than messages.
+    assert_eq!(bound(Activation::Sporadic, 60), Err(DagId(1)));
+    assert_eq!(bound(Activation::Periodic, 61), Ok(30 + 500 + 61 + 9));
 }
 
 #[test]

@@ -3,8 +3,11 @@
 //! It comes as a file, or as lines of a serial log with the file's bytes. Every view of a run
 //! (shown, judged, drawn or computed) is derived from it.
 
+mod hops;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use recording::{Chunk, Commit, CommittedDag, Events, MAGIC, Recording, Times};
 use sched_dag::analysis::{self, AnalysisSettings, Overheads};
@@ -40,6 +43,8 @@ pub const SCHED_EXT_TOLERANCE_NS: u64 = 10_000_000;
 /// On Linux by ordinary threads, which every program delays.
 pub const NORMAL_TOLERANCE_NS: u64 = 100_000_000;
 
+pub use hops::{Heard, Hop, Link, Machine};
+
 /// The record of a boot.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
@@ -51,6 +56,8 @@ pub struct Record {
     pub runs: Vec<Run>,
     /// The times of each run that has ended, each with the index of its commit.
     pub times: Vec<(usize, Times)>,
+    /// The messages that sources have heard from other machines.
+    pub heard: Vec<Heard>,
 }
 
 /// Events of a run that is being read, by cluster.
@@ -193,6 +200,9 @@ impl Record {
         if !open.taken.is_empty() {
             record.end_run(open, None)?;
         }
+        if let Some(commit) = record.commits.first() {
+            record.heard = hops::heard(recording, &commit.told.dags);
+        }
         let transcript = Transcript::read(&record.lines);
         // Only now, since the line may come in any chunk of text.
         if let Some(boot) = transcript.of_kind("boot").next() {
@@ -225,6 +235,8 @@ impl Record {
             usual_bound_ns: REAL_TOLERANCE_NS,
             task_set: committed.task_set.clone(),
             samplings: committed.samplings(),
+            machines: Vec::new(),
+            links: Vec::new(),
             bounds_ns: committed.told.dags.iter().map(|dag| dag.bound_ns).collect(),
             events: first.unwrap_or_default(),
             lost: open.lost,
@@ -299,7 +311,7 @@ impl Open {
 
 /// Merges the events of two clusters by time; at equal times those of the first come before, as in
 /// a kernel that ends a run.
-fn merged(ours: Vec<Event>, theirs: Vec<Event>) -> Vec<Event> {
+pub(crate) fn merged(ours: Vec<Event>, theirs: Vec<Event>) -> Vec<Event> {
     let mut merged = Vec::with_capacity(ours.len() + theirs.len());
     let mut theirs = theirs.into_iter().peekable();
     for event in ours {
@@ -590,6 +602,10 @@ pub struct Run {
     pub task_set: TaskSet,
     /// The samplings of subtasks.
     pub samplings: Vec<SampledEdge>,
+    /// The machines whose runs it joins, if it does.
+    pub machines: Vec<Machine>,
+    /// The links between these.
+    pub links: Vec<Link>,
     /// The bound that was proven of each DAG.
     pub bounds_ns: Vec<Option<u64>>,
     /// The events, in the order of the journal.
@@ -601,6 +617,15 @@ pub struct Run {
 }
 
 impl Run {
+    /// Returns the cores of each machine, with its name.
+    pub fn cores(&self) -> Vec<(String, Range<u32>)> {
+        let of = |it: &Machine| (format!("{}:", it.name), it.cores.clone());
+        match &self.machines[..] {
+            [] => vec![(String::new(), 0..self.options.cores)],
+            machines => machines.iter().map(of).collect(),
+        }
+    }
+
     /// Returns the terms on which the run is judged, with a tolerance in nanoseconds.
     pub const fn terms(&self, bound_ns: u64) -> JudgeOptions {
         JudgeOptions {

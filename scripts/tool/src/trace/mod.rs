@@ -33,6 +33,7 @@
 //! A trace is *complete from* the first instant after the first event that is left; earlier events
 //! are left out.
 
+mod links;
 pub mod picture;
 pub mod viewer;
 
@@ -116,8 +117,11 @@ chains: from a source to a sink, from DAG to DAG by samples of latest values
   data age                the same, to the finish of the next output
   reaction time           from what a release just misses to the first output of it
 
-For each run there is a machine line of kind `trace_check`, and one of kind `chain`
-for each chain; docs/formats.md explains them.
+Records of several machines whose messages have hops (docs/ros.md) are read as one: chains
+lead over their links, with the delay that the app states, which nothing proves.
+
+For each run there is a machine line of kind `trace_check`, one of kind `chain` for each
+chain and one of kind `link` for each link; docs/formats.md explains them.
 
 exit codes: 0 no breach; 1 some; 2 a refused command line, or a file without a
 well-formed trace with events
@@ -151,42 +155,67 @@ fn judge_all(options: &Parsed) -> Result<usize, String> {
         return Err("which files? name at least one record of a run".into());
     }
     files::check_once(options.files())?;
-    let mut runs = Vec::new();
-    for file in options.files() {
-        let found = read_file(file)?.into_iter();
-        runs.extend(found.map(|run| (files::shown_path(file), run)));
+    let records = read_files(options)?;
+    let files: Vec<&str> = records.iter().map(|(file, _)| &file[..]).collect();
+    let (files, joint) = (files.join(" "), links::join(&records));
+    let runs = records.into_iter().flat_map(|(file, record)| {
+        let runs = record.runs.into_iter();
+        runs.map(move |run| (file.clone(), run))
+    });
+    let mut runs: Vec<(String, Run)> = runs.collect();
+    let is_joint = matches!(joint, Ok(Some(_)));
+    match joint {
+        Ok(joint) => runs.extend(joint.map(|run| (files, run))),
+        Err(why) => eprintln!("{files}: each is read alone, as {why}"),
     }
     // All chains are measured first, so that a wrong name is reported before any output.
-    let measured = runs.iter().map(|(_, run)| measure(run, options));
+    let measured = runs.iter().map(|(_, run)| match run.machines[..] {
+        [] if is_joint => Ok(Vec::new()),
+        _ => measure(run, options),
+    });
     let measured: Vec<_> = measured.collect::<Result<_, _>>()?;
     let judged = runs.iter().zip(&measured);
     let breaches = judged.map(|((file, run), chains)| judge(file, run, chains, options));
     Ok(breaches.sum())
 }
 
+/// Reads all files.
+fn read_files(options: &Parsed) -> Result<Vec<(String, Record)>, String> {
+    let read = |path| Ok((files::shown_path(path), read_file(path)?));
+    options.files().map(read).collect()
+}
+
 /// Reads a file's runs, of which at least one must have events.
-fn read_file(path: &Path) -> Result<Vec<Run>, String> {
+fn read_file(path: &Path) -> Result<Record, String> {
     let file = files::shown_path(path);
     let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
-    let runs = Record::read(&bytes)
-        .map_err(|why| format!("{file}: {why}"))?
-        .runs;
-    match &runs[..] {
+    let record = Record::read(&bytes).map_err(|why| format!("{file}: {why}"))?;
+    match &record.runs[..] {
         [] => Err(format!(
             "{file}: there is no run in it; `./scripts/run --trace FILE` keeps one"
         )),
         runs if runs.iter().all(|run| run.events.is_empty()) => {
             Err(format!("{file}: no run of the file has an event"))
         }
-        _ => Ok(runs),
+        _ => Ok(record),
     }
 }
 
 /// Judges a run, prints the findings, and returns the number of breaches.
 fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> usize {
     let bound_ns = tolerance_ns(run, options.number(name::BOUND_US));
-    let findings = check(run, bound_ns);
-    let mut table = table(file, run, &findings, bound_ns);
+    let (mut table, lines, breaches) = match &run.machines[..] {
+        [] => {
+            let findings = check(run, bound_ns);
+            let table = table(file, run, &findings, bound_ns);
+            let line = machine_line(file, run, &findings);
+            (table, vec![line], findings.breaches.len())
+        }
+        _ => {
+            let (table, lines) = links::told(file, run);
+            (table, lines, 0)
+        }
+    };
     table += &chain_table(run, chains, options.is_given(name::FROM));
     let exceeded: usize = chains.iter().map(|chain| chain.exceeded(bound_ns)).sum();
     if exceeded > 0 {
@@ -200,11 +229,11 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
     } else {
         print!("{table}");
     }
-    println!("{}", machine_line(file, run, &findings));
+    lines.iter().for_each(|line| println!("{line}"));
     for chain in chains {
         println!("{}", chain_line(file, run, chain, bound_ns));
     }
-    findings.breaches.len() + exceeded
+    breaches + exceeded
 }
 
 /// The most breaches of a run that are shown; all are counted.
@@ -325,15 +354,20 @@ struct MeasuredChain {
     names: Vec<String>,
     /// The age of an output, the data age and the reaction time.
     times: [(Distribution, Result<u64, DagId>); 3],
+    /// The longest of each for which a bound holds, by clocks that may be wrong.
+    longest_ns: [u64; 3],
+    /// The stated delay of the links that it leads over, if any.
+    stated_ns: Option<u64>,
 }
 
 impl MeasuredChain {
     /// Returns how many of its times are beyond their bounds, by more than the tolerance.
     fn exceeded(&self, tolerance_ns: u64) -> usize {
-        let is_beyond = |(times, bound): &&(Distribution, Result<u64, DagId>)| {
-            bound.is_ok_and(|ns| times.max() > ns.saturating_add(tolerance_ns))
+        let is_beyond = |(longest_ns, (_, bound)): &(&u64, &(_, Result<u64, DagId>))| {
+            bound.is_ok_and(|ns| **longest_ns > ns.saturating_add(tolerance_ns))
         };
-        self.times.iter().filter(is_beyond).count()
+        let times = self.longest_ns.iter().zip(&self.times);
+        times.filter(is_beyond).count()
     }
 }
 
@@ -343,7 +377,13 @@ impl MeasuredChain {
 ///
 /// In words: there is no such subtask, or no chain between the two.
 fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
-    let samplings = &run.samplings;
+    let links = run.links.iter().map(|link| link.edge);
+    let samplings = &run
+        .samplings
+        .iter()
+        .copied()
+        .chain(links)
+        .collect::<Vec<_>>();
     let ends = (options.text(name::FROM), options.text(name::TO));
     let chains = match ends {
         (None, None) => Chain::all(&run.task_set, samplings),
@@ -366,12 +406,21 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
     };
     let view = View::new(run);
     let events: Vec<_> = view.in_the_order_of_the_log().collect();
+    let sampled = [true, false].map(|with_late| links::sampled(run, with_late, &events));
     let measured = |chain: &Chain| {
-        let times = chain.latencies(&run.task_set, events.iter().copied());
+        let times = |by| chain.latencies_by(by, &run.task_set, events.iter().copied());
+        let [times, judged] = sampled.each_ref().map(times);
         let bounds = &run.bounds_ns;
-        let output_age = chain.output_age_bound_ns(&run.task_set, bounds);
-        let reaction = chain.reaction_bound_ns(&run.task_set, bounds);
+        let (links, wrong_ns) = links::of_chain(run, chain);
+        let output_age = chain.output_age_bound_over_links_ns(&run.task_set, bounds, &links);
+        let reaction = match links.first() {
+            None => chain.reaction_bound_ns(&run.task_set, bounds),
+            // Messages may be lost.
+            Some((link, _)) => Err(link.reader.0),
+        };
         let names = chain.names(&run.task_set).map(|name| name.to_string());
+        let judged = [judged.output_age_ns, judged.data_age_ns, judged.reaction_ns];
+        let longest_ns = judged.map(|times_ns| times_ns.into_iter().max().unwrap_or(0));
         // Reaction time and data age have the same bound.
         MeasuredChain {
             names: names.collect(),
@@ -380,6 +429,8 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
                 (Distribution::new(times.data_age_ns), reaction),
                 (Distribution::new(times.reaction_ns), reaction),
             ],
+            longest_ns: longest_ns.map(|ns| ns.saturating_sub(wrong_ns)),
+            stated_ns: links.iter().map(|link| link.1).reduce(u64::saturating_add),
         }
     };
     Ok(chains.iter().map(measured).collect())
@@ -414,9 +465,15 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
         let _ = writeln!(text, "  chain {}", chain.names.join(" > "));
         let names = ["age of an output", "data age", "reaction time"];
         for (name, (times, bound)) in names.into_iter().zip(&chain.times) {
-            let bound = match bound {
-                Ok(ns) => format!("bound {}", shown_ns(*ns)),
-                Err(dag) => match run.task_set.dag(*dag) {
+            let bound = match (bound, chain.stated_ns) {
+                (Ok(ns), None) => format!("bound {}", shown_ns(*ns)),
+                (Ok(ns), Some(stated_ns)) => format!(
+                    "bound {}, of which {} is the stated delay of links, which nothing proves",
+                    shown_ns(*ns),
+                    shown_ns(stated_ns)
+                ),
+                (Err(_), Some(_)) => "no bound over links".into(),
+                (Err(dag), None) => match run.task_set.dag(*dag) {
                     model if model.is_sporadic() => {
                         format!("no bound, as dag `{}` is sporadic", model.name())
                     }
@@ -441,7 +498,7 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
 fn chain_line(file: &str, run: &Run, chain: &MeasuredChain, tolerance_ns: u64) -> String {
     let bound = |of: &Result<u64, DagId>| of.map_or("null".into(), |ns| ns.to_string());
     let [output_age, data_age, reaction] = &chain.times;
-    Object::new()
+    let line = Object::new()
         .text("kind", "chain")
         .text("file", file)
         .number("run", run.number)
@@ -451,8 +508,9 @@ fn chain_line(file: &str, run: &Run, chain: &MeasuredChain, tolerance_ns: u64) -
         .json("reaction_ns", &object(&reaction.0))
         .json("output_age_bound_ns", &bound(&output_age.1))
         .json("reaction_bound_ns", &bound(&reaction.1))
-        .number("exceeded", chain.exceeded(tolerance_ns) as u64)
-        .into_text()
+        .number("exceeded", chain.exceeded(tolerance_ns) as u64);
+    let stated = |line: Object, ns: u64| line.number("stated_ns", ns);
+    chain.stated_ns.into_iter().fold(line, stated).into_text()
 }
 
 /// The figures of one run. Times are in nanoseconds.

@@ -2,7 +2,7 @@
 //!
 //! At the top stands each graph: a box for each subtask with its WCET, and an arrow for each
 //! edge. Below are the first jobs on a common axis of time: a row for each core with what it
-//! executed, in the colour of its subtask, and below that a thin bar for each wait of what has left
+//! executed, in the colour of its subtask, with arrows of messages between machines, and below that a thin bar for each wait of what has left
 //! the core; then a row for each DAG with the response time of each job, its proven bound and its
 //! deadline.
 //!
@@ -11,14 +11,14 @@
 
 use std::ops::Range;
 
-use sched_dag::{Dag, DagId, SubtaskId};
+use sched_dag::{CoreId, Dag, DagId, SubtaskId};
 
-use super::View;
+use super::{View, links};
 use crate::record::Run;
 use crate::svg::Svg;
 
 const WIDTH: u64 = 820;
-/// The width of the rows' names, and where the axis of time begins.
+/// The least width of the rows' names, and where the axis of time begins.
 const LEFT: u64 = 84;
 /// The room behind the axis, for half a label.
 const RIGHT: u64 = 36;
@@ -41,8 +41,16 @@ const COLOURS: [&str; 10] = [
 /// In words: no job is left of that time.
 pub fn draw(run: &Run, released_ns: Range<u64>) -> Result<String, String> {
     let view = View::new(run);
+    let names = run
+        .task_set
+        .dags()
+        .iter()
+        .map(|dag| dag.name().len() as u64);
+    // Those of several machines begin with the machine's.
+    let names = names.filter(|_| !run.machines.is_empty());
     let mut picture = Picture {
         view: &view,
+        left: LEFT.max(16 + 8 * names.max().unwrap_or(0)),
         svg: Svg::default(),
         end_ns: released_ns.end,
         released_ns,
@@ -78,6 +86,7 @@ pub fn draw(run: &Run, released_ns: Range<u64>) -> Result<String, String> {
 struct Picture<'v> {
     view: &'v View<'v>,
     svg: Svg,
+    left: u64,
     /// Jobs that are released then are drawn.
     released_ns: Range<u64>,
     /// Where the axis of time ends.
@@ -100,13 +109,13 @@ impl<'v> Picture<'v> {
 
     /// Where an instant is on the axis.
     fn x(&self, time_ns: u64) -> u64 {
-        let pixels = u128::from(WIDTH - LEFT - RIGHT);
+        let pixels = u128::from(WIDTH - self.left - RIGHT);
         let from_ns = self.released_ns.start;
         let span_ns = u128::from((self.end_ns - from_ns).max(1));
         // To the nearest pixel.
         let after_ns = u128::from(time_ns.saturating_sub(from_ns));
         let x = (2 * after_ns * pixels + span_ns) / (2 * span_ns);
-        LEFT + u64::try_from(x).expect("within the picture")
+        self.left + u64::try_from(x).expect("within the picture")
     }
 
     /// The colour of a subtask: the next one for each of all DAGs.
@@ -136,7 +145,7 @@ impl<'v> Picture<'v> {
         for (x, layer) in (0..).zip(&layers) {
             let above = (tallest - layer.len() as u64) * height / 2;
             for (row, subtask) in (0..).zip(layer) {
-                corners[subtask.0 as usize] = (LEFT + x * width, y + above + row * height);
+                corners[subtask.0 as usize] = (self.left + x * width, y + above + row * height);
             }
         }
         self.svg
@@ -172,9 +181,12 @@ impl<'v> Picture<'v> {
     /// Draws what each core executed, from `y` on.
     fn cores(&mut self, y: u64) -> u64 {
         let cores = u64::from(self.view.run.options.cores);
-        for core in 0..cores {
-            let middle = y + core * ROW + 20;
-            self.svg.text((8, middle), "start", &format!("core {core}"));
+        for (name, of) in self.view.run.cores() {
+            for core in of.clone() {
+                let middle = y + u64::from(core) * ROW + 20;
+                let name = format!("{name}core {}", core - of.start);
+                self.svg.text((8, middle), "start", &name);
+            }
         }
         for (&instance, history) in &self.view.histories {
             if !self.is_drawn(instance.dag, instance.job) {
@@ -196,6 +208,26 @@ impl<'v> Picture<'v> {
                     self.svg
                         .rect((to, top + ROW - 7), ((until - to).max(1), 4), colour);
                 }
+            }
+        }
+        for (writer, reader) in links::messages(self.view.run, true) {
+            let slices = [(writer, true), (reader, false)].map(|(of, is_last)| {
+                let slices = &self.view.histories.get(&of)?.slices;
+                let slice = if is_last {
+                    slices.last()
+                } else {
+                    slices.first()
+                };
+                slice.filter(|_| self.is_drawn(of.dag, of.job))
+            });
+            if let [Some(from), Some(to)] = slices {
+                let row = |core: CoreId| y + u64::from(core.0) * ROW + ROW / 2;
+                let sent_ns = from.to_ns.unwrap_or(self.end_ns);
+                let end = (self.x(to.from_ns), row(to.core));
+                let style = "stroke=\"#333333\" stroke-dasharray=\"3\"";
+                self.svg.line((self.x(sent_ns), row(from.core)), end, style);
+                let arrow = format!("M{} {} l-8 -4 v8 z", end.0, end.1);
+                self.svg.path(&arrow, "fill=\"#333333\"");
             }
         }
         y + cores * ROW
@@ -274,15 +306,22 @@ impl<'v> Picture<'v> {
                 (x, bottom),
                 "stroke=\"#333333\" stroke-opacity=\"0.12\"",
             );
-            self.svg.text((x, bottom + 16), "middle", &time(time_ns));
+            // Far from 0 a decimal does not tell marks apart.
+            let unit = UNITS.into_iter().find(|it| step_ns >= it.0);
+            let label = match unit.filter(|_| from_ns > 0) {
+                Some((unit_ns, unit)) => format!("{} {unit}", time_ns / unit_ns),
+                None => time(time_ns),
+            };
+            self.svg.text((x, bottom + 16), "middle", &label);
         }
     }
 }
 
+const UNITS: [(u64, &str); 3] = [(1_000_000_000, "s"), (1_000_000, "ms"), (1000, "us")];
+
 /// Writes a time with at most one decimal, in the largest unit that makes it 1 or more.
 fn time(ns: u64) -> String {
-    let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1000, "us")];
-    let (unit_ns, unit) = units.into_iter().find(|it| ns >= it.0).unwrap_or((1, "ns"));
+    let (unit_ns, unit) = UNITS.into_iter().find(|it| ns >= it.0).unwrap_or((1, "ns"));
     if ns == 0 {
         return "0".into();
     }

@@ -5,6 +5,7 @@ mod dag_files;
 mod elf;
 mod files;
 mod lines;
+mod links;
 #[path = "../../src/record/tests/made.rs"]
 #[allow(dead_code, reason = "each program uses a part of this")]
 mod made;

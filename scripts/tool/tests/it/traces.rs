@@ -39,7 +39,7 @@ fn traces(name: &str, others: &[(&str, &[u8])]) -> PathBuf {
 }
 
 /// Returns the machine line of a kind.
-fn machine_line(said: &str, kind: &str) -> MachineLine {
+pub(crate) fn machine_line(said: &str, kind: &str) -> MachineLine {
     let mut lines = said.lines().filter_map(|line| read_line(1, line));
     let line = lines.find(|line| line.as_ref().is_ok_and(|line| line.kind == kind));
     line.expect(said).expect("it is well formed")

@@ -7,7 +7,7 @@
 //! such as `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it has one. A
 //! line `lost 2` before them states the number of earlier events that are lost.
 
-use recording::{Commit, CommittedDag, CommittedSubtask, Times, Writer};
+use recording::{Commit, CommittedDag, CommittedSubtask, Entry, EntryKind, Header, Times, Writer};
 use sched_dag::journal::{Event, EventSubject};
 use sched_dag::{CoreId, DagId, SubtaskId};
 
@@ -105,9 +105,32 @@ pub(crate) fn event(line: &str) -> Event {
 
 /// Makes a record of one run, after a text.
 pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
+    record_with(&Header::default(), &[], text, commit, events)
+}
+
+/// Makes one that has values, too: of the first channel, by job.
+pub(crate) fn record_with(
+    header: &Header,
+    values: &[Vec<u8>],
+    text: &str,
+    commit: &Commit,
+    events: &str,
+) -> Vec<u8> {
     let mut record = Writer::begin(Vec::new());
+    record.header(header);
     record.text(text);
     record.commit(commit);
+    for (job, value) in (0..).zip(values) {
+        record.write(&Entry {
+            what: EntryKind::Value,
+            dag: header.channels[0].dag,
+            place: 0,
+            job,
+            release_ns: 0,
+            at_ns: 0,
+            value,
+        });
+    }
     let mut lines = lines_of(events);
     let lost = lines.first().and_then(|line| line.strip_prefix("lost "));
     let lost = lost.map_or(0, number);

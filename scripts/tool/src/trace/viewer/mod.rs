@@ -16,7 +16,9 @@
 //!
 //! Flows lead along each edge of the graph from an instance's finish to the start of its successor
 //! in the same job, and from an instance's finish to the start of each one that samples its value.
-//! Each flow is drawn twice, between cores and between subtasks, under two numbers.
+//! Each flow is drawn twice, between cores and between subtasks, under two numbers. In a joint run
+//! of several machines each has its own cores, and a flow leads from the sender of a message to its
+//! receiver; breaches are left out.
 //!
 //! Slices of one track always nest, and each flow has both its ends. Each time is the trace's, in
 //! microseconds with three decimals. All runs begin at 0, side by side. Where events were lost,
@@ -43,9 +45,9 @@ use sched_dag::journal::EventKind;
 use sched_dag::law::Violation;
 use sched_dag::{CoreId, Dag, DagId, Instance, SubtaskId};
 
-use super::{JobHistory, Slice, View, picture};
-use super::{check, read_file};
-use crate::files;
+use super::{JobHistory, Slice, View, links, picture};
+use super::{check, read_files};
+use crate::files::{self, Named};
 use crate::json::{Object, quoted};
 use crate::options::{Command, Name, Parsed, Refusal, Takes, options};
 use crate::output::briefly;
@@ -56,7 +58,11 @@ pub fn convert(runs: &[Run], bound_ns: u64) -> String {
     let (mut output, mut next_flow) = (Output::default(), 0);
     for run in runs {
         let view = View::new(run);
-        let breaches = check(run, bound_ns).breaches;
+        let breaches = match run.machines[..] {
+            [] => check(run, bound_ns).breaches,
+            // Each machine is judged alone.
+            _ => Vec::new(),
+        };
         let prefix = match runs {
             [_] => String::new(),
             _ => format!("run {} ", run.number),
@@ -137,8 +143,9 @@ pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
     about: "Draws the traces of runs: for Perfetto's viewer, or as one picture.",
     positional: Some((
-        Takes::File("FILE"),
-        "A record of runs, as `./scripts/run --trace FILE` and --keep write it, or a serial log.",
+        Takes::File("FILE..."),
+        "A record of runs, as `./scripts/run --trace FILE` and --keep write it, or a serial log; or \
+         records of machines that send each other messages.",
     )),
     options: OPTIONS,
     notes: "\
@@ -157,7 +164,8 @@ options! {
     SVG: Takes::Nothing;
     /// How many times the longest period the picture shows.
     PERIODS: Takes::Number(1, 1000), or "1";
-    /// The picture begins at this time of the run, such as 20ms; else at 0.
+    /// The picture begins at this time of the run, such as 20ms; else at 0, or where
+    /// machines first hear of each other.
     FROM: Takes::Text("TIME");
     /// It shows the jobs that are released before this time, whatever --periods says.
     UNTIL: Takes::Text("TIME");
@@ -189,10 +197,17 @@ pub fn trace(words: &[OsString]) -> ExitCode {
 
 /// Converts the runs that the options name.
 fn draw(options: &Parsed) -> Result<String, String> {
-    let input = options.file("which file? name a record of a run")?;
-    files::check(&[input], &options.named(&[name::OUT]))?;
-    let mut runs = read_file(input.path)?;
-    let file = files::shown_path(input.path);
+    options.file("which file? name a record of a run")?;
+    let inputs = options.files().map(|path| Named { option: "", path });
+    files::check(&inputs.collect::<Vec<_>>(), &options.named(&[name::OUT]))?;
+    let mut records = read_files(options)?;
+    let joint = links::join(&records)?;
+    let (file, first) = records.swap_remove(0);
+    let mut runs = match joint {
+        Some(run) => vec![run],
+        None if records.is_empty() => first.runs,
+        None => return Err("no messages connect these records; draw each alone".into()),
+    };
     if let Some(number) = options.number(name::RUN) {
         let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
         runs.retain(|run| run.number == number);
@@ -210,7 +225,10 @@ fn draw(options: &Parsed) -> Result<String, String> {
             let time = options.text(name).map(parse_ns).transpose();
             time.map_err(|why| format!("`--{name}`: {why}"))
         };
-        let from_ns = time(name::FROM)?.unwrap_or(0);
+        let view = View::new(run);
+        let sent = links::messages(run, true);
+        let sent_ns = sent.filter_map(|(of, _)| view.jobs.get(&(of.dag, of.job))?.released_ns);
+        let from_ns = time(name::FROM)?.or(sent_ns.min()).unwrap_or(0);
         let periods = run.task_set.dags().iter().map(Dag::period_ns);
         let longest_ns = periods.max().unwrap_or(0);
         let span_ns = longest_ns.saturating_mul(options.number(name::PERIODS).unwrap_or(1));
@@ -230,14 +248,16 @@ type Piece = (Instance, usize);
 /// Draws the cores of a run.
 fn draw_cores(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output) {
     let pieces = pieces(view);
-    let group = output.group(&format!("{prefix}cores"), "");
-    for core in (0..view.run.options.cores).map(CoreId) {
-        let mut track = output.track(group, &format!("core {}", core.0));
-        for &(slice, piece) in pieces.iter().filter(|(slice, _)| slice.core == core) {
-            draw_one(view, slice, piece, flows, &mut track);
+    for (machine, cores) in view.run.cores() {
+        let group = output.group(&format!("{prefix}{machine}cores"), "");
+        for core in cores.clone().map(CoreId) {
+            let mut track = output.track(group, &format!("core {}", core.0 - cores.start));
+            for &(slice, piece) in pieces.iter().filter(|(slice, _)| slice.core == core) {
+                draw_one(view, slice, piece, flows, &mut track);
+            }
+            draw_preemptions(view, core, &mut track);
+            output.add(track);
         }
-        draw_preemptions(view, core, &mut track);
-        output.add(track);
     }
 }
 
@@ -477,8 +497,8 @@ fn jobs_of<'v>(
 #[derive(Clone, Copy, Debug)]
 struct Flow {
     number: u64,
-    /// Whether it is a sample rather than an edge.
-    is_sample: bool,
+    /// Its name and category.
+    kind: (&'static str, &'static str),
 }
 
 /// The arrows of a run.
@@ -513,21 +533,27 @@ impl Flows {
                 let earlier = Instance { subtask, ..later };
                 let finish = view.histories.get(&earlier).and_then(|it| it.finish_ns);
                 if finish.is_some() {
-                    flows.add(earlier, later, false);
+                    flows.add(earlier, later, ("precedes", "precedence"));
                 }
             }
         }
         let samplings = &view.run.samplings;
         let sampled = SampledJobs::new(samplings, view.in_the_order_of_the_log());
         for (reader, writer) in sampled.all() {
-            flows.add(writer, reader, true);
+            flows.add(writer, reader, ("sampled by", "sample"));
+        }
+        for (writer, reader) in links::messages(view.run, true) {
+            let reads = view.histories.get(&reader).and_then(|it| it.start_ns);
+            if view.histories.contains_key(&writer) && reads.is_some() {
+                flows.add(writer, reader, ("heard by", "message"));
+            }
         }
         flows
     }
 
-    fn add(&mut self, from: Instance, to: Instance, is_sample: bool) {
+    fn add(&mut self, from: Instance, to: Instance, kind: (&'static str, &'static str)) {
         let number = self.first + self.count;
-        let flow = Flow { number, is_sample };
+        let flow = Flow { number, kind };
         self.out.entry(from).or_default().push(flow);
         self.into.entry(to).or_default().push(flow);
         self.count += 1;
@@ -706,11 +732,8 @@ impl TrackWriter {
 
 /// Returns the members that both ends of a flow share.
 fn described(flow: Flow) -> String {
-    let Flow { number, is_sample } = flow;
-    let (name, category) = match is_sample {
-        true => ("sampled by", "sample"),
-        false => ("precedes", "precedence"),
-    };
+    let number = flow.number;
+    let (name, category) = flow.kind;
     format!(",\"name\":\"{name}\",\"cat\":\"{category}\",\"id\":{number}")
 }
 
