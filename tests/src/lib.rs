@@ -1,6 +1,6 @@
 //! Support of the boot tests, above the host tool's library: a [`Guest`] that a test
 //! describes and boots, [`said`] for what it says, [`stick`] for what it boots from as a PC does,
-//! [`bochs`], where it is not QEMU that boots it, [`markdown`] and
+//! [`bochs`], where it is not QEMU that boots it, [`peer`] for a router, [`markdown`] and
 //! [`fault_page`] for pages that are held to their word, [`workload`] for what the baseline's policies
 //! do by their rules, and the tutorials, whose examples are
 //! this crate's doctests.
@@ -14,6 +14,7 @@ pub mod file;
 pub mod guest;
 pub mod guide;
 pub mod markdown;
+pub mod peer;
 pub mod said;
 pub mod stick;
 pub mod workload;
@@ -66,3 +67,8 @@ mod wire_examples {}
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/from-ros-2.md")]
 mod ros_examples {}
+
+/// As above, of the page about nodes of ROS 2.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/ros.md")]
+mod node_examples {}

@@ -53,6 +53,8 @@ prints how many of those jobs each pair of features had.
 With --frames, and nothing else, so many frames of a network with wrong bytes are
 heard on the host, and a tenth of them on the machine, with as large a flood of
 right ones, next to a control loop that may miss nothing.
+With --messages, and nothing else, a client of a router hears so many messages
+with wrong bytes, and so many of each type of ROS 2 are decoded and written again.
 
 exit codes: 0 no round failed; 1 some did; 2 a refused command line
 ",
@@ -67,6 +69,8 @@ options! {
     JOBS: Takes::Number(1, 1_000_000_000_000);
     /// Frames with wrong bytes to hear, instead of rounds.
     FRAMES: Takes::Number(1, 1_000_000_000_000);
+    /// Messages with wrong bytes to hear, instead of rounds.
+    MESSAGES: Takes::Number(1, 1_000_000_000_000);
     /// The first round.
     FIRST: Takes::Number(0, 1_000_000), or "0";
     /// How many rounds, that is sets of DAGs; 84, with --short 16.
@@ -87,8 +91,21 @@ options! {
 /// Runs the subcommand with the words after its name.
 pub fn soak(words: &[OsString]) -> ExitCode {
     SOAK.carry_out(words, |options| {
+        let seed = options.number(name::SEED).unwrap_or(1);
         if let Some(frames) = options.number(name::FRAMES) {
-            return Ok(hear(frames, options.number(name::SEED).unwrap_or(1))?);
+            let on_host = (["net", "it", "no_mutated_frame"], frames);
+            let on_machine = (
+                ["harness", "boots", "no_storm_of_frames"],
+                frames.div_ceil(10),
+            );
+            return Ok(hear("FRAMES", [on_host, on_machine], seed)?);
+        }
+        if let Some(messages) = options.number(name::MESSAGES) {
+            let tests = [
+                ["zenoh", "it", "no_mutated"],
+                ["ros", "it", "all_types_have"],
+            ];
+            return Ok(hear("MESSAGES", tests.map(|test| (test, messages)), seed)?);
         }
         let are_kept = options.number(name::JOBS).map_or(Ok(true), simulate)?;
         let plan = plan(options);
@@ -114,17 +131,11 @@ fn simulate(jobs: u64) -> Result<bool, String> {
     hold(test, &[("ANALYSIS_JOBS", jobs)])
 }
 
-/// Has the network's protocols hear so many frames with wrong bytes, and the machine a tenth.
-fn hear(frames: u64, seed: u64) -> Result<ExitCode, String> {
+/// Has tests hear so many of something with wrong bytes, whose name they look for.
+fn hear(what: &str, tests: [([&str; 3], u64); 2], seed: u64) -> Result<ExitCode, String> {
     let mut are_heard = true;
-    for (test, count) in [
-        (["net", "it", "no_mutated_frame"], frames),
-        (
-            ["harness", "boots", "no_storm_of_frames"],
-            frames.div_ceil(10),
-        ),
-    ] {
-        are_heard &= hold(test, &[("FRAMES", count), ("SEED", seed)])?;
+    for (test, count) in tests {
+        are_heard &= hold(test, &[(what, count), ("SEED", seed)])?;
     }
     Ok(ExitCode::from(u8::from(!are_heard)))
 }

@@ -20,7 +20,7 @@ use crate::progress::Lasting;
 use crate::system;
 
 /// The most bytes that a stripped image may have.
-pub const MOST_STRIPPED_BYTES: u64 = 832 << 10;
+pub const MOST_STRIPPED_BYTES: u64 = 864 << 10;
 
 /// The folder of the apps.
 const APPS: &str = "apps";

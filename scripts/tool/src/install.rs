@@ -1,11 +1,12 @@
-//! Installing the programs that a command needs, by `apt-get`.
+//! Installing the programs that a command needs, by `apt-get`, and what tests need of PyPI, by `pip`.
 //!
 //! A command that needs QEMU installs it if it is missing; one that needs GRUB, a firmware
 //! or Bochs does likewise. The tool downloads nothing itself. Without `apt-get` the person is told
 //! what to install.
 
+use std::fs::{self, File};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::qemu::{Loader, OVMF_FILE, PROGRAM};
@@ -72,6 +73,9 @@ pub static BOCHS: Need = Need {
     packages: "bochs bochs-sdl bochsbios vgabios",
 };
 
+/// Packages of PyPI for tests: a router of Zenoh, and a reader of ROS 2's messages.
+const OF_PYPI: [&str; 2] = ["eclipse-zenoh==1.10.2", "rosbags==0.11.9"];
+
 /// Makes sure that QEMU is there, as [`ensure`] does.
 ///
 /// # Errors
@@ -121,6 +125,37 @@ pub fn ensure(need: &Need) -> Result<(), String> {
             need.what
         )),
     }
+}
+
+/// Returns a Python with the packages that tests need, in `target/python`, which it installs if they
+/// are missing.
+///
+/// # Errors
+///
+/// In words: there is no Python, or the packages are not to be had.
+pub fn python() -> Result<PathBuf, String> {
+    let folder = system::workspace().join("target/python");
+    let python = folder.join("bin/python");
+    let install = || {
+        let lock = || {
+            fs::create_dir_all(&folder)?;
+            let file = File::create(folder.with_extension("lock"))?;
+            file.lock().map(|()| file)
+        };
+        // Until it is dropped, other processes wait here.
+        let _lock = lock().map_err(|why| format!("`{}`: {why}", folder.display()))?;
+        if system::run(Command::new(&python).args(["-c", "import zenoh, rosbags"])).is_ok() {
+            return Ok(());
+        }
+        system::run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
+        let mut pip = Command::new(&python);
+        pip.args(["-m", "pip", "install", "--quiet", "--retries=1"]);
+        system::run(pip.args(OF_PYPI)).map(drop)
+    };
+    let installed: Result<(), String> = install();
+    let what = OF_PYPI.join(" and ");
+    installed.map_err(|why| format!("no Python with {what} can be made: {why}"))?;
+    Ok(python)
 }
 
 /// Returns the first part that is missing.

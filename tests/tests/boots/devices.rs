@@ -52,7 +52,7 @@ fn a_machine_without_devices_says_what_it_lacks() {
     for (guest, remedy) in [
         (
             edu.clone(),
-            "no PCI configuration space in memory; boot a PC with PCI Express, in QEMU by `--machine q35`",
+            "no PCI configuration space in memory; boot a PC with PCI Express, in QEMU by `--machine q35`, with a network by `--net user`",
         ),
         (
             edu.machine(Machine::Q35),

@@ -33,3 +33,4 @@ mod seeing;
 mod stacks;
 mod topics;
 mod waits;
+mod with_router;

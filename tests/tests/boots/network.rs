@@ -108,7 +108,7 @@ fn a_machine_without_a_card_and_wrong_words_are_refused_with_a_remedy() {
         (
             echo.clone(),
             "wire `echo` finds that the machine has no PCI configuration space in memory; boot a PC \
-             with PCI Express, in QEMU by `--machine q35`",
+             with PCI Express, in QEMU by `--machine q35`, with a network by `--net user`",
         ),
         (
             q35,

@@ -1,7 +1,9 @@
-//! Pages and faults held to their word, and the baseline to its reference, without a guest.
+//! Pages and faults held to their word, the baseline to its reference, and a client to its router,
+//! without a guest.
 
 mod commit_faults;
 mod divided;
 mod documentation;
 mod published_schedules;
+mod with_router;
 mod workload;

@@ -26,6 +26,9 @@ const NEEDS: [(&str, &[&Need]); 4] = [
     ("in_bochs::", &[&install::GRUB, &install::BOCHS]),
 ];
 
+/// The module of boot tests with a router of Zenoh, which is a program in Python.
+const WITH_ROUTER: &str = "with_router::";
+
 /// Compiles the tests of all packages, and lists the wanted ones that boot guests. Cargo's errors
 /// go to standard error.
 ///
@@ -110,6 +113,12 @@ fn boot(plan: &TestPlan, tests: &[String], tally: &mut Tally) -> Option<Command>
             tally.skip(module, &why);
             command.args(["--skip", module]);
         }
+    }
+    if tests.iter().any(|test| test.starts_with(WITH_ROUTER))
+        && let Err(why) = install::python()
+    {
+        tally.skip(WITH_ROUTER, &why);
+        command.args(["--skip", WITH_ROUTER]);
     }
     Some(command)
 }

@@ -1,0 +1,81 @@
+//! A router of Zenoh on loopback, as users have one: `peers/router.py`, in a Python of its own.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{Ipv4Addr, UdpSocket};
+use std::process::{ChildStdin, Stdio};
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
+use std::time::Duration;
+
+use tool::child::{Child, bound_to_us};
+use tool::{install, system};
+
+/// The most time for a router's start: many times the usual.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// A running router. To drop the value ends the process.
+pub struct Router {
+    /// Its port for UDP.
+    pub port: u16,
+    commands: ChildStdin,
+    lines: Receiver<String>,
+    _process: Child,
+}
+
+impl Router {
+    /// Starts a router at a port, or at a free one, and waits until the router is up. Returns `None`
+    /// where no Python has a router, and says why; `./scripts/test` counts this as skipped.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the router does not come up.
+    #[must_use]
+    pub fn start(port: Option<u16>) -> Option<Self> {
+        let python = match install::python() {
+            Ok(python) => python,
+            Err(why) => {
+                eprintln!("skipped: {why}");
+                return None;
+            }
+        };
+        let free = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr();
+        let port = port.unwrap_or_else(|| free().expect("a port").port());
+        let mut command = bound_to_us(&python);
+        command.arg(system::workspace().join("tests/peers/router.py"));
+        command.arg(port.to_string());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut process = Child::start(&mut command).expect("a process");
+        let output = BufReader::new(process.output().expect("its output"));
+        let (sender, lines) = mpsc::channel();
+        // The thread ends with the process.
+        thread::spawn(move || {
+            let mut lines = output.lines().map_while(Result::ok);
+            lines.try_for_each(|line| sender.send(line))
+        });
+        let commands = process.input().expect("its input");
+        let router = Self {
+            port,
+            commands,
+            lines,
+            _process: process,
+        };
+        // A client that has waited for it may be heard of before.
+        let next = || router.lines.recv_timeout(LIMIT).expect("it comes up");
+        while !next().starts_with("up ") {}
+        Some(router)
+    }
+
+    /// Gives the router a command.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the router has ended.
+    pub fn command(&mut self, line: &str) {
+        writeln!(self.commands, "{line}").expect("a router");
+    }
+
+    /// Returns what the router has said since the last call.
+    pub fn said(&self) -> impl Iterator<Item = String> {
+        self.lines.try_iter()
+    }
+}
