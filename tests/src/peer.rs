@@ -23,21 +23,15 @@ pub struct Router {
 }
 
 impl Router {
-    /// Starts a router at a port, or at a free one, and waits until the router is up. Returns `None`
-    /// where no Python has a router, and says why; `./scripts/test` counts this as skipped.
+    /// Starts a router at a port, or at a free one, and waits until the router is up.
     ///
     /// # Panics
     ///
-    /// Panics if the router does not come up.
+    /// Panics if the router does not come up, as where no Python has one: there `./scripts/test` skips
+    /// the module `with_router`, and counts it.
     #[must_use]
-    pub fn start(port: Option<u16>) -> Option<Self> {
-        let python = match install::python() {
-            Ok(python) => python,
-            Err(why) => {
-                eprintln!("skipped: {why}");
-                return None;
-            }
-        };
+    pub fn start(port: Option<u16>) -> Self {
+        let python = install::python().expect("a Python with a router");
         let free = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr();
         let port = port.unwrap_or_else(|| free().expect("a port").port());
         let mut command = bound_to_us(&python);
@@ -62,7 +56,7 @@ impl Router {
         // A client that has waited for it may be heard of before.
         let next = || router.lines.recv_timeout(LIMIT).expect("it comes up");
         while !next().starts_with("up ") {}
-        Some(router)
+        router
     }
 
     /// Gives the router a command.

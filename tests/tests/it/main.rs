@@ -5,5 +5,4 @@ mod commit_faults;
 mod divided;
 mod documentation;
 mod published_schedules;
-mod with_router;
 mod workload;

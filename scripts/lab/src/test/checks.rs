@@ -20,7 +20,6 @@ use super::{
 use crate::bench::hand_off;
 use sched_dag::Policy;
 use tool::image;
-use tool::install;
 use tool::probe;
 use tool::progress::Lasting;
 use tool::qemu::Qemu;
@@ -94,13 +93,8 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     run("no crate has more lines than its budget", &|| {
         budgets::check(sources, blessed)
     });
-    run_with_programs(plan, tally);
-}
-
-/// Runs the checks that need programs of the host, build images and boot guests. What is missing is
-/// reported as skipped, not as a failure.
-fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
-    let blessed = plan.blessed.as_deref();
+    // From here on the checks need programs of the host, build images and boot guests; what is
+    // missing is reported as skipped, not as a failure.
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), CheckFailure>| {
         if plan.wants(name) {
             tally.run(name, check);
@@ -110,9 +104,6 @@ fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
     run(reader, &|| {
         let reader = recordings::independent_reader();
         reader.map(drop).map_err(CheckFailure::Skipped)
-    });
-    run("a router of Zenoh is there for tests", &|| {
-        install::python().map(drop).map_err(CheckFailure::Skipped)
     });
     if plan.quick {
         return;
