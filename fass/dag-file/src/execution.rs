@@ -77,6 +77,14 @@ fn fraction(text: &str) -> Option<u64> {
         .checked_add(part * 10_u64.pow(missing))
 }
 
+/// Returns the kernel's worst overheads in nanoseconds, as measured in deterministic mode: of a context
+/// switch, a dispatch, an interrupt, and an instance that becomes ready. A dispatch may wait for those
+/// of all other cores, which take turns.
+#[must_use]
+pub const fn kernel_overheads_ns(cores: u64) -> [u64; 4] {
+    [1000, 2500 * cores, 4000, 1000]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -26,7 +26,7 @@ pub mod time;
 mod write;
 
 pub use check::check;
-pub use execution::{Execution, WHOLE};
+pub use execution::{Execution, WHOLE, kernel_overheads_ns};
 pub use file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 pub use length::Length;
 pub use parse::{is_name, no_name, parse, refuse_repeated_edge};
