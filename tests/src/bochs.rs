@@ -16,8 +16,8 @@ use tool::child::{Child, Waited, bound_to_us};
 use tool::install;
 use tool::medium::Medium;
 use tool::outcome::judge_lines;
-use tool::protocol::Transcript;
 use tool::system::{find_program, host_load, new_log};
+use views::protocol::Transcript;
 
 use crate::guest::built;
 

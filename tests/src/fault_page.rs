@@ -31,9 +31,8 @@ pub fn table(head: &str) -> Vec<String> {
     let page = page(PAGE);
     let rows = page.split(head).nth(1).expect(head);
     let rows = rows.trim_start().lines().skip(1);
-    let texts = rows
-        .take_while(|row| row.starts_with("| "))
-        .filter_map(|row| row.split('|').nth(1));
+    let texts = rows.take_while(|row| row.starts_with("| "));
+    let texts = texts.filter_map(|row| row.split('|').nth(1));
     texts.map(|text| text.trim().to_string()).collect()
 }
 

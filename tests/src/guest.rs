@@ -27,9 +27,9 @@ use std::time::Duration;
 use tool::image;
 use tool::install;
 use tool::outcome::{Outcome, boot_with_input};
-use tool::protocol::Status;
 use tool::qemu::{Loader, Machine, Mode, Network, Qemu, Second};
 use tool::{system, wire_script};
+use views::protocol::Status;
 
 use crate::Said;
 use crate::altered::altered;

@@ -21,8 +21,8 @@ pub mod workload;
 
 use std::process::Command;
 
-use tool::protocol::Transcript;
 use tool::system;
+use views::protocol::Transcript;
 
 pub use guest::Guest;
 pub use said::{Members, Said, lawful_runs};

@@ -2,9 +2,10 @@
 //! the end of the log.
 
 use tool::Outcome;
-use tool::protocol::{MachineLine, Transcript};
-use tool::record::Run;
 use tool::trace;
+use views::findings::check;
+use views::protocol::{MachineLine, Transcript};
+use views::record::Run;
 
 /// Queries of a run's output.
 pub trait Said {
@@ -119,7 +120,7 @@ pub fn lawful_runs(outcome: &Outcome, bound_ns: u64) -> Vec<Run> {
     let runs = runs.unwrap_or_else(|fault| panic!("{fault}"));
     assert!(!runs.is_empty(), "no trace\n{}", outcome.tail());
     for run in &runs {
-        let breaches = trace::check(run, bound_ns).breaches;
+        let breaches = check(run, bound_ns).breaches;
         let breaches: Vec<String> = breaches.iter().map(ToString::to_string).collect();
         assert!(breaches.is_empty(), "run {}: {breaches:#?}", run.number);
     }

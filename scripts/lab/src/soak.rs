@@ -22,11 +22,12 @@ use sched_dag::journal::EventKind;
 use tool::options::{Command, Parsed, Takes, options};
 use tool::outcome::{self, Outcome};
 use tool::progress::{Progress, SILENCE};
-use tool::protocol::MachineLine;
 use tool::qemu::{MOST_CORES, Mode, Qemu};
-use tool::record::{COUNTED_TOLERANCE_NS, Run};
-use tool::trace::{check, read};
+use tool::trace::read;
 use tool::{image, install, probe, system};
+use views::findings::check;
+use views::protocol::MachineLine;
+use views::record::{COUNTED_TOLERANCE_NS, Run};
 
 /// The table of `soak`.
 static SOAK: Command = Command {

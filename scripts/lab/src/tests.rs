@@ -1,11 +1,9 @@
 //! Tables and records of tests: those that the tool's own tests use.
 
-#[path = "../../tool/src/record/tests/made.rs"]
-pub(crate) mod made;
 #[path = "../../tool/src/tests.rs"]
 mod tables;
 
-pub(crate) use tables::{altered, right, rows};
+pub(crate) use tables::{altered, made, right, rows};
 use text::Malformed;
 
 /// Makes sure that `parse` refuses a text once it is altered: in each row are a part, another in its

@@ -19,8 +19,8 @@ use std::time::{Duration, Instant};
 
 use end_signals::EndSignals;
 
-use crate::protocol::written;
 use crate::system;
+use views::protocol::written;
 
 /// The time between two looks at the process.
 const PAUSE: Duration = Duration::from_millis(10);

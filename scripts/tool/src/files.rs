@@ -122,17 +122,15 @@ pub(crate) fn why_full(path: &Path) -> Option<String> {
     let length = fs::metadata(path).ok()?.len();
     // Not by a trial: the system ends a program that goes beyond this limit.
     let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
-    let limit = limits
-        .lines()
-        .find_map(|line| line.strip_prefix("Max file size"));
+    let mut limits = limits.lines();
+    let limit = limits.find_map(|line| line.strip_prefix("Max file size"));
     let limit = limit.and_then(|line| line.split_whitespace().next()?.parse().ok());
     if limit.is_some_and(|limit: u64| length + MORE as u64 > limit) {
         return Some("a file may not be longer (`ulimit -f`)".into());
     }
     let mut file = OpenOptions::new().append(true).open(path).ok()?;
-    let written = file
-        .write_all(&[b'\n'; MORE])
-        .and_then(|()| file.sync_all());
+    let written = file.write_all(&[b'\n'; MORE]);
+    let written = written.and_then(|()| file.sync_all());
     // What was written for the trial goes again.
     let _ = file.set_len(length);
     written.err().map(|error| error.to_string())
@@ -365,7 +363,7 @@ mod tests {
         fs::hard_link(&file, &hard).unwrap();
         let dotted = folder.join("..").join(own).join("a");
         for other in [&file, &link, &hard, &dotted] {
-            let refused = check(&[named("dag", &file)], &[named("dot", other)]).unwrap_err();
+            let refused = check(&[named("dag", &file)], &[named("keep", other)]).unwrap_err();
             let ends = " are one file, which would be overwritten; name another";
             assert!(refused.starts_with("`--dag ") && refused.ends_with(ends));
         }
@@ -373,8 +371,8 @@ mod tests {
         assert!(twice.ends_with("/b` are one file; give it once"), "{twice}");
         // Neither is there yet.
         let (new, again) = (folder.join("new"), folder.join(".").join("new"));
-        assert!(check(&[], &[named("dot", &new), named("serial", &again)]).is_err());
-        assert_eq!(check(&[named("", &file)], &[named("dot", &new)]), Ok(()));
+        assert!(check(&[], &[named("keep", &new), named("serial", &again)]).is_err());
+        assert_eq!(check(&[named("", &file)], &[named("keep", &new)]), Ok(()));
         assert!(!new.exists(), "the trial is removed");
 
         for path in [file.join("x"), folder.join("none/x"), folder.clone()] {
@@ -398,10 +396,8 @@ mod tests {
         assert_eq!(read_text(&file).as_deref(), Ok("dag ä\n"));
         let ends = |why: &str| {
             let said = read_text(&file).unwrap_err();
-            assert!(
-                said.ends_with(&format!("{why}; name another file")),
-                "{said}"
-            );
+            let is_told = said.ends_with(&format!("{why}; name another file"));
+            assert!(is_told, "{said}");
         };
         fs::write(&file, b"one\ntwo \xff\n").unwrap();
         ends("/file:2: this is not UTF-8 text");
@@ -409,10 +405,8 @@ mod tests {
         long.set_len((64 << 20) + 1).unwrap();
         ends("/file: it is longer than 64 MiB");
         long.set_len(MOST_BYTES + 1).unwrap();
-        assert_eq!(
-            read(&file).unwrap_err(),
-            "cannot be read: it is longer than 1024 MiB"
-        );
+        let expected = "cannot be read: it is longer than 1024 MiB";
+        assert_eq!(read(&file).unwrap_err(), expected);
         fs::remove_dir_all(folder).unwrap();
     }
 }

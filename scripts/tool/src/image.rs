@@ -14,10 +14,11 @@ use text::quoted;
 
 use crate::elf;
 use crate::files;
-use crate::json::Value;
+use crate::install::WASM_TARGET;
 use crate::options::did_you_mean;
 use crate::progress::Lasting;
 use crate::system;
+use views::json::Value;
 
 /// The most bytes that a stripped image may have.
 pub const MOST_STRIPPED_BYTES: u64 = 864 << 10;
@@ -150,6 +151,9 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<PathBuf, String> 
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
+/// The profile of the page's engine, which alone is no program of this computer or an image.
+pub(crate) const PAGE_PROFILE: &str = "page";
+
 /// Flags beyond those of a profile, to make an image small: its addresses are constants, since the
 /// linker script fixes them; no loop is padded; a jump table pays from eight cases on.
 const FOR_IMAGES: [&str; 4] = [
@@ -172,6 +176,7 @@ pub fn build_target(
 ) -> Result<PathBuf, String> {
     let [kind, name] = target;
     let (verb, flags) = match kind {
+        _ if profile == PAGE_PROFILE => ("build", &["--target", WASM_TARGET][..]),
         // Only `cargo rustc` takes flags for the last crate alone.
         "--bin" => ("rustc", &FOR_IMAGES[..]),
         _ => ("build", &[][..]),
@@ -218,7 +223,7 @@ fn executable(message: &Value, package: &str) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::json;
+    use views::json;
 
     #[test]
     fn an_unknown_app_is_named_with_those_there_are() {

@@ -1,4 +1,5 @@
-//! Installing the programs that a command needs, by `apt-get`, and what tests need of PyPI, by `pip`.
+//! Installing the programs that a command needs, by `apt-get`, a target of Rust, by `rustup`, and what
+//! tests need of PyPI, by `pip`.
 //!
 //! A command that needs QEMU installs it if it is missing; one that needs GRUB, a firmware
 //! or Bochs does likewise. The tool downloads nothing itself. Without `apt-get` the person is told
@@ -19,7 +20,7 @@ pub struct Need {
     what: &'static str,
     /// The parts by which it is recognized: programs on the `PATH`, and files or folders.
     parts: &'static [&'static str],
-    /// Debian's packages that bring it, with blanks between.
+    /// Debian's packages that bring it, with blanks between; empty: a person installs it.
     packages: &'static str,
 }
 
@@ -73,6 +74,25 @@ pub static BOCHS: Need = Need {
     packages: "bochs bochs-sdl bochsbios vgabios",
 };
 
+/// The runtime in which tests run the page's engine without a browser.
+pub static NODE: Need = Need {
+    name: "Node.js",
+    what: "a runtime of JavaScript and WebAssembly",
+    parts: &["node"],
+    packages: "nodejs",
+};
+
+/// A browser, in which tests open the page. It is large, so it is not installed for them.
+pub static CHROMIUM: Need = Need {
+    name: "Chromium",
+    what: "a browser",
+    parts: &["chromium"],
+    packages: "",
+};
+
+/// Rust's target for the page's engine: WebAssembly with standard input and output.
+pub(crate) const WASM_TARGET: &str = "wasm32-wasip1";
+
 /// Packages of PyPI for tests: a router of Zenoh, and a reader of ROS 2's messages.
 const OF_PYPI: [&str; 2] = ["eclipse-zenoh==1.10.2", "rosbags==0.11.9"];
 
@@ -125,6 +145,25 @@ pub fn ensure(need: &Need) -> Result<(), String> {
             need.what
         )),
     }
+}
+
+/// Makes sure that Rust can compile for WebAssembly, and adds its target if it is missing.
+///
+/// # Errors
+///
+/// In words, with the remedy by hand.
+pub fn ensure_wasm() -> Result<(), String> {
+    let mut rustc = Command::new("rustc");
+    // In the workspace, since a toolchain is pinned there.
+    rustc.current_dir(system::workspace());
+    let folder = system::run(rustc.args(["--print=target-libdir", "--target", WASM_TARGET]))?;
+    if Path::new(folder.trim()).is_dir() {
+        return Ok(());
+    }
+    let what = "Rust's target for WebAssembly";
+    run(what, &format!("rustup target add {WASM_TARGET}")).map_err(|why| {
+        format!("{what} could not be added: {why}; add {WASM_TARGET} by hand and start again")
+    })
 }
 
 /// Returns a Python with the packages that tests need, in `target/python`, which it installs if they
@@ -181,6 +220,10 @@ fn plan(
         packages,
         ..
     } = need;
+    if packages.is_empty() {
+        let remedy = "install it by hand, if you want to use it";
+        return Err(format!("{name} is missing; {remedy}"));
+    }
     if !exists("apt-get") {
         return Err(format!(
             "{name} is missing, and `apt-get`, by which it would be installed, is not here; install \
@@ -204,7 +247,7 @@ fn run(name: &str, line: &str) -> Result<(), String> {
     eprintln!("{name} is missing; running: {line}");
     let mut words = line.split(' ');
     let mut command = Command::new(words.next().unwrap_or_default());
-    command.args(words);
+    command.args(words).current_dir(system::workspace());
     // Packages of Debian would ask questions, which nobody answers here.
     command.env("DEBIAN_FRONTEND", "noninteractive");
     // A program may read our standard output.

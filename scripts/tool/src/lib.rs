@@ -8,16 +8,16 @@
 //! The library serves the program (`main.rs`), the laboratory (`scripts/lab`), and the tests, its
 //! own and the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
-//! - [`json`], [`protocol`]: the guest's output, read strictly;
 //! - [`elf`], [`image`], [`medium`], [`places`]: images and media to boot;
 //! - [`child`], [`qemu`], [`outcome`]: the boot, and the judgement of its end;
 //! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
 //! - [`options`](mod@options): command lines by a table; [`files`]: the files they name; [`output`],
-//!   [`progress`]: printing without a panic, and progress of long work; [`svg`]: pictures;
+//!   [`progress`]: printing without a panic, and progress of long work;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`trace`]: the events of a run, checked against the model's rules;
 //! - [`recordings`]: the inputs of a run, and conversion to and from other formats;
-//! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
+//! - [`proof`]: the bounds of committed DAGs, and witnesses of these;
+//! - [`page`](mod@page): the page that plays and shows runs;
 //! - [`run`](mod@run) with its [`run_options`], [`new_app`](mod@new_app): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
@@ -33,28 +33,24 @@ pub mod output;
 pub mod child;
 pub mod dag_file;
 pub mod debian;
-pub mod dot;
 pub mod elf;
 pub mod files;
 pub mod image;
 pub mod install;
-pub mod json;
 pub mod medium;
 pub mod new_app;
 pub mod options;
 pub mod outcome;
+pub mod page;
 pub mod places;
 pub mod probe;
 pub mod program;
 pub mod progress;
 pub mod proof;
-pub mod protocol;
 pub mod qemu;
-pub mod record;
 pub mod recordings;
 pub mod run;
 pub mod run_options;
-pub mod svg;
 pub mod system;
 pub mod trace;
 pub mod wire_script;
@@ -78,6 +74,7 @@ pub static TOOL: Menu = Menu {
             new_app::new_app;
         "check-trace": "replay the traces of runs against the model's rules", trace::check_trace;
         "trace": "convert the traces of runs for Perfetto's viewer", trace::trace;
+        "page": "make a page that plays DAG files and shows runs in a browser", page::page;
         "recording": "show a recording, and convert it from and to other formats",
             recordings::recording;
     },
@@ -89,6 +86,3 @@ extern crate self as tool;
 
 #[cfg(test)]
 mod tests;
-
-#[cfg(test)]
-use record::tests::made;

@@ -154,9 +154,9 @@ pub fn check_words(words: &str) -> Result<(), String> {
     let changes = |c: char| matches!(c, '\'' | '"' | '\\') || !(c.is_ascii_graphic());
     for word in words.split_whitespace() {
         if let Some(c) = word.chars().find(|c| changes(*c)) {
+            let remedy = "give words of ASCII without quotes and backslashes";
             return Err(format!(
-                "`{word}`: GRUB would not hand on `{c}` as it is; give words of ASCII without \
-                 quotes and backslashes"
+                "`{word}`: GRUB would not hand on `{c}` as it is; {remedy}"
             ));
         }
     }

@@ -467,10 +467,8 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
         let long = "a".repeat(33);
         for name in ["", "../fork", "2nd", "brake-", "-a", "a--b", &long] {
             let said = check(workspace(), name).unwrap_err();
-            assert!(
-                said.ends_with(", 32 at most, as in `brake-assist`"),
-                "{said}"
-            );
+            let is_told = said.ends_with(", 32 at most, as in `brake-assist`");
+            assert!(is_told, "{said}");
         }
         assert_eq!(check(workspace(), "brake-assist-2"), Ok(()));
     }
@@ -515,9 +513,8 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
             }
             let is_there = ": it is there already; name a folder to be made";
             let packages = "boot-entry boot-link executive front linux random recording sched-dag";
-            let packages = packages
-                .split(' ')
-                .map(|name| (name, " has it; choose another"));
+            let packages = packages.split(' ');
+            let packages = packages.map(|name| (name, " has it; choose another"));
             let rows = [
                 ("brake", is_there),
                 ("Brake", ": give small letters, digits and"),

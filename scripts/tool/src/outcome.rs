@@ -14,10 +14,10 @@ use crate::child::Asked;
 use crate::files;
 use crate::medium::Medium;
 use crate::places;
-use crate::protocol::{MachineLine, Status, Transcript, Verdict};
 use crate::qemu::{Ending, Qemu};
-use crate::record::Record;
 use crate::system;
+use views::protocol::{MachineLine, Status, Transcript, Verdict};
+use views::record::Record;
 
 /// How many of the last serial lines are shown at a failure.
 const SHOWN_LINES: usize = 30;

@@ -153,31 +153,9 @@ impl Table {
     }
 }
 
-/// Formats a time in the largest unit that it reaches, with three decimals (none for ns).
-pub fn shown(ns: u64) -> String {
-    let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
-    match units.into_iter().find(|(unit, _)| ns >= *unit) {
-        None => format!("{ns} ns"),
-        // `unit / 1000` scales the rest to thousandths of the unit.
-        Some((unit, name)) => format!("{}.{:03} {name}", ns / unit, ns % unit / (unit / 1000)),
-    }
-}
-
-/// Formats a time as [`shown`] does, without trailing zeros.
-pub fn briefly(ns: u64) -> String {
-    let text = shown(ns);
-    match text.split_once(' ') {
-        Some((number, unit)) if number.contains('.') => {
-            let number = number.trim_end_matches('0').trim_end_matches('.');
-            format!("{number} {unit}")
-        }
-        _ => text,
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Table, briefly, shown};
+    use super::Table;
 
     #[test]
     fn cells_stand_below_their_headings_with_their_decimals() {
@@ -186,16 +164,5 @@ mod tests {
         table.line("a line");
         let expected = "a title\nname    load  sets\none      0.2     7\na line\n";
         assert_eq!(table.text(), expected);
-    }
-
-    #[test]
-    fn times_have_a_fitting_unit() {
-        let times = [999, 1_500, 2_000_000_000, 1_234_567_890];
-        assert_eq!(
-            times.map(shown),
-            ["999 ns", "1.500 us", "2.000 s", "1.234 s"]
-        );
-        assert_eq!(times.map(briefly), ["999 ns", "1.5 us", "2 s", "1.234 s"]);
-        assert_eq!(briefly(40), "40 ns");
     }
 }

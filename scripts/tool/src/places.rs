@@ -23,9 +23,9 @@ use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdout, Command, Stdio};
 use std::sync::Mutex;
 
-use crate::json::Value;
-use crate::protocol::{MachineLine, read_line};
 use crate::system;
+use views::json::Value;
+use views::protocol::{MachineLine, read_line};
 
 /// The kinds whose `place` may be an address.
 const KINDS: [&str; 3] = ["panic", "fault", BACKTRACE];

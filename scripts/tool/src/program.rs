@@ -14,9 +14,9 @@ use end_signals::EndSignals;
 
 use crate::child::{Asked, Child, Waited, bound_to_us};
 use crate::outcome::Outcome;
-use crate::protocol::{Status, Transcript};
 use crate::qemu::Ending;
 use crate::system;
+use views::protocol::{Status, Transcript};
 
 /// A program, and how it is run.
 #[derive(Clone, Copy, Debug)]

@@ -32,8 +32,8 @@ use boot::MOST_COMMAND_LINE_BYTES;
 
 use crate::child::{Asked, Child, Waited};
 use crate::files::Temporary;
-use crate::protocol::Status;
 use crate::system;
+use views::protocol::Status;
 
 /// The name under which QEMU is looked for.
 pub const PROGRAM: &str = "qemu-system-x86_64";

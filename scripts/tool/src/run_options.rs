@@ -112,6 +112,8 @@ options! {
     KEEP in "files": Takes::File("FILE");
     /// As --keep, without values; for check-trace.
     TRACE: Takes::File("FILE");
+    /// Serve a page that shows the run while it goes on.
+    PAGE: Takes::Nothing;
     /// Jobs of a DAG to keep for a crash; 16.
     LATEST: Takes::Number(0, 64);
     /// Take the sources' values from it, compare others.
@@ -120,8 +122,6 @@ options! {
     FROM: Takes::Text("DAG/JOB");
     /// The serial log.
     SERIAL: Takes::File("FILE");
-    /// The committed DAGs, for `dot -Tsvg FILE`.
-    DOT: Takes::File("FILE");
     /// Measure, commit, and compare; docs/proving.md.
     PROVE in "bounds": Takes::Nothing;
     /// --prove: per cent more; 20.

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use crate::json::{self, Value};
+use views::json::{self, Value};
 
 /// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool was
 /// built, which is wrong once the workspace has been moved.

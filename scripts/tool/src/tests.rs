@@ -1,29 +1,20 @@
-//! Tables of tests: each row is a line, with ` | ` between its cells.
-//!
-//! In a cell `\n` stands for the end of a line, and `\?` for a character that must not be shown.
+//! Command lines of tests, and what they share with those of the views.
 
 use std::ffi::OsString;
 
 use tool::options::{Command, Parsed};
 
+#[path = "../../views/src/tests.rs"]
+mod cells;
+
+#[path = "../../views/src/record/tests/made.rs"]
+#[allow(dead_code, reason = "each program uses a part of this")]
+pub(crate) mod made;
+
+pub(crate) use cells::{altered, rows};
+
 /// Parses a command line that a table must accept.
 pub(crate) fn right(table: &Command, line: &str) -> Parsed {
     let words: Vec<_> = line.split_whitespace().map(OsString::from).collect();
     table.parse(&words).expect(line)
-}
-
-/// Returns the rows of a table, each of so many cells; those that a row leaves out are empty.
-pub(crate) fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [String; N]> {
-    table.lines().filter(|row| !row.is_empty()).map(|row| {
-        let told = |cell: &str| cell.replace(r"\n", "\n").replace(r"\?", "\u{202e}");
-        let mut cells: Vec<String> = row.split(" | ").map(told).collect();
-        cells.resize(cells.len().max(N), String::new());
-        cells.try_into().expect(row)
-    })
-}
-
-/// Returns a text in which something else stands in place of a part.
-pub(crate) fn altered(text: &str, [from, to]: [&str; 2]) -> String {
-    assert!(text.contains(from), "{from}");
-    text.replacen(from, to, 1)
 }

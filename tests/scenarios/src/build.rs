@@ -396,9 +396,8 @@ impl Scenario {
             }
         }
         devices.into_iter().for_each(connect);
-        let all: Vec<Dag> = (self.dags.iter())
-            .map(|text| dags[&text.name].clone())
-            .collect();
+        let all = (self.dags.iter()).map(|text| dags[&text.name].clone());
+        let all: Vec<Dag> = all.collect();
         finish_create_dags_with(&all, ConstructionPolicy::any_graph())
     }
 }

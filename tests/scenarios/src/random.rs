@@ -112,9 +112,8 @@ impl Scenario {
 /// Draws two modes: one with all DAGs of a cluster but the first two, and one with some of them.
 fn modes(dags: u64, is_divided: bool, random: &mut Random) -> Vec<(String, Vec<String>)> {
     let all = (2..dags).filter(|number| !is_divided || number % 2 == 0);
-    let some = all
-        .clone()
-        .filter(|number| *number == 2 || random.once_in(2));
+    let some = all.clone();
+    let some = some.filter(|number| *number == 2 || random.once_in(2));
     let some = some.map(name_of).collect();
     vec![
         ("all".into(), all.map(name_of).collect()),
@@ -145,9 +144,8 @@ impl Round {
             };
             let first = place.saturating_sub(reach);
             let before = (0..inputs).filter(|_| place > 0);
-            let mut before: Vec<usize> = before
-                .map(|_| first + random.index(place - first))
-                .collect();
+            let before = before.map(|_| first + random.index(place - first));
+            let mut before: Vec<usize> = before.collect();
             before.sort_unstable();
             before.dedup();
             let start_ns = before.iter().map(|before| ends_ns[*before]).max();

@@ -6,8 +6,8 @@
 use harness::{Guest, Members, Said, lawful_runs};
 use tool::Outcome;
 use tool::places;
-use tool::protocol::{MachineLine, Status};
-use tool::record::COUNTED_TOLERANCE_NS;
+use views::protocol::{MachineLine, Status};
+use views::record::COUNTED_TOLERANCE_NS;
 
 /// Boots one attack, or those that can be one after the other, on so many cores.
 fn attacks(word: &str, cores: u64) -> Guest {

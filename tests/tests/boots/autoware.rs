@@ -4,7 +4,7 @@ use harness::{Guest, Members, Said};
 use sched_dag::chains::Chain;
 use sched_dag::law::Distribution;
 use tool::Outcome;
-use tool::protocol::MachineLine;
+use views::protocol::MachineLine;
 
 #[test]
 fn the_hot_path_keeps_its_bounds_and_the_trace_tells_the_ages_that_its_values_tell() {
@@ -27,7 +27,6 @@ fn the_hot_path_keeps_its_bounds_and_the_trace_tells_the_ages_that_its_values_te
 fn tells_its_ages(outcome: &Outcome, line: &MachineLine) {
     let mut runs = tool::trace::read(&outcome.serial).expect("a trace");
     let run = runs.remove(0);
-    // `dot` draws an arrow for each.
     assert_eq!(run.samplings.len(), 10);
     let place = |name| Chain::find(&run.task_set, name).expect(name);
     let ends = (

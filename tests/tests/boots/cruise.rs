@@ -6,8 +6,8 @@ use cruise::{Releases, build};
 use fass::finish_create_dags;
 use fass::shared::{Wire, WireCounts};
 use harness::Guest;
-use tool::protocol::Status;
 use tool::{Machine, Outcome, wire_script};
+use views::protocol::Status;
 use virtual_time::{Silent, VirtualTime};
 
 /// The jobs of each run.

@@ -1,8 +1,8 @@
 //! Devices of PCI, whose messages come to a core.
 
 use harness::{Guest, Members, Said};
-use tool::protocol::Status;
 use tool::qemu::Machine;
+use views::protocol::Status;
 
 #[test]
 fn each_message_of_a_device_takes_one_interrupt_on_its_core() {
@@ -39,10 +39,8 @@ fn a_message_ends_a_wait_on_whichever_core_it_comes() {
     let guest = Guest::test("devices_answer").machine(Machine::Q35).cores(2);
     let outcome = guest.altered(&[], "-device edu").succeed();
     let answered = outcome.lines("answered");
-    let answered: Vec<u64> = answered
-        .iter()
-        .map(|line| line.number("answered"))
-        .collect();
+    let answered = answered.iter().map(|line| line.number("answered"));
+    let answered: Vec<u64> = answered.collect();
     assert_eq!(answered, [20, 20]);
 }
 

@@ -2,7 +2,7 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::EventKind;
-use tool::record::COUNTED_TOLERANCE_NS;
+use views::record::COUNTED_TOLERANCE_NS;
 
 /// Describes the drone on two cores.
 fn drone(words: &str) -> Guest {

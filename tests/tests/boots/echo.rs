@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use harness::{Guest, Members, Said};
 use tool::image;
-use tool::protocol::Transcript;
+use views::protocol::Transcript;
 
 /// Several packets at once and more than a job takes, the last as long as can be; half of the lines
 /// name their wire.
@@ -27,10 +27,8 @@ fn the_packets_of_a_script_go_back_as_the_same_bytes_in_every_run_on_any_cores()
         let guest = Guest::new("echo").word(&words).cores(cores);
         let (outcome, sent) = guest.input(&script).succeed_sending();
         let sent = String::from_utf8_lossy(&sent);
-        let differs = sent
-            .lines()
-            .zip(wanted.lines())
-            .position(|(sent, line)| sent != line);
+        let mut lines = sent.lines().zip(wanted.lines());
+        let differs = lines.position(|(sent, line)| sent != line);
         let lengths = (sent.len(), wanted.len());
         assert!(
             sent == wanted,

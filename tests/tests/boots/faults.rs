@@ -1,7 +1,7 @@
 //! Faults cost nothing that lasts, and what a run leaves behind has a name.
 
 use harness::{Guest, Members, Said};
-use tool::protocol::Status;
+use views::protocol::Status;
 
 /// One DAG survives a thousand faults, next to one that must not notice.
 #[test]

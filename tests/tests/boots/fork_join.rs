@@ -4,7 +4,7 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use tool::Outcome;
-use tool::record::COUNTED_TOLERANCE_NS;
+use views::record::COUNTED_TOLERANCE_NS;
 
 fn demo(cores: u64, words: &str) -> Guest {
     Guest::new("fork-join").cores(cores).word(words)

@@ -1,7 +1,7 @@
 //! The image boots from an ISO in Bochs, which is stricter about a PC's hardware than QEMU.
 
 use harness::{Members, Said, bochs};
-use tool::protocol::MachineLine;
+use views::protocol::MachineLine;
 
 const SKYLAKE: &str = "corei7_skylake_x";
 

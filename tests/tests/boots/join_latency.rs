@@ -6,7 +6,7 @@ use std::thread;
 use fork_join::ExecutionTimes;
 use harness::workload;
 use harness::{Guest, Members, Said};
-use tool::protocol::{MachineLine, Status};
+use views::protocol::{MachineLine, Status};
 
 const JOBS: u64 = 150;
 

@@ -5,7 +5,7 @@
 use harness::markdown::page;
 use harness::{Guest, Members, Said};
 use tool::Mode;
-use tool::protocol::Status;
+use views::protocol::Status;
 
 #[test]
 fn a_panic_in_the_kernel_ends_in_failure_and_names_its_place() {

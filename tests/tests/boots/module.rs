@@ -2,8 +2,8 @@
 
 use harness::file::File;
 use harness::{Guest, Members, Said};
-use tool::protocol::Status;
 use tool::{Machine, Outcome};
+use views::protocol::Status;
 
 const MIB: usize = 1 << 20;
 

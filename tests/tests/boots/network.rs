@@ -14,8 +14,8 @@ use harness::{Guest, Members, Said};
 use mutation::{datagram, mutated, ping, vectors, wanted};
 use random::Random;
 use tool::Outcome;
-use tool::protocol::Status;
 use tool::qemu::Machine;
+use views::protocol::Status;
 
 const VIRTIO: &str = "virtio-net-pci,romfile=";
 const E1000E: &str = "e1000e,romfile=";
@@ -66,9 +66,8 @@ fn exchange(socket: &UdpSocket) {
     ask(socket, &[b"hello"], |answer| answer == b"hello");
     for number in 0..200_usize {
         let length = 1 + number * (MOST - 1) / 199;
-        let packet: Vec<u8> = (0..length)
-            .map(|at| (at * 7 + number).to_le_bytes()[0])
-            .collect();
+        let packet = (0..length).map(|at| (at * 7 + number).to_le_bytes()[0]);
+        let packet: Vec<u8> = packet.collect();
         ask(socket, &[&packet], |answer| answer == packet);
     }
 }

@@ -4,9 +4,9 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::{Event, EventKind};
-use tool::protocol::{MachineLine, Status};
-use tool::record::Run;
 use tool::{Mode, Outcome};
+use views::protocol::{MachineLine, Status};
+use views::record::Run;
 
 /// For how long a core waits for others' turns, and for what the kernel executes meanwhile
 /// (`docs/decisions/0008-deterministic-by-default.md`).

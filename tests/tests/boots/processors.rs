@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use harness::file::File;
 use harness::{Guest, Members, Said};
-use tool::protocol::{MachineLine, Status, Transcript};
 use tool::qemu::Ending;
 use tool::{Machine, Mode, Outcome};
+use views::protocol::{MachineLine, Status, Transcript};
 
 /// Describes the demo, short.
 fn demo(cores: u64) -> Guest {

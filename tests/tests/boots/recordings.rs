@@ -6,8 +6,8 @@ use std::fs;
 use harness::file::File;
 use harness::{Guest, Members, Said, lawful_runs};
 use recording::{Entry, EntryKind, Recordable, Recording};
-use tool::protocol::Status;
 use tool::{Machine, Outcome, recordings};
+use views::protocol::Status;
 
 /// Returns what the guest has sent to a file.
 fn bytes(file: &File) -> Vec<u8> {
@@ -49,9 +49,8 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     let bytes = bytes(&file);
     let recording = Recording::read(&bytes).expect("it is whole");
     assert_eq!(recording.header().app, "guest-tests");
-    let inputs = recording
-        .values::<u64>("counts", "input")
-        .expect("there are");
+    let inputs = recording.values::<u64>("counts", "input");
+    let inputs = inputs.expect("there are");
     assert!(inputs.eq((0..50).map(|job| (job, job + 1))));
     // Times are from the kernel's entry on, and not from the first release.
     for entry in recording.entries() {
@@ -96,9 +95,8 @@ fn what_does_not_fit_is_named_job_by_job() {
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(!recording.is_cut() && recording.lost() > 0);
     let of = |wanted: EntryKind| {
-        let entries = recording
-            .entries()
-            .filter(move |entry| entry.what == wanted);
+        let entries = recording.entries();
+        let entries = entries.filter(move |entry| entry.what == wanted);
         let places = entries.map(|entry: Entry<'_>| (entry.place, entry.job));
         places.collect::<BTreeSet<(u16, u64)>>()
     };
@@ -131,7 +129,7 @@ fn a_recording_that_does_not_fit_is_refused() {
 #[test]
 fn without_a_debug_port_the_record_goes_to_the_console() {
     let outcome = guest("keep=256").cores(2).succeed();
-    let bytes = tool::record::bytes_of_log(&outcome.serial).expect("whole lines");
+    let bytes = views::record::bytes_of_log(&outcome.serial).expect("whole lines");
     let recording = Recording::read(&bytes).expect("it is whole");
     assert_eq!((recording.lost(), recording.is_cut()), (0, false));
     assert!(recording.count() > 100, "{}", recording.count());

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use harness::{Guest, lawful_runs};
 use scenarios::Scenario;
 use tool::image;
-use tool::protocol::Transcript;
-use tool::record::COUNTED_TOLERANCE_NS;
+use views::protocol::Transcript;
+use views::record::COUNTED_TOLERANCE_NS;
 
 /// Runs those for 1 to 5 cores, which are all.
 fn run(mut run: impl FnMut(u64) -> Transcript) {

@@ -3,9 +3,11 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use recording::Counted;
+use sched_dag::{DagId, SubtaskId};
 use tool::Outcome;
-use tool::json::Value;
-use tool::protocol::MachineLine;
+use views::json::Value;
+use views::notes;
+use views::protocol::MachineLine;
 
 /// The answer to a command.
 const SAID: &str = "console\",\"command\"";
@@ -157,14 +159,11 @@ fn each_commit_is_in_the_record() {
         ("u64", 0, &[1, 2][..])
     );
 
-    let dot = tool::dot::text(&record).expect("a commit");
-    for part in [
-        "c0_d0_s0 -> c0_d0_s2 [label=\"job: u64\"];",
-        "label=\"parallel-0\\nWCET 50 ms\\npriority 1\"",
-    ] {
-        assert!(dot.contains(part), "{dot}");
-    }
-    assert_eq!(dot.matches("subgraph").count(), 2);
+    let notes = notes::of_dag(first, DagId(0));
+    let topic = "topic `job`: u64 of source, read by parallel-0, parallel-1";
+    assert!(notes.iter().any(|note| note == topic), "{notes:?}");
+    let of_parallel = notes::of_subtask(first, DagId(0), SubtaskId(1));
+    assert_eq!(of_parallel, ["priority 1"]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::EventKind;
-use tool::record::{COUNTED_TOLERANCE_NS, Run};
+use views::record::{COUNTED_TOLERANCE_NS, Run};
 
 /// Returns what the only subtask does, a line for each job, with times in milliseconds: a core is
 /// free at the same tenth at which a wait begins, and an instance goes on at that at which it ends.

@@ -6,8 +6,7 @@ use std::time::Duration;
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 use recording::Commit;
-use tool::record::{Committed, Record};
-use tool::trace;
+use views::record::{Committed, Record};
 use virtual_time::VirtualTime;
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -93,7 +92,7 @@ fn a_divided_set_is_recorded_replayed_and_judged() {
         let bounds = told.dags.iter().map(|dag| dag.bound_ns);
         let expected = DAGS.map(|(_, _, ms)| Some(ms * 1_000_000));
         assert_eq!(bounds.collect::<Vec<_>>(), expected);
-        assert_eq!(trace::check(&recorded.runs[0], 0).breaches, []);
+        assert_eq!(views::findings::check(&recorded.runs[0], 0).breaches, []);
 
         let machine = machine().replay(&bytes).expect("whole");
         let (_, replayed) = record(&machine, &build(7, demands_proof));
@@ -109,6 +108,6 @@ fn a_divided_set_is_recorded_replayed_and_judged() {
         assert!(other.check_bounds().is_err());
         let mut run = recorded.runs[0].clone();
         run.task_set = other.task_set;
-        assert_ne!(trace::check(&run, 0).breaches, []);
+        assert_ne!(views::findings::check(&run, 0).breaches, []);
     }
 }

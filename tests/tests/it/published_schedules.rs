@@ -8,8 +8,8 @@ use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::{Occupation, Policy, Preemption};
 use fass_dag_file::{Execution, Length, Set};
 use tool::dag_file::stg;
-use tool::json::{self, Value};
 use tool::system::workspace;
+use views::json::{self, Value};
 use virtual_time::VirtualTime;
 
 /// A length of a unit that leaves no rest.

@@ -13,11 +13,11 @@ use std::process::{self, ExitCode, Stdio};
 
 use sched_dag::law::Distribution;
 
-use tool::json::{Object, Value};
 use tool::options::{Command, Parsed, Refusal};
 use tool::outcome::Outcome;
-use tool::protocol::Transcript;
 use tool::system;
+use views::json::{Object, Value};
+use views::protocol::Transcript;
 
 /// Runs a measurement: `plan` turns the options into a plan, and `measure` returns whether all
 /// limits hold.

@@ -12,10 +12,10 @@ use std::process::ExitCode;
 
 use super::code::{self, Frames};
 use super::frame::by_plan;
-use tool::json::Object;
 use tool::options::{Command, Parsed, Takes, options};
 use tool::progress::Lasting;
 use tool::{elf, files, image};
+use views::json::Object;
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench sizes",

@@ -38,10 +38,10 @@ use super::{Parse, equal, read};
 use tool::options::{Command, Parsed, Refusal, Takes, options};
 use tool::outcome::{Outcome, boot};
 use tool::progress::Progress;
-use tool::protocol::MachineLine;
 use tool::qemu::{MOST_CORES, Machine, Mode, Qemu};
-use tool::record::Run;
 use tool::{files, image, install, probe, system, trace};
+use views::protocol::MachineLine;
+use views::record::Run;
 
 static IN_KERNEL: Command = Command {
     invocation: "./scripts/oracle schedules --in-kernel",
@@ -260,9 +260,8 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
     let mut progress = Progress::new(cases.len() as u64, "cases");
     while let Some(first) = waiting.first() {
         let words = machine_words(first);
-        let same = waiting
-            .iter()
-            .take_while(|case| machine_words(case) == words);
+        let same = waiting.iter();
+        let same = same.take_while(|case| machine_words(case) == words);
         let mut sets = same.map(|case| case.set_at(settings.scale())).peekable();
         let found = match sets.next_if(Result::is_err) {
             // A case that the guest refuses would end the whole boot.
@@ -407,8 +406,8 @@ mod tests {
     use crate::oracle::schedules::{Deviation, parse};
     use crate::tests::made::{self, line_of, record_of};
     use crate::tests::{altered, rows};
-    use tool::protocol::Status;
     use tool::qemu::Ending;
+    use views::protocol::Status;
 
     const CASE: &str = "case small 1 0 1 1
 dag 4 9 0 1 1 0

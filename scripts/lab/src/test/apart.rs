@@ -11,12 +11,17 @@ use tool::image::package_name;
 use super::{SourceFile, none_of};
 
 /// Folders, and those that no package in them stands on.
-const NEVER: [(&[&str], &[&str]); 2] = [
+const NEVER: [(&[&str], &[&str]); 4] = [
     (
         &["sched-dag", "fass", "kernel", "boot", "apps"],
         &["apps", "scripts"],
     ),
-    (&["scripts/tool"], &["scripts/lab", "apps", "kernel"]),
+    (
+        &["scripts/tool"],
+        &["scripts/lab", "scripts/web", "apps", "kernel"],
+    ),
+    (&["scripts/views"], &["scripts", "apps", "kernel"]),
+    (&["scripts/web"], &["scripts/lab", "scripts/tool"]),
 ];
 
 /// The apps of the laboratory, which may stand on all.
@@ -120,15 +125,19 @@ mod tests {
             "kernel: text, dev text",
             "apps/drone: kernel",
             "apps/lab/hand-off: drone, kernel",
-            "scripts/tool: text",
+            "scripts/views: text",
+            "scripts/tool: text, views",
+            "scripts/web: views, drone",
             "scripts/lab: tool, hand-off",
         ];
         assert_eq!(check(&manifests(&right)), Ok(()));
         for (at, row, found) in [
             (1, "kernel: dev drone", "kernel on apps/drone"),
             (2, "apps/drone: hand-off", "apps/drone on apps/lab/hand-off"),
-            (4, "scripts/tool: dev lab", "scripts/tool on scripts/lab"),
-            (4, "scripts/tool: drone", "scripts/tool on kernel"),
+            (4, "scripts/views: drone", "scripts/views on apps/drone"),
+            (5, "scripts/tool: dev lab", "scripts/tool on scripts/lab"),
+            (5, "scripts/tool: drone", "scripts/tool on kernel"),
+            (6, "scripts/web: tool", "scripts/web on scripts/tool"),
         ] {
             let mut rows = right;
             rows[at] = row;

@@ -210,9 +210,8 @@ mod tests {
 
     #[test]
     fn code_is_told_from_tests_comments_and_blanks() {
-        let source = SOURCE
-            .replace('@', "#[cfg(test)]")
-            .replace("\n        ", "\n");
+        let source = SOURCE.replace('@', "#[cfg(test)]");
+        let source = source.replace("\n        ", "\n");
         let script = "#!/bin/sh\n# Says\n\necho \\\n    // # hello\n";
         for (name, text, counts) in [
             ("a/src/lib.rs", &*source, [7, 10]),

@@ -198,9 +198,8 @@ fn lacks_essay(name: &str, text: &str) -> Option<String> {
 fn names_policy(name: &str, text: &str) -> Option<String> {
     let room = name.strip_prefix("sched-dag/src/")?;
     let code = layers::code(text);
-    let mut names = Policy::ALL
-        .iter()
-        .map(|policy| format!("Policy::{policy:?}"));
+    let names = Policy::ALL.iter();
+    let mut names = names.map(|policy| format!("Policy::{policy:?}"));
     let named = names.find(|named| code.contains(named))?;
     let is_free = room.starts_with("policies/") || room.ends_with("tests.rs");
     (!is_free).then(|| format!("names {named}; ask the table what that policy is like"))

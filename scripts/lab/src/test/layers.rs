@@ -107,9 +107,8 @@ pub(super) fn code(text: &str) -> String {
 fn names(codes: &BTreeMap<PathBuf, String>) -> Names {
     let named = |(module, code): (&PathBuf, &String)| {
         let paths = paths(code).into_iter();
-        let mut named: BTreeSet<PathBuf> = paths
-            .filter_map(|path| target(module, &path, codes))
-            .collect();
+        let named = paths.filter_map(|path| target(module, &path, codes));
+        let mut named: BTreeSet<PathBuf> = named.collect();
         named.remove(module);
         (module.clone(), named)
     };
@@ -253,9 +252,8 @@ fn upward(row: &LayerRow, names: &Names) -> impl Iterator<Item = String> {
 
 /// Returns the circles of files that name each other, each in order of their names.
 fn circles(names: &Names) -> BTreeSet<Vec<&PathBuf>> {
-    let reached = names
-        .keys()
-        .map(|module| (module, reached_from(module, names)));
+    let reached = names.keys();
+    let reached = reached.map(|module| (module, reached_from(module, names)));
     let reached: BTreeMap<_, _> = reached.collect();
     let circle = |module| -> Vec<&PathBuf> {
         let others = reached[module].iter().copied();

@@ -26,8 +26,21 @@ const NEEDS: [(&str, &[&Need]); 4] = [
     ("in_bochs::", &[&install::GRUB, &install::BOCHS]),
 ];
 
-/// The module of boot tests with a router of Zenoh, which is a program in Python.
-const WITH_ROUTER: &str = "with_router::";
+/// The modules of tests on the host that run the page's engine, with their programs.
+const OF_PAGE: [(&str, &Need); 2] = [
+    ("in_node::", &install::NODE),
+    ("in_chromium::", &install::CHROMIUM),
+];
+
+/// Makes sure that something is there.
+type Ensure = fn() -> Result<(), String>;
+
+/// The modules of boot tests that need more than programs: a router of Zenoh in Python, and the page's
+/// engine.
+const BY_MORE: [(&str, Ensure); 2] = [
+    ("with_router::", || install::python().map(drop)),
+    ("live_page::", install::ensure_wasm),
+];
 
 /// Compiles the tests of all packages, and lists the wanted ones that boot guests. Cargo's errors
 /// go to standard error.
@@ -55,7 +68,11 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
             }
             tally
         });
-        let host = programs("--no-fail-fast", "host", plan);
+        let mut host = programs("--no-fail-fast", "host", plan);
+        for (module, need) in OF_PAGE.into_iter().filter(|(module, _)| plan.wants(module)) {
+            let there = install::ensure(need).and_then(|()| install::ensure_wasm());
+            leave_out(module, there, &mut host, tally);
+        }
         run(plan, "tests on the host", host, tally);
         // Doctests need cargo to compile each, which is not quick.
         if !plan.quick {
@@ -109,18 +126,23 @@ fn boot(plan: &TestPlan, tests: &[String], tally: &mut Tally) -> Option<Command>
         // What they need is installed before, by one package manager at a time.
         let is_wanted = tests.iter().any(|test| test.starts_with(module));
         let mut needs = needs.iter().filter(|_| is_wanted);
-        if let Err(why) = needs.try_for_each(|need| install::ensure(need)) {
-            tally.skip(module, &why);
-            command.args(["--skip", module]);
+        let there = needs.try_for_each(|need| install::ensure(need));
+        leave_out(module, there, &mut command, tally);
+    }
+    for (module, ensure) in BY_MORE {
+        if tests.iter().any(|test| test.starts_with(module)) {
+            leave_out(module, ensure(), &mut command, tally);
         }
     }
-    if tests.iter().any(|test| test.starts_with(WITH_ROUTER))
-        && let Err(why) = install::python()
-    {
-        tally.skip(WITH_ROUTER, &why);
-        command.args(["--skip", WITH_ROUTER]);
-    }
     Some(command)
+}
+
+/// Leaves out a module of tests that lacks something, and counts it.
+fn leave_out(module: &str, there: Result<(), String>, command: &mut Command, tally: &mut Tally) {
+    if let Err(why) = there {
+        tally.skip(module, &why);
+        command.args(["--skip", module]);
+    }
 }
 
 /// Runs one command, and counts the results in its output.

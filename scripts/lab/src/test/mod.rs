@@ -375,9 +375,8 @@ mod tests {
 
         let packages = packages(&sources());
         let some = "sched-dag fass kernel boot-link tool lab harness fork-join";
-        let missing = some
-            .split(' ')
-            .find(|name| !packages.iter().any(|own| own == name));
+        let mut names = some.split(' ');
+        let missing = names.find(|name| !packages.iter().any(|own| own == name));
         assert_eq!(missing, None, "{packages:?}");
         let template = include_str!("../../../tool/template/manifest.toml");
         assert!(!super::takes_lints(template));

@@ -48,17 +48,11 @@ pub(super) fn check(sources: &[SourceFile]) -> Result<(), String> {
             if !(is_page || name.ends_with(".rs") && comment.starts_with("//")) {
                 continue;
             }
-            let words = line
-                .split('`')
-                .skip(1)
-                .step_by(2)
-                .map(|word| word.trim_start_matches("./"));
+            let words = line.split('`').skip(1).step_by(2);
+            let words = words.map(|word| word.trim_start_matches("./"));
             let named = words.filter(|word| is_path(word, &top)).map(PathBuf::from);
-            let links = line
-                .split("](")
-                .skip(1)
-                .filter(|_| is_page)
-                .filter_map(link);
+            let links = line.split("](").skip(1).filter(|_| is_page);
+            let links = links.filter_map(link);
             let links = links.map(|link| plain(&folder.join(link)));
             let lost = named
                 .chain(links)

@@ -60,9 +60,8 @@ pub(super) fn asks(name: &str, text: &str) -> Option<String> {
 /// In words: which names, and where.
 pub(super) fn check_names(sources: &[SourceFile]) -> Result<(), String> {
     let manifests = sources.iter().map(|it| it.name.as_str());
-    let crates: Vec<&str> = manifests
-        .filter_map(|name| name.strip_suffix("Cargo.toml"))
-        .collect();
+    let crates = manifests.filter_map(|name| name.strip_suffix("Cargo.toml"));
+    let crates: Vec<&str> = crates.collect();
     let mut places = BTreeMap::<(&str, &str), Vec<&str>>::new();
     let mut faults = Vec::new();
     for SourceFile { name, text } in sources {
@@ -76,17 +75,17 @@ pub(super) fn check_names(sources: &[SourceFile]) -> Result<(), String> {
         for type_name in text.lines().filter_map(type_name) {
             places.entry((*own, type_name)).or_default().push(name);
             if PRONOUNS.contains(&type_name) {
-                faults.push(format!(
-                    "{name} has a type `{type_name}`; name it by a noun"
-                ));
+                let remedy = "name it by a noun";
+                faults.push(format!("{name} has a type `{type_name}`; {remedy}"));
             }
         }
     }
     for ((_, type_name), places) in places {
         if places.len() > 1 {
             let places = places.join(", ");
+            let remedy = "rename all but one";
             faults.push(format!(
-                "`{type_name}` is a type in each of {places}; rename all but one"
+                "`{type_name}` is a type in each of {places}; {remedy}"
             ));
         }
     }

@@ -1,12 +1,7 @@
 //! The scheduler against reference schedules, and the refusal of broken files.
 
-use dag_file::{Settings, build};
-use fass::Occupation;
-use fass::commit::{ConstructionPolicy, finish_create_dags_with};
-use fass_dag_file::{DagFile, Execution, Length};
-use lab::oracle::schedules::{Case, Deviation, Scale, check, compare, compare_turns, parse};
+use lab::oracle::schedules::{check, parse};
 use lab::oracle::waiting::{self, WaitingCase};
-use virtual_time::VirtualTime;
 
 use crate::tests::{altered, assert_malformed, rows};
 
@@ -29,73 +24,22 @@ j 0 1 4 10 6 1
 end
 ";
 
+/// The page's tests play the same by DAG files; `in_kernel` tells how far a time may be off.
 #[test]
 fn all_public_schedules_agree() {
-    for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
-        let cases = parse(text).expect("the file is well formed");
-        assert_eq!(cases.len(), count);
-        assert_cases_agree(&cases);
-    }
-}
-
-#[test]
-fn all_public_schedules_with_waits_agree() {
-    let blocks = waiting::parse(WITH_WAITS).expect("the file is well formed");
-    let schedules = blocks.into_iter().filter_map(|block| match block {
+    let schedule = |case| match case {
         WaitingCase::Schedule(case) => Some(*case),
         WaitingCase::Bounds(_) => None,
-    });
-    let cases: Vec<Case> = schedules.collect();
-    assert_eq!(cases.len(), 40);
-    assert_cases_agree(&cases);
-}
-
-fn assert_cases_agree(cases: &[Case]) {
-    for case in cases {
-        assert_eq!(check(case), Ok(()), "{}", case.name);
-        assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
+    };
+    let waiting = waiting::parse(WITH_WAITS);
+    let waiting = waiting.map(|blocks| blocks.into_iter().filter_map(schedule).collect());
+    for (cases, count) in [(parse(PUBLIC), 40), (parse(CLUSTERS), 30), (waiting, 40)] {
+        let cases = cases.expect("the file is well formed");
+        assert_eq!(cases.len(), count);
+        for case in cases {
+            assert_eq!(check(&case), Ok(()), "{}", case.name);
+        }
     }
-}
-
-/// Compares a case with a run, in virtual time, of the DAGs that the app `dag-file` builds from the
-/// file that the case becomes, with units of 1000 ns and this guard.
-fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, String> {
-    let machine = VirtualTime::new()
-        .cores(case.cores)
-        .clusters(case.clusters.sizes())
-        .policy(case.policy)
-        .preemption(case.preemption);
-    let scale = Scale {
-        unit_ns: 1000,
-        guard_ns,
-    };
-    let sets = vec![case.set_at(scale).expect("short times")];
-    let file = fass_dag_file::parse(&DagFile { sets }.to_string()).expect("it is well formed");
-    let settings = Settings {
-        execution: Execution::Sequence,
-        seed: 0,
-        occupation: Occupation::Hold,
-        length: Length::Jobs(0),
-        grid_ns: 1000,
-    };
-    let dags = build(&file.sets[0], &settings);
-    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
-    compare_turns(case, report.events.iter().copied(), 1000, tolerance_ns)?;
-    compare(case, report.task_set(), report.record(), 1000, tolerance_ns)
-}
-
-#[test]
-fn what_is_near_passes_and_by_how_much_is_told() {
-    let case = parse(SMALL).expect("well formed").remove(0);
-    let deviation = Deviation {
-        earliest_ns: -10,
-        latest_ns: 0,
-    };
-    assert_eq!(built(&case, 10, 10), Ok(deviation));
-    let far = "dag 0 job 0 subtask 0: finish: expected 1, found 0.990";
-    assert_eq!(built(&case, 10, 9), Err(far.to_owned()));
 }
 
 /// A part of the small case, its replacement, and the difference that it makes.

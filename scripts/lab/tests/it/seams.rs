@@ -51,10 +51,8 @@ fn each_kind_of_change_that_contributing_shows_applies_and_works() {
         let diff = fs::read_to_string(&path).expect("a text");
         let lines = diff.lines().filter(|line| line.starts_with('+'));
         let tests = lines.filter_map(|line| line.split_once("fn ")?.1.strip_suffix("() {"));
-        let tests: Vec<String> = tests
-            .filter(|test| test.starts_with(SHOWN))
-            .map(String::from)
-            .collect();
+        let tests = tests.filter(|test| test.starts_with(SHOWN));
+        let tests: Vec<String> = tests.map(String::from).collect();
         assert!(
             !tests.is_empty(),
             "{name} has no test called {SHOWN}..; add one"

@@ -22,7 +22,9 @@ pub mod yaml;
 use std::path::{Path, PathBuf};
 
 use fass_dag_file::time::parse_ns;
-use fass_dag_file::{DagFile, Execution, FileDag, Length, Set, check, is_name, parse};
+use fass_dag_file::{
+    DagFile, Execution, FileDag, Length, Set, check, is_name, kernel_overheads_ns, parse,
+};
 use sched_dag::{CommitOptions, CoreDivision, Policy};
 use text::Malformed;
 use text::{is_seen, shown};
@@ -149,11 +151,11 @@ const COMPANIONS: [Name; 6] = [
 /// The longest periods of a run if nothing is said of its length, as for the guest.
 const PERIODS: u64 = 50;
 
-/// Returns the word with the kernel's worst overheads, as measured in deterministic mode: a context
-/// switch, a dispatch, an interrupt, an instance that becomes ready. The commit adds them to WCETs
-/// before it computes bounds. A dispatch may wait for those of all other cores, which take turns.
+/// Returns the guest's word with the kernel's worst overheads. The commit adds them to WCETs before
+/// it computes bounds.
 fn overheads(cores: u64) -> String {
-    format!("overheads_ns=1000,{},4000,1000", 2500 * cores)
+    let [switch, dispatch, interrupt, ready] = kernel_overheads_ns(cores);
+    format!("overheads_ns={switch},{dispatch},{interrupt},{ready}")
 }
 
 /// Reports whether a command line states the kernel's overheads, or has them measured.

@@ -31,10 +31,11 @@ use sched_dag::analysis::{self, AnalysisSettings, Overheads};
 use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption};
 
 use crate::files;
-use crate::json::Object;
-use crate::output::{Table, shown};
-use crate::record::{self, Committed};
+use crate::output::Table;
 use observed::OfDag;
+use views::json::Object;
+use views::record::{self, Committed};
+use views::units::shown;
 
 /// One DAG of one commit.
 #[derive(Clone, Debug)]

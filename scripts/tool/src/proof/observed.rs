@@ -21,10 +21,10 @@ use sched_dag::law::{Distribution, MeasuredCosts};
 use sched_dag::wcets::{self, records};
 
 use crate::files;
-use crate::json::Object;
-use crate::output::shown;
-use crate::record::{Record, Run};
-use crate::trace;
+use views::findings::check;
+use views::json::Object;
+use views::record::{Record, Run};
+use views::units::shown;
 
 /// A DAG of one shape, in all its runs.
 #[derive(Clone, Debug)]
@@ -135,7 +135,7 @@ pub fn measure(runs: &[Run]) -> Result<MeasuredCosts, String> {
 
 fn of_run(run: &Run) -> MeasuredCosts {
     // Without a tolerance nothing is a breach, and only the figures are needed.
-    let figures = trace::check(run, u64::MAX).figures;
+    let figures = check(run, u64::MAX).figures;
     MeasuredCosts {
         dispatches: figures.instances as u64,
         owed_ns: figures.longest_inversion_ns,
@@ -260,27 +260,19 @@ pub fn table(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::new();
     for dag in all {
         // Writing into a `String` cannot fail.
-        let _ = writeln!(
-            text,
-            "\n{:<24}{:>8}{:>12}{:>12}{:>12}{:>12}{:>12}  from min to max",
+        let (name, last) = (
             format!("dag {}", dag.name),
-            "calls",
-            "min",
-            "median",
-            "p99",
-            "max",
-            format!("max+{margin_percent}%")
+            format!("max+{margin_percent}%"),
         );
+        let titles = ["min", "median", "p99", "max", &last];
+        let titles = titles.map(|title| format!("{title:>12}")).concat();
+        let _ = writeln!(text, "\n{name:<24}   calls{titles}  from min to max");
         for (name, times) in &dag.subtasks {
-            let figures = [times.min(), times.median(), times.p99(), times.max()];
-            let _ = write!(text, "  {name:<22}{:>8}", times.count());
-            for ns in figures
-                .into_iter()
-                .chain([with_margin(times.max(), margin_percent)])
-            {
-                let _ = write!(text, "{:>12}", shown(ns));
-            }
-            let _ = writeln!(text, "  {}", bars(times));
+            let last = with_margin(times.max(), margin_percent);
+            let figures = [times.min(), times.median(), times.p99(), times.max(), last];
+            let figures = figures.map(|ns| format!("{:>12}", shown(ns))).concat();
+            let (count, bars) = (times.count(), bars(times));
+            let _ = writeln!(text, "  {name:<22}{count:>8}{figures}  {bars}");
         }
     }
     text

@@ -2,12 +2,12 @@
 
 use super::observed::OfDag;
 use super::*;
-use crate::made::{commit, record_of};
-use crate::record::Record;
+use crate::tests::made::{commit, record_of};
 use crate::tests::{altered, rows as rows_of};
 use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
 use sched_dag::law::MeasuredCosts;
 use std::fs;
+use views::record::Record;
 
 /// A chain of 2 and 3 ms, each charged 1 us.
 const CHAIN: &str = "static 2

@@ -27,7 +27,7 @@ use recording::{
     Scalar, Schema, to_bytes,
 };
 
-use crate::json::{Object, quoted};
+use views::json::{Object, quoted};
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
@@ -97,9 +97,8 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
                 EntryKind::Lost => channel.map_or(entry.place, |channel| channel.subtask),
                 _ => entry.place,
             };
-            let event = Object::new()
-                .text("what", what.name())
-                .number("subtask", subtask);
+            let event = Object::new().text("what", what.name());
+            let event = event.number("subtask", subtask);
             // Writing into a `String` cannot fail.
             let _ = write!(
                 json,
@@ -464,8 +463,8 @@ impl Values<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::json::{Value, parse};
     use random::Random;
+    use views::json::{Value, parse};
 
     /// Returns all types up to a depth of nesting.
     fn types(depth: u32) -> Vec<String> {

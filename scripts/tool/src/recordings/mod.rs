@@ -20,17 +20,15 @@ use recording::{
 };
 use text::{quoted, visible};
 
-use crate::dot;
 use crate::files::{self, Named};
 use crate::options::{Command, Name, Parsed, Refusal, Takes, options};
-use crate::output;
 use crate::proof::{self, observed};
-use crate::protocol::Transcript;
-use crate::record::Record;
 use crate::system;
+use views::protocol::Transcript;
+use views::record::Record;
 
 /// The options that write views of the commits and runs of a record.
-const OF_RUNS: [Name; 3] = [name::DOT, name::WITNESS, name::OBSERVE];
+const OF_RUNS: [Name; 2] = [name::WITNESS, name::OBSERVE];
 
 /// The table of `recording`.
 pub static RECORDING: Command = Command {
@@ -54,10 +52,8 @@ options! {
     CSV: Takes::File("DIR");
     /// Write an MCAP file, with messages in JSON, for Foxglove and others.
     MCAP: Takes::File("FILE");
-    /// Of a run that was kept (`./scripts/run --keep FILE`): write the committed DAGs to this
-    /// file, for Graphviz.
-    DOT: Takes::File("FILE");
-    /// Of such a run: write what proves the commit's bounds.
+    /// Of a run that was kept (`./scripts/run --keep FILE`): write what proves the commit's
+    /// bounds.
     WITNESS: Takes::File("FILE");
     /// Of such a run: write what calls took, as WCETs with a margin of 20 %.
     OBSERVE: Takes::File("FILE");
@@ -170,9 +166,6 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
         return Err(format!("`--{name}`: {line}"));
     }
-    if let Some(path) = options.path(name::DOT) {
-        println!("{}", draw(&record, path)?);
-    }
     if let Some(path) = options.path(name::WITNESS) {
         println!("{}", proof::write(path, record.proven()?)?);
     }
@@ -184,15 +177,6 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         println!("{}", files::shown_path(path));
     }
     Ok(())
-}
-
-/// Writes the picture of the committed DAGs, and returns a line that announces it.
-pub(crate) fn draw(record: &Record, path: &Path) -> Result<String, String> {
-    files::write_named(name::DOT.as_str(), path, dot::text(record)?)?;
-    let file = files::shown_path(path);
-    Ok(format!(
-        "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
-    ))
 }
 
 /// Checks the options and all files, before any is opened.
@@ -212,13 +196,7 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
     }
     files::check(
         &[input],
-        &options.named(&[
-            name::OUT,
-            name::MCAP,
-            name::DOT,
-            name::WITNESS,
-            name::OBSERVE,
-        ]),
+        &options.named(&[name::OUT, name::MCAP, name::WITNESS, name::OBSERVE]),
     )?;
     (options.named(&[name::CSV]).iter()).try_for_each(files::check_folder)
 }
@@ -308,12 +286,8 @@ fn shown(recording: &Recording<'_>) -> String {
     }
     let mut text = String::new();
     // Writing into a `String` cannot fail.
-    let _ = writeln!(
-        text,
-        "recording of `{}`, {} entries",
-        visible(&header.app),
-        recording.count()
-    );
+    let (app, count) = (visible(&header.app), recording.count());
+    let _ = writeln!(text, "recording of `{app}`, {count} entries");
     if let Some((first, last)) = span_ns {
         let _ = writeln!(text, "from {first} ns to {last} ns");
     }
@@ -322,10 +296,8 @@ fn shown(recording: &Recording<'_>) -> String {
         let (role, topic) = (channel.role.name(), visible(&channel.topic));
         let schema = channel.schema.to_string();
         let schema = visible(&schema);
-        let _ = writeln!(
-            text,
-            "  {role} `{topic}` of dag `{dag}`: {values} values of {schema}"
-        );
+        let counted = format!("{values} values of {schema}");
+        let _ = writeln!(text, "  {role} `{topic}` of dag `{dag}`: {counted}");
     }
     for (what, count) in others {
         if count > 0 {
@@ -341,9 +313,8 @@ fn shown(recording: &Recording<'_>) -> String {
             Chunk::Commit(commit) => commits.push(commit),
             Chunk::Events(some) => events += some.words().count(),
             Chunk::Times(times) => {
-                tables += &commits
-                    .last()
-                    .map_or(String::new(), |of| table(runs, of, &times));
+                let of_run = commits.last().map(|of| table(runs, of, &times));
+                tables += &of_run.unwrap_or_default();
                 runs += 1;
             }
         }
@@ -362,11 +333,9 @@ fn shown(recording: &Recording<'_>) -> String {
     for answer in commits.iter().flat_map(|commit| &commit.answers) {
         let _ = writeln!(text, "  {}", visible(answer));
     }
+    let cut = "incomplete: it says nothing of what came after its last entry";
     let _ = match recording.lost() {
-        _ if recording.is_cut() => writeln!(
-            text,
-            "incomplete: it says nothing of what came after its last entry"
-        ),
+        _ if recording.is_cut() => writeln!(text, "{cut}"),
         0 => writeln!(text, "complete"),
         lost => writeln!(text, "incomplete: {lost} values are lost"),
     };
@@ -379,9 +348,8 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
     let mut row = |name: &str, counted: &Counted| {
         let times = observed::distribution(counted);
         let figures = [times.min(), times.median(), times.p99(), times.max()];
-        let figures = figures
-            .map(|ns| format!("{:>12}", output::shown(ns)))
-            .concat();
+        let figures = figures.map(|ns| format!("{:>12}", views::units::shown(ns)));
+        let figures = figures.concat();
         // Writing into a `String` cannot fail.
         // A row without samples would show zeros that nobody has measured.
         let _ = match times.count() {
@@ -402,95 +370,64 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
             }
         }
     }
+    let columns = "count         min      median         p99         max";
     match text.is_empty() {
         true => text,
-        false => format!(
-            "run {run}{:>39}         min      median         p99         max\n{text}",
-            "count"
-        ),
+        false => format!("run {run}{columns:>87}\n{text}"),
     }
 }
 
 /// Returns the lines about a job, given as `DAG/JOB`.
-#[allow(clippy::too_many_lines, reason = "a text, line by line")]
 fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> {
     let header = recording.header();
     // The last `/`, since a DAG's name may contain one.
     let parts = job.rsplit_once('/');
-    let Some((name, number)) =
-        parts.and_then(|(dag, number)| Some((dag, number.parse::<u64>().ok()?)))
-    else {
-        return Err(format!(
-            "`--until {}`: DAG/JOB is wanted, such as gait/17",
-            visible(job)
-        ));
+    let parts = parts.and_then(|(dag, number)| Some((dag, number.parse::<u64>().ok()?)));
+    let Some((name, number)) = parts else {
+        let wanted = "DAG/JOB is wanted, such as gait/17";
+        return Err(format!("`--until {}`: {wanted}", visible(job)));
     };
     let Some(dag) = header.dags.iter().position(|dag| dag.name == name) else {
         let there = header.dags.iter().map(|dag| quoted(&dag.name).to_string());
         let there = there.collect::<Vec<String>>().join(", ");
-        return Err(format!(
-            "`--until`: there is no dag {}; there are {there}",
-            quoted(name)
-        ));
+        let why = format!("there is no dag {}", quoted(name));
+        return Err(format!("`--until`: {why}; there are {there}"));
     };
-    let mut of_job = (recording.entries())
-        .filter(|entry| usize::from(entry.dag) == dag && entry.job == number)
-        .peekable();
+    let is_its = |entry: &Entry<'_>| usize::from(entry.dag) == dag && entry.job == number;
+    let mut of_job = recording.entries().filter(is_its).peekable();
     let Some(first) = of_job.peek() else {
-        return Err(format!(
-            "`--until`: nothing is recorded of job {number} of that dag"
-        ));
+        let why = "nothing is recorded of";
+        return Err(format!("`--until`: {why} job {number} of that dag"));
     };
     let mut text = String::new();
     // Writing into a `String` cannot fail.
-    let _ = writeln!(
-        text,
-        "job {number} of dag `{}`, due at {} ns",
-        visible(name),
-        first.release_ns
-    );
+    let (name, due_ns) = (visible(name), first.release_ns);
+    let _ = writeln!(text, "job {number} of dag `{name}`, due at {due_ns} ns");
     let times = Schema::parse("[u64]").expect("it is a schema");
-    for Entry {
-        what,
-        place,
-        at_ns,
-        value,
-        ..
-    } in of_job
-    {
-        let channel = header.channels.get(usize::from(place));
-        let _ = match (what, channel) {
+    for entry in of_job {
+        let (at_ns, place, bytes) = (entry.at_ns, entry.place, entry.value);
+        let what = entry.what;
+        let told = match (what, header.channels.get(usize::from(place))) {
             (EntryKind::Value | EntryKind::Lost, Some(channel)) => {
-                let (role, topic) = (channel.role.name(), visible(&channel.topic));
+                let (schema, topic) = (&channel.schema, visible(&channel.topic));
+                let (subtask, role) = (channel.subtask, channel.role.name());
                 let shown = match what {
                     EntryKind::Lost => "lost".to_string(),
-                    _ => Shown {
-                        schema: &channel.schema,
-                        bytes: value,
-                    }
-                    .to_string(),
+                    _ => Shown { schema, bytes }.to_string(),
                 };
-                let subtask = channel.subtask;
-                writeln!(
-                    text,
-                    "  {at_ns} ns, subtask {subtask}, {role} `{topic}`: {shown}"
-                )
+                format!(", subtask {subtask}, {role} `{topic}`: {shown}")
             }
             (EntryKind::Clock, _) => {
-                let shown = Shown {
-                    schema: &times,
-                    bytes: value,
-                };
-                writeln!(
-                    text,
-                    "  {at_ns} ns, subtask {place}, told the time: {shown}"
-                )
+                let schema = &times;
+                let shown = Shown { schema, bytes };
+                format!(", subtask {place}, told the time: {shown}")
             }
             (EntryKind::Cut | EntryKind::Restart | EntryKind::Fault, _) => {
-                writeln!(text, "  {at_ns} ns, subtask {place}: {}", what.name())
+                format!(", subtask {place}: {}", what.name())
             }
-            _ => writeln!(text, "  {at_ns} ns: {}", what.name()),
+            _ => format!(": {}", what.name()),
         };
+        let _ = writeln!(text, "  {at_ns} ns{told}");
     }
     Ok(text)
 }

@@ -1,7 +1,7 @@
 //! The files that stay of a boot: its record, views of that, and its serial log.
 //!
 //! The record arrives while the guest runs and is completed with the guest's machine lines. It is
-//! written to the files that the options name; the view `--dot` is made from it.
+//! written to the files that the options name.
 //!
 //! Even without such an option a guest sends the inputs of its last jobs before a fault; they are
 //! written to a file next to the log.
@@ -14,17 +14,19 @@ use std::path::{Path, PathBuf};
 
 use recording::{Chunk, Header, Recording, Writer};
 
+use super::page::Server;
 use super::screen::Screen;
 use super::{Booted, handed};
 use crate::files::{self, Temporary};
 use crate::options::{Name, Parsed, Refusal};
 use crate::outcome::Outcome;
-use crate::protocol::Status;
+use crate::page::{self, Content};
 use crate::qemu::Ending;
-use crate::record::Record;
 use crate::recordings;
 use crate::run_options::name;
 use crate::system;
+use views::protocol::Status;
+use views::record::Record;
 
 /// The kinds of lines that are left out of the record: those about progress, and those that carry
 /// the record itself.
@@ -43,15 +45,17 @@ pub(super) struct Kept {
     app: String,
     /// The guest's word for the wanted kind of record; `None`: none is wanted.
     word: Option<&'static str>,
+    /// The server of the page, if one is wanted.
+    server: Option<&'static Server>,
 }
 
 /// Returns the guest's word for the kind of record that the options want.
 pub(super) fn word(options: &Parsed) -> Option<&'static str> {
     // A full record has the events, too, so it prevails over the views.
-    match options.is_given(name::KEEP) {
-        true => Some("keep"),
-        false => options
-            .given_of(&[name::TRACE, name::DOT, name::PROVE])
+    match options.given_of(&[name::KEEP, name::PAGE]) {
+        Some(_) => Some("keep"),
+        None => options
+            .given_of(&[name::TRACE, name::PROVE])
             .map(|_| "events"),
     }
 }
@@ -59,7 +63,12 @@ pub(super) fn word(options: &Parsed) -> Option<&'static str> {
 impl Kept {
     pub(super) fn new(options: &Parsed, app: &str) -> Result<Self, String> {
         let path = system::new_log(app)?.with_extension("sent");
+        let server = options.is_given(name::PAGE).then(|| {
+            let page = page::html(&Content::default(), true)?;
+            Server::start(page, &path)
+        });
         Ok(Self {
+            server: server.transpose()?,
             raw: Temporary(Some(path)),
             app: app.into(),
             word: word(options),
@@ -73,7 +82,10 @@ impl Kept {
 
     /// Says where the record can be read while the run goes on.
     pub(super) fn introduce(&self, screen: &Screen) {
-        if let (Some(_), Some(raw)) = (self.word, &self.raw.0) {
+        if let Some(server) = &self.server {
+            // Not by the screen, for which `--quiet` holds: without the address it is of no use.
+            eprintln!("page: http://127.0.0.1:{}/", server.port);
+        } else if let (Some(_), Some(raw)) = (self.word, &self.raw.0) {
             let (show, raw) = (system::script("recording"), files::shown_path(raw));
             screen.say(&format!(
                 "record: until the end of the run `{show} {raw}` shows what came so far\n"
@@ -102,7 +114,7 @@ impl Kept {
         outcome.sent = sent.and_then(Result::ok).unwrap_or_default();
         // Without the port for records the bytes come as text in lines of kind `record`.
         if outcome.sent.is_empty() {
-            outcome.sent = crate::record::bytes_of_log(&outcome.serial)?;
+            outcome.sent = views::record::bytes_of_log(&outcome.serial)?;
         }
         Ok(())
     }
@@ -117,9 +129,8 @@ impl Kept {
         if self.word.is_none() {
             return self.write_crash(&outcome.sent);
         }
-        let wanted = FILES
-            .into_iter()
-            .filter_map(|name| Some((name, options.path(name)?)));
+        let wanted = FILES.into_iter();
+        let wanted = wanted.filter_map(|name| Some((name, options.path(name)?)));
         let wanted: Vec<_> = wanted.collect();
         if wanted.is_empty() {
             return Ok(Vec::new());
@@ -294,14 +305,18 @@ pub(super) fn write(
     for line in kept.write(options, &outcome)? {
         screen.say(&line);
     }
-    // After a failure the picture would be wrong or missing, and would hide its message.
-    if outcome.judge().is_ok() {
-        if let Some(path) = options.path(name::DOT) {
-            screen.say(&recordings::draw(&outcome.record()?, path)?);
-        }
-        if let Some(warning) = handed::warning(options, &outcome) {
-            screen.say(&warning);
-        }
+    if outcome.judge().is_ok()
+        && let Some(warning) = handed::warning(options, &outcome)
+    {
+        screen.say(&warning);
+    }
+    if let Some(server) = &kept.server
+        && !server.finish(kept.completed(&outcome))
+    {
+        let page = system::script("page");
+        screen.say(&format!(
+            "page: nobody has opened it; `--keep X`, then `{page} X` shows a run"
+        ));
     }
     Ok(Booted {
         outcome,

@@ -55,9 +55,8 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
     }
     for option in [name::CARD, name::PCAP] {
         if options.is_given(option) && !options.is_given(name::NET) {
-            return Err(format!(
-                "`--{option}`: there is no network; give --net WORDS, such as --net user"
-            ));
+            let remedy = "give --net WORDS, such as --net user";
+            return Err(format!("`--{option}`: there is no network; {remedy}"));
         }
     }
     if loader == Loader::Uefi && mode == Some(Mode::Deterministic) {

@@ -14,6 +14,7 @@ mod handed;
 mod kept;
 mod loading;
 mod on_linux;
+mod page;
 mod screen;
 mod several;
 
@@ -33,25 +34,26 @@ use crate::medium;
 use crate::options::{BY_PERSON, Name, Parsed, Refusal};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
-use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, Mode, Qemu};
 use crate::run_options::{GUEST_WORDS, name};
 use handed::Handed;
 use kept::{Kept, Log};
 use screen::Screen;
+use views::protocol::{Status, Transcript};
 
 pub use crate::run_options::RUN;
 pub use boot::boot;
 pub use debug::debug;
 
 /// Options that exclude each other in one run that is not observed.
-const APART: [(Name, Name, &str); 3] = [
+const APART: [(Name, Name, &str); 4] = [
     (
         name::DAG,
         name::MODULE,
         "exclude each other: the DAGs are the module",
     ),
     (name::REPLAY, name::KEEP, "exclude each other"),
+    (name::REPLAY, name::PAGE, "exclude each other"),
     (name::REPLAY, name::DAG, "exclude each other"),
 ];
 
@@ -108,13 +110,7 @@ fn check_files(options: &Parsed) -> Result<(), Refusal> {
     ];
     let mut inputs = options.named(&names);
     inputs.extend(handed::input(options));
-    let outputs = [
-        name::SERIAL,
-        name::TRACE,
-        name::KEEP,
-        name::DOT,
-        name::OUTPUT,
-    ];
+    let outputs = [name::SERIAL, name::TRACE, name::KEEP, name::OUTPUT];
     let outputs = options.named(&outputs);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     kept::check(options).map_err(Refusal::Usage)

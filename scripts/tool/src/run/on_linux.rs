@@ -34,11 +34,12 @@ const FOREIGN: [Name; 10] = [
 ];
 
 /// Options that `--on debian` cannot pass on to its guest, and options only for that guest.
-const NOT_IN_GUEST: [Name; 5] = [
+const NOT_IN_GUEST: [Name; 6] = [
     name::CONSOLE,
     name::INPUT,
     name::KEEP,
     name::OUTPUT,
+    name::PAGE,
     name::REPLAY,
 ];
 const ONLY_IN_GUEST: [Name; 2] = [name::MODE, name::BUSY];

@@ -20,9 +20,9 @@ use super::handed;
 use crate::options::Parsed;
 use crate::places;
 use crate::progress::Progress;
-use crate::protocol::{MachineLine, read_line};
 use crate::run_options::name;
 use crate::system;
+use views::protocol::{MachineLine, read_line};
 
 /// The value of `quiet` that suppresses machine lines, too: for a run that only prepares another.
 pub(super) const NOTHING: &str = "nothing";
@@ -155,7 +155,7 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
     };
     let mut text = format!("{jobs}, {misses} missed");
     let loads = line.value.get("load_permille")?.elements();
-    let percent = |load: &crate::json::Value| Some((load.as_u64()? + 5) / 10);
+    let percent = |load: &views::json::Value| Some((load.as_u64()? + 5) / 10);
     let loads: Vec<String> = loads
         .iter()
         .filter_map(percent)

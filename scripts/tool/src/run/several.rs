@@ -18,17 +18,17 @@ use super::screen::NOTHING;
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::{Format, states_overheads};
 use crate::files::{self, Temporary};
-use crate::json::quoted;
 use crate::options::{Name, Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
 use crate::proof::observed::{self, OfDag};
 use crate::proof::{self, ProofRow};
-use crate::protocol::Status;
-use crate::record::Record;
 use crate::run_options::name;
 use crate::system;
+use views::json::quoted;
+use views::protocol::Status;
+use views::record::Record;
 
 /// The platform's overheads; an error in words if no trace was kept.
 type Measurement = Result<MeasuredCosts, String>;
@@ -36,7 +36,8 @@ type Measurement = Result<MeasuredCosts, String>;
 /// Runs the proof.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
-    let alone = options.check_without(&[name::CONSOLE, name::GDB, name::PRINT_DAG], why);
+    let others = [name::CONSOLE, name::GDB, name::PAGE, name::PRINT_DAG];
+    let alone = options.check_without(&others, why);
     alone.map_err(Refusal::Usage)?;
     check_files(options)?;
     let Some((rows, code)) = prove(options)? else {
@@ -130,12 +131,11 @@ fn observe_first(options: &Parsed, own: &Path) -> Result<Option<Parsed>, Refusal
     }
     if measures {
         let measured = seen?;
-        let margin = options
-            .number(name::MARGIN)
-            .unwrap_or(observed::MARGIN_PERCENT);
+        let margin = options.number(name::MARGIN);
+        let margin = margin.unwrap_or(observed::MARGIN_PERCENT);
         let word = observed::overheads_word(&measured, margin);
-        let text =
-            format!("\noverheads measured: {measured}; with a margin of {margin} %: {word}\n");
+        let with = format!("with a margin of {margin} %");
+        let text = format!("\noverheads measured: {measured}; {with}: {word}\n");
         let line = observed::overheads_line(&measured, margin);
         say(options, &text, [line].into_iter());
         next = next.with(name::APPEND, format!("{append} {word}"));
@@ -177,14 +177,10 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         latest = booted.outcome.record()?;
         observed::add(&mut all, &latest)?;
     }
-    let margin = options
-        .number(name::MARGIN)
-        .unwrap_or(observed::MARGIN_PERCENT);
-    say(
-        options,
-        &observed::table(&all, margin),
-        observed::lines(&all),
-    );
+    let margin = options.number(name::MARGIN);
+    let margin = margin.unwrap_or(observed::MARGIN_PERCENT);
+    let table = observed::table(&all, margin);
+    say(options, &table, observed::lines(&all));
     if let Some(path) = file {
         files::write(path, observed::text(&all, margin))?;
     }
@@ -237,10 +233,10 @@ const FOR_ONE_FILE: [Name; 8] = [
     name::GRAPH,
     name::TRACE,
     name::SERIAL,
-    name::DOT,
     name::WCETS,
     name::CONSOLE,
     name::GDB,
+    name::PAGE,
 ];
 
 /// Runs all files. A refused or failed one does not keep the others from running;
@@ -401,8 +397,8 @@ fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::json::{self, Value};
     use crate::qemu::Ending;
+    use views::json::{self, Value};
 
     #[test]
     fn any_name_of_a_file_is_one_member_of_a_machine_line() {

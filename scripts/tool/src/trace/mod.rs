@@ -1,71 +1,32 @@
 //! The trace checker: the events of a run, judged by the model's rules.
 //!
-//! A [record](crate::record) has the model of a run and its journal: a [`Run`]. The judge is
-//! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision takes
-//! effect after an interrupt.
-//!
-//! This module has the subcommand `check-trace`; the [`RunFigures`], computed from a `View`, which
-//! puts a run in the order of time; the latencies of effects from DAG to DAG
-//! ([`sched_dag::chains`]); and [`viewer`], which draws a run instead of judging it. All files are
-//! read before the first run is judged, so that a damaged one does not hide behind the breaches of
-//! another.
-//!
-//! Lost events are always the oldest, and only events after the instant of the first one that is
-//! left are judged. An instance that has not finished when the trace ends breaks no rule, unless
-//! the run says that it is complete.
-//!
-//! The figures of a trace:
-//!
-//! - *finish to ready*: from the last finish that an instance waited for to its readiness; the
-//!   largest.
-//! - *ready to start*: from readiness to the function's call, of instances for
-//!   which a core was idle when they became ready, unless another instance with
-//!   a smaller key became ready meanwhile and took it.
-//! - *preemption latency*: from the scheduler's request that a core run an
-//!   instance to that instance's start or resumption there. A request that is
-//!   overtaken, by another one for the core or because the instance runs
-//!   elsewhere, does not count.
-//! - *longest inversion*: the longest time for which an instance that should
-//!   have run by R5 waited while one of lower priority ran or a core was idle.
-//! - *load*: the part of the time from the first event to the last for which a
-//!   core had an instance, in thousandths.
-//!
-//! A trace is *complete from* the first instant after the first event that is left; earlier events
-//! are left out.
+//! This module has the subcommand `check-trace`, which prints the [`views::findings`] of runs and the
+//! times of their [chains]; and that of `trace`, which draws a run instead of judging it. All
+//! files are read before the first run is judged, so that a damaged one does not hide behind the
+//! breaches of another.
 
-mod links;
-pub mod picture;
-pub mod viewer;
+mod drawn;
+mod perfetto;
 
-use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
 use sched_dag::chains::{Chain, SubtaskRef};
-use sched_dag::journal::{Event, EventKind};
-use sched_dag::law::sweep::WaitCounts;
-use sched_dag::law::{self, Distribution, Violation};
-use sched_dag::{CoreId, DagId, Instance, Preemption};
+use sched_dag::{DagId, Preemption};
+use views::chains::{self, MeasuredChain};
+use views::findings::{Findings, check, distribution, object};
+use views::json::{Object, quoted};
+use views::links;
+use views::record::{Record, Run, tolerance_ns};
+use views::units::shown as shown_ns;
+use views::view::View;
 
 use crate::files;
-use crate::json::{Object, quoted};
 use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, options};
-use crate::output::shown as shown_ns;
-use crate::record::{Record, Run, tolerance_ns};
 
-pub use viewer::TRACE;
-pub use viewer::trace;
-
-/// The findings in a run's trace.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Findings {
-    /// The breaches by time.
-    pub breaches: Vec<Violation>,
-    /// The figures.
-    pub figures: RunFigures,
-}
+pub use drawn::{TRACE, trace};
 
 /// Reads the runs of the record in a log.
 ///
@@ -74,23 +35,6 @@ pub struct Findings {
 /// In words: the fault of the record.
 pub fn read(log: &str) -> Result<Vec<Run>, String> {
     Record::of_log(log).map(|record| record.runs)
-}
-
-/// Judges a run. `bound_ns` is the longest time for which an instance may wait for a core that it
-/// is owed; 0 is for virtual time.
-pub fn check(run: &Run, bound_ns: u64) -> Findings {
-    let (view, terms) = (View::new(run), run.terms(bound_ns));
-    let verdict = law::judge(&run.task_set, terms, view.in_the_order_of_the_log());
-    let by_time = view.events.iter().copied();
-    let dispatch = law::judge_dispatch(&run.task_set, &run.options, terms, by_time);
-    let mut breaches = verdict.violations;
-    breaches.extend(dispatch.violations);
-    // Two judges have reported; people read one list by time.
-    breaches.sort_by_key(|breach| (breach.time_ns(), breach.rule()));
-    Findings {
-        breaches,
-        figures: compute(&view, verdict.finish_to_ready_max_ns, dispatch.waits),
-    }
 }
 
 /// The table of `check-trace`.
@@ -186,7 +130,7 @@ fn read_files(options: &Parsed) -> Result<Vec<(String, Record)>, String> {
 }
 
 /// Reads a file's runs, of which at least one must have events.
-fn read_file(path: &Path) -> Result<Record, String> {
+pub(crate) fn read_file(path: &Path) -> Result<Record, String> {
     let file = files::shown_path(path);
     let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
     let record = Record::read(&bytes).map_err(|why| format!("{file}: {why}"))?;
@@ -219,15 +163,12 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
     table += &chain_table(run, chains, options.is_given(name::FROM));
     let exceeded: usize = chains.iter().map(|chain| chain.exceeded(bound_ns)).sum();
     if exceeded > 0 {
-        let _ = writeln!(
-            table,
-            "  breach {exceeded} times of chains are beyond their bounds"
-        );
+        let what = "times of chains are beyond their bounds";
+        let _ = writeln!(table, "  breach {exceeded} {what}");
     }
-    if options.is_given(name::JSON) {
-        eprint!("{table}");
-    } else {
-        print!("{table}");
+    match options.is_given(name::JSON) {
+        true => eprint!("{table}"),
+        false => print!("{table}"),
     }
     lines.iter().for_each(|line| println!("{line}"));
     for chain in chains {
@@ -275,27 +216,16 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64) -> Strin
     row("events", &figures.events.to_string());
     row("instances started", &figures.instances.to_string());
     row("preemptions", &figures.preemptions.to_string());
-    row(
-        "finish to ready, largest",
-        &shown_ns(figures.finish_to_ready_max_ns),
-    );
-    row(
-        "ready to start, a core idle",
-        &distribution(&figures.ready_to_start),
-    );
+    let largest = shown_ns(figures.finish_to_ready_max_ns);
+    row("finish to ready, largest", &largest);
+    let to_start = distribution(&figures.ready_to_start);
+    row("ready to start, a core idle", &to_start);
     row("preemption latency", &distribution(&figures.preemption));
-    row(
-        "longest inversion",
-        &format!(
-            "{} (bound {})",
-            shown_ns(figures.longest_inversion_ns),
-            shown_ns(bound_ns)
-        ),
-    );
+    let [longest, bound] = [figures.longest_inversion_ns, bound_ns].map(shown_ns);
+    row("longest inversion", &format!("{longest} (bound {bound})"));
     let loads = figures.load_permille.iter();
-    let loads: Vec<String> = loads
-        .map(|load| format!("{}.{} %", load / 10, load % 10))
-        .collect();
+    let loads = loads.map(|load| format!("{}.{} %", load / 10, load % 10));
+    let loads: Vec<String> = loads.collect();
     row("load by core", &loads.join("  "));
     row("breaches", &breaches.len().to_string());
     text
@@ -323,53 +253,8 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
         .into_text()
 }
 
-fn distribution(of: &Distribution) -> String {
-    if of.count() == 0 {
-        return "none".into();
-    }
-    format!(
-        "median {}, p99 {}, max {} of {}",
-        shown_ns(of.median()),
-        shown_ns(of.p99()),
-        shown_ns(of.max()),
-        of.count()
-    )
-}
-
-fn object(of: &Distribution) -> String {
-    format!(
-        "{{\"count\":{},\"median\":{},\"p99\":{},\"max\":{}}}",
-        of.count(),
-        of.median(),
-        of.p99(),
-        of.max()
-    )
-}
-
 /// The largest number of chains shown for a run, unless one is named.
 const SHOWN: usize = 8;
-
-/// The times of a chain in a run, and their bounds.
-struct MeasuredChain {
-    names: Vec<String>,
-    /// The age of an output, the data age and the reaction time.
-    times: [(Distribution, Result<u64, DagId>); 3],
-    /// The longest of each for which a bound holds, by clocks that may be wrong.
-    longest_ns: [u64; 3],
-    /// The stated delay of the links that it leads over, if any.
-    stated_ns: Option<u64>,
-}
-
-impl MeasuredChain {
-    /// Returns how many of its times are beyond their bounds, by more than the tolerance.
-    fn exceeded(&self, tolerance_ns: u64) -> usize {
-        let is_beyond = |(longest_ns, (_, bound)): &(&u64, &(_, Result<u64, DagId>))| {
-            bound.is_ok_and(|ns| **longest_ns > ns.saturating_add(tolerance_ns))
-        };
-        let times = self.longest_ns.iter().zip(&self.times);
-        times.filter(is_beyond).count()
-    }
-}
 
 /// Measures the chains that the options name, or else all.
 ///
@@ -377,63 +262,24 @@ impl MeasuredChain {
 ///
 /// In words: there is no such subtask, or no chain between the two.
 fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
-    let links = run.links.iter().map(|link| link.edge);
-    let samplings = &run
-        .samplings
-        .iter()
-        .copied()
-        .chain(links)
-        .collect::<Vec<_>>();
-    let ends = (options.text(name::FROM), options.text(name::TO));
-    let chains = match ends {
-        (None, None) => Chain::all(&run.task_set, samplings),
+    let ends = match (options.text(name::FROM), options.text(name::TO)) {
+        (None, None) => None,
         (Some(from), Some(to)) => {
-            let ends = (
-                named_subtask(run, "from", from)?,
-                named_subtask(run, "to", to)?,
-            );
-            let chains = Chain::between(&run.task_set, samplings, ends.0, ends.1);
-            if chains.is_empty() {
-                return Err(format!(
-                    "run {}: no edges and samples lead from `{from}` to `{to}`; \
-                     `./scripts/run --dot FILE` draws which there are",
-                    run.number
-                ));
-            }
-            chains
+            let from = named_subtask(run, "from", from)?;
+            Some((from, named_subtask(run, "to", to)?))
         }
         _ => return Err("give both `--from` and `--to`, or neither for all chains".into()),
     };
-    let view = View::new(run);
-    let events: Vec<_> = view.in_the_order_of_the_log().collect();
-    let sampled = [true, false].map(|with_late| links::sampled(run, with_late, &events));
-    let measured = |chain: &Chain| {
-        let times = |by| chain.latencies_by(by, &run.task_set, events.iter().copied());
-        let [times, judged] = sampled.each_ref().map(times);
-        let bounds = &run.bounds_ns;
-        let (links, wrong_ns) = links::of_chain(run, chain);
-        let output_age = chain.output_age_bound_over_links_ns(&run.task_set, bounds, &links);
-        let reaction = match links.first() {
-            None => chain.reaction_bound_ns(&run.task_set, bounds),
-            // Messages may be lost.
-            Some((link, _)) => Err(link.reader.0),
-        };
-        let names = chain.names(&run.task_set).map(|name| name.to_string());
-        let judged = [judged.output_age_ns, judged.data_age_ns, judged.reaction_ns];
-        let longest_ns = judged.map(|times_ns| times_ns.into_iter().max().unwrap_or(0));
-        // Reaction time and data age have the same bound.
-        MeasuredChain {
-            names: names.collect(),
-            times: [
-                (Distribution::new(times.output_age_ns), output_age),
-                (Distribution::new(times.data_age_ns), reaction),
-                (Distribution::new(times.reaction_ns), reaction),
-            ],
-            longest_ns: longest_ns.map(|ns| ns.saturating_sub(wrong_ns)),
-            stated_ns: links.iter().map(|link| link.1).reduce(u64::saturating_add),
-        }
-    };
-    Ok(chains.iter().map(measured).collect())
+    let found = chains::of(run, ends);
+    if ends.is_some() && found.is_empty() {
+        let ends = [name::FROM, name::TO].map(|end| options.text(end).unwrap_or_default());
+        let (number, [from, to]) = (run.number, ends);
+        return Err(format!(
+            "run {number}: no edges and samples lead from `{from}` to `{to}`; `./scripts/page FILE` \
+             draws which there are"
+        ));
+    }
+    Ok(chains::measured(&View::new(run), &found))
 }
 
 /// Finds the subtask that an option names.
@@ -485,11 +331,8 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
     }
     if chains.len() > shown {
         let more = chains.len() - shown;
-        let _ = writeln!(
-            text,
-            "  and {more} chains more; `--from DAG/SUBTASK --to DAG/SUBTASK` shows those between \
-             two subtasks"
-        );
+        let how = "`--from DAG/SUBTASK --to DAG/SUBTASK` shows those between two subtasks";
+        let _ = writeln!(text, "  and {more} chains more; {how}");
     }
     text
 }
@@ -512,280 +355,3 @@ fn chain_line(file: &str, run: &Run, chain: &MeasuredChain, tolerance_ns: u64) -
     let stated = |line: Object, ns: u64| line.number("stated_ns", ns);
     chain.stated_ns.into_iter().fold(line, stated).into_text()
 }
-
-/// The figures of one run. Times are in nanoseconds.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct RunFigures {
-    /// The number of judged events.
-    pub events: usize,
-    /// The number of instances that started.
-    pub instances: usize,
-    /// The number of suspensions.
-    pub preemptions: u64,
-    /// The first instant from which the trace is complete; 0 if nothing was
-    /// lost.
-    pub from_ns: u64,
-    /// The time from the first judged event to the last.
-    pub span_ns: u64,
-    /// See the module; 0 if there was none.
-    pub finish_to_ready_max_ns: u64,
-    /// See the module.
-    pub ready_to_start: Distribution,
-    /// See the module.
-    pub preemption: Distribution,
-    /// See the module.
-    pub longest_inversion_ns: u64,
-    /// See the module; by core.
-    pub load_permille: Vec<u64>,
-}
-
-/// Computes the figures of a run.
-fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: WaitCounts) -> RunFigures {
-    let first_ns = view.events.first().map_or(0, |event| event.time_ns);
-    let span_ns = view.end_ns.saturating_sub(first_ns);
-    let histories = view.histories.values();
-    RunFigures {
-        events: view.events.len(),
-        instances: histories.filter(|it| it.start_ns.is_some()).count(),
-        preemptions: view.histories.values().map(|it| it.suspensions).sum(),
-        from_ns: view.from_ns,
-        span_ns,
-        finish_to_ready_max_ns,
-        ready_to_start: Distribution::new(waits.ready_to_start_ns),
-        preemption: Distribution::new(preemption_latencies_ns(view)),
-        longest_inversion_ns: waits.longest_owed_ns,
-        load_permille: load_permille(view, first_ns, span_ns),
-    }
-}
-
-fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
-    let mut latencies_ns = Vec::new();
-    // For each core, the time of the next request after the one at hand.
-    let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
-    // Backwards, so that the next request for the core is known already.
-    let requests = view.events.iter().rev();
-    for event in requests.filter(|event| event.what == EventKind::Request) {
-        let overtaken_ns = next_ns.insert(event.core, event.time_ns);
-        let history = event.instance().and_then(|it| view.histories.get(&it));
-        let slices = history.map_or(&[][..], |history| &history.slices);
-        let mut later = slices.iter().filter(|it| it.from_ns >= event.time_ns);
-        // The instance must come to this core, and before the core is wanted for another.
-        if let Some(slice) = later.next()
-            && slice.core == event.core
-            && overtaken_ns.is_none_or(|overtaken_ns| slice.from_ns <= overtaken_ns)
-        {
-            latencies_ns.push(slice.from_ns - event.time_ns);
-        }
-    }
-    latencies_ns
-}
-
-fn load_permille(view: &View<'_>, first_ns: u64, span_ns: u64) -> Vec<u64> {
-    let mut busy_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
-    for slice in view.histories.values().flat_map(|it| &it.slices) {
-        // An instance that ran when the trace ended has its core up to there.
-        let to_ns = slice.to_ns.unwrap_or(view.end_ns);
-        let from_ns = slice.from_ns.max(first_ns);
-        let busy_ns = busy_ns.entry(slice.core).or_insert(0);
-        *busy_ns = busy_ns.saturating_add(to_ns.saturating_sub(from_ns));
-    }
-    let permille = |core: u32| {
-        let busy_ns = busy_ns.get(&CoreId(core)).copied().unwrap_or(0);
-        let permille = u128::from(busy_ns) * 1000 / u128::from(span_ns.max(1));
-        u64::try_from(permille).unwrap_or(u64::MAX)
-    };
-    (0..view.run.options.cores).map(permille).collect()
-}
-
-/// A run in the order of time.
-struct View<'r> {
-    run: &'r Run,
-    /// The first instant from which on no event is missing.
-    from_ns: u64,
-    /// The time of the last event.
-    end_ns: u64,
-    /// The events from `from_ns` on, by time.
-    events: Vec<Event>,
-    histories: BTreeMap<Instance, History>,
-    /// The jobs, each with its history.
-    jobs: BTreeMap<(DagId, u64), JobHistory>,
-    /// The due times of sporadic jobs.
-    due_ns: BTreeMap<(DagId, u64), u64>,
-}
-
-/// The times of a job's first events of each kind.
-#[derive(Clone, Debug, Default)]
-struct JobHistory {
-    released_ns: Option<u64>,
-    aborted_ns: Option<u64>,
-    missed_ns: Option<u64>,
-    completed_ns: Option<u64>,
-}
-
-/// The times of an instance's first events of each kind.
-#[derive(Clone, Debug, Default)]
-struct History {
-    ready_ns: Option<u64>,
-    start_ns: Option<u64>,
-    finish_ns: Option<u64>,
-    /// The time of its cancellation, or of its end by a fault.
-    dropped_ns: Option<u64>,
-    /// The times on a core.
-    slices: Vec<Slice>,
-    /// When each wait began and ended; `None`: it went on when the trace ended.
-    waits: Vec<(u64, Option<u64>)>,
-    suspensions: u64,
-}
-
-/// A stretch of execution on one core.
-#[derive(Clone, Copy, Debug)]
-struct Slice {
-    core: CoreId,
-    from_ns: u64,
-    /// `None`: it ran when the trace ended.
-    to_ns: Option<u64>,
-}
-
-impl<'r> View<'r> {
-    /// Builds the view of a run.
-    fn new(run: &'r Run) -> View<'r> {
-        let mut view = View {
-            run,
-            from_ns: complete_from_ns(run),
-            end_ns: 0,
-            events: Vec::new(),
-            histories: BTreeMap::new(),
-            jobs: BTreeMap::new(),
-            due_ns: BTreeMap::new(),
-        };
-        view.events = view.in_the_order_of_the_log().collect();
-        // Stable: events of one instant keep the order of the journal.
-        view.events.sort_by_key(|event| event.time_ns);
-        view.end_ns = view.events.last().map_or(view.from_ns, |last| last.time_ns);
-        for event in &view.events {
-            let of_job = (event.dag, event.job);
-            match (event.what, event.instance()) {
-                (EventKind::Request, _) => {}
-                (_, Some(instance)) => {
-                    let history = view.histories.entry(instance).or_default();
-                    history.note(event, run.lost > 0, view.from_ns);
-                }
-                (EventKind::Due, None) => {
-                    view.due_ns.insert(of_job, event.time_ns);
-                }
-                (EventKind::Signalled | EventKind::Dropped, None) => {}
-                (what, None) if what.is_of_dag() => {}
-                (_, None) => view.jobs.entry(of_job).or_default().note(event),
-            }
-        }
-        view
-    }
-
-    /// Returns the judged events in the order of the journal.
-    fn in_the_order_of_the_log(&self) -> impl Iterator<Item = Event> {
-        let events = self.run.events.iter().copied();
-        events.filter(|event| event.time_ns >= self.from_ns)
-    }
-
-    /// Returns the nominal release of a job; 0 if that of a sporadic one is unknown.
-    fn release_ns(&self, dag: DagId, job: u64) -> u64 {
-        let model = self.run.task_set.dag(dag);
-        match model.is_sporadic() {
-            true => self.due_ns.get(&(dag, job)).copied().unwrap_or(0),
-            false => model.grid_ns(job),
-        }
-    }
-
-    /// Returns the absolute deadline of a job.
-    fn deadline_ns(&self, dag: DagId, job: u64) -> u64 {
-        let relative_ns = self.run.task_set.dag(dag).relative_deadline_ns();
-        self.release_ns(dag, job).saturating_add(relative_ns)
-    }
-}
-
-/// Returns the first instant after which no event is missing.
-fn complete_from_ns(run: &Run) -> u64 {
-    if run.lost == 0 {
-        return 0;
-    }
-    // Ends of turns and due times may be dated before their writing; the others bear the time at
-    // which they were written, so every lost event is older.
-    let is_dated_back = |what| matches!(what, EventKind::Finish | EventKind::Wait | EventKind::Due);
-    let mut events = run.events.iter();
-    let first = events.find(|event| !is_dated_back(event.what));
-    // Other events of that very instant may be lost.
-    first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
-}
-
-impl JobHistory {
-    fn note(&mut self, event: &Event) {
-        let place = match event.what {
-            EventKind::Released => &mut self.released_ns,
-            EventKind::Aborted => &mut self.aborted_ns,
-            EventKind::Missed => &mut self.missed_ns,
-            EventKind::Completed => &mut self.completed_ns,
-            _ => return,
-        };
-        place.get_or_insert(event.time_ns);
-    }
-}
-
-impl History {
-    /// Returns the time when the instance was over: finished, cancelled or ended.
-    fn over_ns(&self) -> Option<u64> {
-        self.finish_ns.or(self.dropped_ns)
-    }
-
-    /// Returns the wait that ended a stretch of execution, if one did.
-    fn wait_after(&self, slice: Slice) -> Option<(u64, Option<u64>)> {
-        let mut waits = self.waits.iter().copied();
-        waits.find(|(from_ns, _)| slice.to_ns == Some(*from_ns))
-    }
-
-    fn note(&mut self, event: &Event, is_lossy: bool, from_ns: u64) {
-        let time_ns = event.time_ns;
-        // A resumption needs no such start: it begins a slice by itself.
-        let is_first = self.slices.is_empty() && self.start_ns.is_none();
-        let ran = matches!(
-            event.what,
-            EventKind::Suspend | EventKind::Wait | EventKind::Finish | EventKind::Ended
-        );
-        if is_lossy && is_first && ran {
-            // Its start is lost: it has run since before the trace.
-            self.begin_slice(event.core, from_ns);
-        }
-        // Any later event of the instance ends the slice; a second one does not move its end.
-        if let Some(slice) = self.slices.last_mut() {
-            slice.to_ns.get_or_insert(time_ns);
-        }
-        if let Some((_, to_ns)) = self.waits.last_mut() {
-            to_ns.get_or_insert(time_ns);
-        }
-        let place = match event.what {
-            EventKind::Ready => &mut self.ready_ns,
-            EventKind::Start => &mut self.start_ns,
-            EventKind::Finish => &mut self.finish_ns,
-            EventKind::Cancelled | EventKind::Ended => &mut self.dropped_ns,
-            _ => &mut None,
-        };
-        place.get_or_insert(time_ns);
-        self.suspensions += u64::from(event.what == EventKind::Suspend);
-        if event.what == EventKind::Wait {
-            self.waits.push((time_ns, None));
-        }
-        if matches!(event.what, EventKind::Start | EventKind::Resume) {
-            self.begin_slice(event.core, time_ns);
-        }
-    }
-
-    fn begin_slice(&mut self, core: CoreId, from_ns: u64) {
-        self.slices.push(Slice {
-            core,
-            from_ns,
-            to_ns: None,
-        });
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -55,11 +55,8 @@ fn a_crash_leaves_what_shows_its_job_on_the_host() {
     let bytes = fs::read(file).expect("the file that is named");
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(recording.is_cut() && recording.lost() == 0);
-    let roles = recording
-        .header()
-        .channels
-        .iter()
-        .map(|channel| channel.role);
+    let roles = recording.header().channels.iter();
+    let roles = roles.map(|channel| channel.role);
     let roles: Vec<Role> = roles.collect();
     // No results.
     assert_eq!(roles, [Role::Source, Role::State, Role::State]);

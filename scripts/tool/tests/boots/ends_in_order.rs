@@ -8,9 +8,9 @@ use std::process::{Child, Stdio};
 
 use end_signals::EndSignals;
 use sched_dag::journal::EventKind;
-use tool::protocol::Transcript;
-use tool::record::Record;
 use tool::system::workspace;
+use views::protocol::Transcript;
+use views::record::Record;
 
 use crate::support::{call, command, folder, succeed};
 

@@ -7,6 +7,7 @@ mod debugger;
 mod ends_in_order;
 mod images;
 mod keeps;
+mod live_page;
 mod prove;
 #[path = "../support/mod.rs"]
 mod support;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use tool::json::{self, Value};
+use views::json::{self, Value};
 
 use crate::support::{Called, call, folder};
 

@@ -96,7 +96,7 @@ run --dag good.dag --jobs 0 | `--jobs 0` has no end, which is for fork-join; wit
 run --dag good.dag --execution most | `--execution`: `most`: give wcet, uniform:
 run --dag good.dag --unit 1 | `--unit`: `1` has no unit
 run --dag good.dag --graph g | `--graph g` is for a set of task graphs
-run --dag set --dot dags.dot | run: `--dot` is for one file; name one with `--dag`
+run --dag set --trace run.rec | run: `--trace` is for one file; name one with `--dag`
 run --dag set --console | run: `--console` is for one file; name one with `--dag`
 run --dag set --print-dag | run: `--print-dag` is for one file; name one with `--dag`";
     assert_refused(&folder, rows);

@@ -32,9 +32,8 @@ fn an_image_is_told_from_other_files() {
     assert_eq!(stripped_bytes(&image[..100]).map(drop), cut);
     assert!(loaded(b"#!/bin/sh".to_vec()).is_err());
     let mut owners = image.windows(4);
-    let note = owners
-        .position(|bytes| bytes == b"Xen\0")
-        .expect("an image");
+    let note = owners.position(|bytes| bytes == b"Xen\0");
+    let note = note.expect("an image");
     image[note] = b'x';
     assert!(check_bootable(&image).unwrap_err().contains("PVH note"));
 }

@@ -25,9 +25,9 @@ fn no_input_and_no_other_output_is_overwritten() {
     let rows = "
 run --mode deterministic --dag f.dag --trace f.dag | run: `--dag f.dag` and `--trace f.dag` are one file, which would be overwritten; name another
 run --mode deterministic --dag f.dag --serial h.log | run: `--dag f.dag` and `--serial h.log` are one file, which would be overwritten; name another
-run --mode deterministic --dag f.dag --dot ./f.dag | run: `--dag f.dag` and `--dot ./f.dag` are one file, which would be overwritten; name another
+run --mode deterministic --dag f.dag --keep ./f.dag | run: `--dag f.dag` and `--keep ./f.dag` are one file, which would be overwritten; name another
 run --mode deterministic --image f.dag --trace f.dag | run: `--image f.dag` and `--trace f.dag` are one file, which would be overwritten; name another
-run --mode deterministic --serial new --dot new | run: `--serial new` and `--dot new` are one file, which would be overwritten; name another
+run --mode deterministic --serial new --keep new | run: `--serial new` and `--keep new` are one file, which would be overwritten; name another
 trace f.dag -o f.dag | trace: `f.dag` and `--out f.dag` are one file, which would be overwritten; name another
 check-trace f.dag ./f.dag | are one file; give it once";
     assert_refused(&folder, rows);
@@ -39,7 +39,7 @@ check-trace f.dag ./f.dag | are one file; give it once";
 #[test]
 fn a_refused_command_empties_no_file() {
     let folder = folder("emptied");
-    let files = ["old.log", "old.dot"];
+    let files = ["old.log", "old.rec"];
     for name in files {
         fs::write(folder.join(name), "kept").expect("a file");
     }
@@ -47,7 +47,7 @@ fn a_refused_command_empties_no_file() {
     for line in [
         "run --trace old.log --dag bad.dag",
         "run --serial old.log --app none",
-        "run --serial old.log --dot old.dot --image bad.dag",
+        "run --serial old.log --keep old.rec --image bad.dag",
         "run --serial old.log --qemu /none",
         "trace bad.dag -o old.log",
     ] {
@@ -70,8 +70,8 @@ fn what_is_no_file_or_not_the_right_one_is_2_before_the_work() {
     let rows = "
 run --serial file/x | name another
 run --trace none/x | name another
-run --dot file/x | `--dot file/x`: cannot be written: 
-run --dot file/x | name another
+run --keep file/x | `--keep file/x`: cannot be written: 
+run --keep file/x | name another
 run --dag /dev/zero | it is a device or a pipe
 run --dag pipe | it is a device or a pipe
 run --dag none | none: cannot be read
@@ -83,7 +83,7 @@ run --image sub.json | `--image sub.json`: cannot be read:
 run --image none | `--image none`: cannot be read: 
 run --serial /dev/full | it is a device or a pipe
 run --trace pipe | it is a named pipe
-run --dot pipe | it is a named pipe
+run --keep pipe | it is a named pipe
 check-trace sub.json | it is a folder
 check-trace /dev/zero | it is a device or a pipe
 trace pipe | it is a device or a pipe";

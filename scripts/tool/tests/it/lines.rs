@@ -15,7 +15,7 @@ use crate::support::{
 };
 
 /// Every command, by the words that name it.
-const COMMANDS: &str = "run, boot, new-app, check-trace, trace, recording";
+const COMMANDS: &str = "run, boot, new-app, check-trace, trace, page, recording";
 
 #[test]
 fn every_command_explains_itself_and_names_an_unknown_option() {

@@ -4,12 +4,14 @@
 mod dag_files;
 mod elf;
 mod files;
+mod in_chromium;
 mod lines;
 mod links;
-#[path = "../../src/record/tests/made.rs"]
+#[path = "../../../views/src/record/tests/made.rs"]
 #[allow(dead_code, reason = "each program uses a part of this")]
 mod made;
 mod on_linux;
+mod page;
 mod recordings;
 #[path = "../support/mod.rs"]
 mod support;

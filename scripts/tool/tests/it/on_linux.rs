@@ -7,9 +7,9 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::{call, folder, succeed};
-use tool::protocol::{MachineLine, Transcript};
-use tool::record::Record;
 use tool::system::workspace;
+use views::protocol::{MachineLine, Transcript};
+use views::record::Record;
 
 /// Returns the numbers of machine lines of kind `fork_join`, one row a line.
 fn fork_joins<const N: usize>(said: &str, members: [&str; N]) -> Vec<[Option<u64>; N]> {
@@ -62,14 +62,11 @@ fn a_dag_file_is_run_and_drawn_with_its_cores_divided_as_on_the_machine() {
             format!("dag {name} period 20ms{cluster}\nsubtask a wcet 12ms\nsubtask b wcet 1ms\n")
         });
         fs::write(folder.join("divided.dag"), dags.concat() + "end\n").expect("a file of ours");
-        let run = "run --on linux --jobs 5 --occupy hold --dag divided.dag --trace trace.rec --dot \
-                   drawn.dot";
+        let run = "run --on linux --jobs 5 --occupy hold --dag divided.dag --trace trace.rec";
         let said = succeed(&folder, &format!("{run} {words}"));
         let transcript = Transcript::read(&said);
         assert_eq!(transcript.of_kind("dag_run").count(), 2, "{said}");
         assert_eq!(transcript.of_kind("verdict").count(), 1, "{said}");
-        let drawn = fs::read_to_string(folder.join("drawn.dot")).expect("it was written");
-        assert!(drawn.starts_with("digraph"), "{drawn}");
         let written = fs::read(folder.join("trace.rec")).expect("it was written");
         let record = Record::read(&written).expect("it is whole");
         let clusters = &record.commits[0].told.clusters[..];

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use recording::CommittedTopic;
-use tool::protocol::{MachineLine, read_line};
+use views::protocol::{MachineLine, read_line};
+use views::record::Record;
 
 use crate::made::{commit, record_of};
 use crate::support::{assert_refused, call, folder, succeed};
@@ -97,7 +98,40 @@ check-trace --bound-us x y | `--bound-us x`: must be a number
 trace | which file
 trace none | none: cannot be read
 trace good.rec -o none/file | `--out none/file`
-trace good.rec --run 3 | has no such run; its runs are 0";
+trace good.rec --run 3 | has no such run; its runs are 0
+trace good.rec --svg --from 5 | `--from`: `5` has no unit
+trace good.rec --svg --dags X | the run has no dag `X`; there are `x`; did you mean `x`?";
+    assert_refused(&folder, rows);
+}
+
+/// As a copy of a record that still grows is, or that of a tool that was killed.
+#[test]
+fn of_a_record_that_is_cut_the_whole_part_is_read_and_a_wrong_one_is_refused() {
+    let good = good();
+    let dies = |end: &usize| {
+        let record = Record::read(&good[..*end]).expect("it only ends too early");
+        record.runs.first().is_some_and(|run| !run.complete)
+    };
+    let end = (100..good.len()).rev().find(dies);
+    let end = end.expect("behind the events");
+    let mut wrong = good.clone();
+    wrong[end / 2] ^= 1;
+    let folder = traces("cut", &[("cut.rec", &good[..end]), ("wrong.rec", &wrong)]);
+    let said = succeed(&folder, "check-trace cut.rec");
+    let ends = "  the record ends before the run: only what came until then is judged\n";
+    assert!(said.contains(ends), "{said}");
+    for words in ["trace cut.rec", "trace cut.rec --svg"] {
+        let drawn = call(&folder, words.split(' '));
+        let said = "cut.rec: the record ends before the run\n";
+        assert_eq!((drawn.code, drawn.complaint.as_str()), (Some(0), said));
+    }
+    let shown = succeed(&folder, "recording cut.rec");
+    let ends = "incomplete: it says nothing of what came after";
+    assert!(shown.contains(ends), "{shown}");
+    let rows = "
+check-trace wrong.rec | wrong.rec: at byte
+trace wrong.rec | wrong.rec: at byte
+recording wrong.rec | wrong.rec: at byte";
     assert_refused(&folder, rows);
 }
 
@@ -105,7 +139,7 @@ trace good.rec --run 3 | has no such run; its runs are 0";
 fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
     let folder = traces("drawn", &[]);
     let drawn = succeed(&folder, "trace good.rec");
-    let value = tool::json::parse(&drawn).expect("JSON");
+    let value = views::json::parse(&drawn).expect("JSON");
     let events = value.get("traceEvents").expect("events");
     assert!(events.elements().len() > 10, "{drawn}");
     let called = call(&folder, ["trace", "good.rec", "-o", "out.json"]);
@@ -113,6 +147,8 @@ fn a_trace_is_drawn_to_a_file_or_to_standard_output() {
     assert_eq!((called.code, called.complaint.as_str()), (Some(0), hint));
     let written = fs::read_to_string(folder.join("out.json"));
     assert_eq!(written.expect("written"), drawn);
+    let picture = succeed(&folder, "trace good.rec --svg --to 5ms --dags x");
+    assert!(picture.starts_with("<svg"), "{picture}");
 }
 
 /// `eye`, of period 100, is sampled by `arm`, of period 40. The eye's value of 0 is there at 20;

@@ -273,10 +273,8 @@ mod tests {
             below,
             [[left, top], [right, top]].map(|[x, y]| [x, y + picture::STEP.1])
         );
-        assert_eq!(
-            beside,
-            [[left, top], [right, top]].map(|[x, y]| [x + picture::STEP.0, y])
-        );
+        let expected = [[left, top], [right, top]].map(|[x, y]| [x + picture::STEP.0, y]);
+        assert_eq!(beside, expected);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use super::methods::METHODS;
 use super::sets::Deadlines;
 use super::{PERCENTS, Point};
-use tool::svg::Svg;
+use views::svg::Svg;
 
 /// The size of a panel's field of curves.
 pub(super) const FIELD: (u64, u64) = (224, 180);

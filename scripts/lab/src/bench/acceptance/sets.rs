@@ -52,9 +52,8 @@ pub(super) fn draw(
         let graphs: Vec<Task> = (0..cores.max(8)).map(|_| graph(random)).collect();
         for _ in 0..TRIES {
             // The distances of random points are uniform among all that have this sum.
-            let mut points: Vec<u64> = (1..graphs.len())
-                .map(|_| random.within(0..=whole))
-                .collect();
+            let points = (1..graphs.len()).map(|_| random.within(0..=whole));
+            let mut points: Vec<u64> = points.collect();
             points.extend([0, whole]);
             points.sort_unstable();
             let shares = points.windows(2).map(|pair| pair[1] - pair[0]);

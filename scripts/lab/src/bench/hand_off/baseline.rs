@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 
 use crate::bench::frame::Figure;
 use crate::golden::Golden;
-use tool::json::{self, Object};
 use tool::output::Table;
 use tool::qemu::Mode;
 use tool::system;
+use views::json::{self, Object};
 
 /// The path of the baseline, relative to the workspace's root.
 const BASELINE: &str = "tests/baselines/hand-off.json";
@@ -97,10 +97,8 @@ pub(super) fn golden(before: &[Figure], now: &[Figure], list: Option<&Path>) -> 
 
 /// Returns a baseline's text, one line for each figure.
 pub(super) fn text(figures: &[Figure]) -> String {
-    let lines: Vec<String> = figures
-        .iter()
-        .map(|figure| figure.json(Object::new()))
-        .collect();
+    let lines = figures.iter().map(|figure| figure.json(Object::new()));
+    let lines: Vec<String> = lines.collect();
     let lines = lines.join(",\n");
     format!("{{\"counts\":\"instructions\",\"figures\":[\n{lines}\n]}}\n")
 }

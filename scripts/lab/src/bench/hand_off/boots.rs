@@ -11,10 +11,10 @@ use std::time::Duration;
 
 use crate::bench::frame::{Figure, judged};
 use tool::image;
-use tool::json::Object;
 use tool::outcome::boot;
 use tool::output::Table;
 use tool::qemu::{Mode, Qemu};
+use views::json::Object;
 
 /// The limit of a boot in wall time.
 pub(super) const LIMIT: Duration = Duration::from_secs(300);
@@ -170,9 +170,8 @@ pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
         Boot::new(Kind::Figures, 1, subtasks, words)
     })?;
     let by_clusters = count(&[1, 2, 4, 8, 16], &|clusters| {
-        let sizes: Vec<String> = (0..clusters)
-            .map(|_| CORES_OF_A_CLUSTER.to_string())
-            .collect();
+        let sizes = (0..clusters).map(|_| CORES_OF_A_CLUSTER.to_string());
+        let sizes: Vec<String> = sizes.collect();
         let words = format!("test=cluster_scale jobs=200 clusters={}", sizes.join(","));
         let (cores, subtasks) = (clusters * CORES_OF_A_CLUSTER, clusters * OF_A_CLUSTER);
         Boot::new(Kind::Divided, cores, subtasks, words)

@@ -14,7 +14,8 @@ use super::boots::{Boot, Kind, LIMIT};
 use crate::bench::code::{self, Frames};
 use tool::places::Frame;
 use tool::qemu::{Ending, Mode};
-use tool::{files, protocol::Status, system};
+use tool::{files, system};
+use views::protocol::Status;
 
 /// Boots, prints how many instructions each file contributes to a hop, and writes all of them to a
 /// file.
@@ -110,10 +111,8 @@ fn the_call(calls: &Frames) -> Result<u64, String> {
 fn usual_hop(executed: &[u64], call: u64) -> Option<&[u64]> {
     let calls = (0..executed.len()).filter(|&at| executed[at] == call);
     let calls: Vec<usize> = calls.collect();
-    let hops: Vec<&[u64]> = calls
-        .windows(2)
-        .map(|pair| &executed[pair[0]..pair[1]])
-        .collect();
+    let hops = calls.windows(2).map(|pair| &executed[pair[0]..pair[1]]);
+    let hops: Vec<&[u64]> = hops.collect();
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
     for hop in &hops {
         *counts.entry(hop.len()).or_default() += 1;

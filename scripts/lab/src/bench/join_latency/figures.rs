@@ -14,9 +14,10 @@ use join_latency::{Joined, Samples, Span};
 use sched_dag::law::Distribution;
 
 use super::{Condition, Setting};
-use tool::json::{Object, Value};
-use tool::output::{Table, shown};
-use tool::protocol::Transcript;
+use tool::output::Table;
+use views::json::{Object, Value};
+use views::protocol::Transcript;
+use views::units::shown;
 
 /// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, N + 1 is the join.
 const COLUMNS: &str = "what,subtask,index,ready_ns,start_ns,finish_ns,joined_indices";
@@ -266,9 +267,8 @@ pub(super) fn summary_json(setting: &Setting<'_>, measured: &MeasuredConditions)
 }
 
 fn result_json(condition: Condition, figures: &ConditionFigures) -> String {
-    let mut result = Object::new()
-        .text("policy", &condition.policy.to_string())
-        .number("subtasks", condition.subtasks as u64);
+    let result = Object::new().text("policy", &condition.policy.to_string());
+    let mut result = result.number("subtasks", condition.subtasks as u64);
     for (name, count) in COUNTS.iter().zip(figures.counts) {
         result = result.number(name, count as u64);
     }

@@ -49,9 +49,8 @@ pub(super) fn join(jobs: u64) -> Result<Vec<NativeRow>, String> {
         }
     }
     if joins.is_empty() {
-        return Err(format!(
-            "{WORKLOAD}: no join was across cores; give the workers processors of their own"
-        ));
+        let remedy = "give the workers processors of their own";
+        return Err(format!("{WORKLOAD}: no join was across cores; {remedy}"));
     }
     let row = |what, samples| {
         (
@@ -167,8 +166,9 @@ pub(super) fn clusters(
         }
         let name = graph.name;
         if samples.iter().any(Vec::is_empty) {
+            let remedy = "ask for more rounds";
             return Err(format!(
-                "{name}: the two clusters never ran at one time; ask for more rounds"
+                "{name}: the two clusters never ran at one time; {remedy}"
             ));
         }
         let per = WINDOW as u64 * jobs_a_round(graph) * graph.instances() as u64;

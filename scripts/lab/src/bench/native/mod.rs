@@ -27,10 +27,10 @@ use sched_dag::DagId;
 use text::quoted;
 
 use super::frame::{Figure, by_plan};
-use tool::json::Object;
 use tool::options::{Command, Parsed, Takes, options};
 use tool::output::Table;
 use tool::progress::Progress;
+use views::json::Object;
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench native",
@@ -88,9 +88,8 @@ impl NativePlan {
         options.check_distinct(&[name::ONLY])?;
         let names = MeasuredGraph::ALL.iter().map(|graph| graph.name);
         let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
-        let chosen = options
-            .text(name::ONLY)
-            .map(|names| names.split(',').collect());
+        let chosen = options.text(name::ONLY);
+        let chosen = chosen.map(|names| names.split(',').collect());
         let wanted: Vec<&str> = chosen.unwrap_or_else(|| known.clone());
         if let Some(name) = wanted.iter().find(|name| !known.contains(name)) {
             let (name, known) = (quoted(name), known.join(", "));

@@ -188,10 +188,8 @@ fn read_link(link: &Node, graph: &mut RateGraph, unit_ns: u64) -> Result<(), Mal
 fn node_index(value: &Node, key: &str, graph: &RateGraph) -> Result<usize, Malformed> {
     let id = text(value, key)?;
     graph.position(id).ok_or_else(|| {
-        let reason = format!(
-            "{key}: there is no node {}; add it, or drop the link",
-            quoted(id)
-        );
+        let remedy = "add it, or drop the link";
+        let reason = format!("{key}: there is no node {}; {remedy}", quoted(id));
         malformed(value.line, reason)
     })
 }

@@ -15,8 +15,8 @@ use fass_dag_file::{DagFile, FileDag, FileSubtask, Set, is_name, no_name};
 use sched_dag::{DagSpec, SubtaskSpec};
 use text::{Malformed, quoted, repeated};
 
-use crate::json::{Value, parse_with_places};
 use crate::options::did_you_mean;
+use views::json::{Value, parse_with_places};
 
 /// A task graph.
 struct TaskGraph {
@@ -65,10 +65,8 @@ fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
         let reason = format!("this is no JSON: {}", error.message);
         Malformed { line, reason }
     })?;
-    let graphs = document
-        .get("graphs")
-        .map(Value::elements)
-        .unwrap_or_default();
+    let graphs = document.get("graphs").map(Value::elements);
+    let graphs = graphs.unwrap_or_default();
     if graphs.is_empty() {
         let reason = "the file has no `graphs`; of JSON a task graph set is read, \
                       {\"graphs\":[{\"name\":\"a\",\"c\":[3,4],\"edges\":[[0,1]]}]}; RD-Gen's graphs are \

@@ -292,18 +292,14 @@ fn plain(line: usize, text: &str) -> Result<String, Malformed> {
     }
     let end = closing_quote(text).filter(|end| end + 1 == text.len());
     let Some(end) = end else {
-        let reason = format!(
-            "{}: its quote does not close at the line's end",
-            quoted(text)
-        );
+        let why = "its quote does not close at the line's end";
+        let reason = format!("{}: {why}", quoted(text));
         return Err(malformed(line, reason));
     };
     let inner = &text[1..end];
     if inner.contains('\\') && text.starts_with('"') {
-        let reason = format!(
-            "{}: escapes are not read; write the character",
-            quoted(text)
-        );
+        let remedy = "write the character";
+        let reason = format!("{}: escapes are not read; {remedy}", quoted(text));
         return Err(malformed(line, reason));
     }
     Ok(inner.into())

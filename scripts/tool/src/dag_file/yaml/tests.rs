@@ -12,9 +12,8 @@ fn flat(node: &Node) -> String {
             format!("[{}]", items.join(","))
         }
         YamlValue::Mapping(members) => {
-            let members = members
-                .iter()
-                .map(|(key, node)| format!("{key}={}", flat(node)));
+            let members = members.iter();
+            let members = members.map(|(key, node)| format!("{key}={}", flat(node)));
             format!("{{{}}}", members.collect::<Vec<_>>().join(","))
         }
     }
@@ -48,10 +47,8 @@ empty:
          nodes=[{id=`0`,quoted key=`a: b # c`},{id=`1`}],empty=``}"
     );
     assert_eq!(read("---\na: 1\n...\n"), "{a=`1`}");
-    assert_eq!(
-        read("- 1\n- - 2\n  - 3\n-\n  a: b\n"),
-        "[`1`,[`2`,`3`],{a=`b`}]"
-    );
+    let expected = "[`1`,[`2`,`3`],{a=`b`}]";
+    assert_eq!(read("- 1\n- - 2\n  - 3\n-\n  a: b\n"), expected);
     assert_eq!(read("a: it's # no\nb: c#d"), "{a=`it's`,b=`c#d`}");
 }
 

@@ -149,16 +149,12 @@ fn a_record_says_how_strictly_it_is_judged() {
         let record = record_of(&format!("{boot},{rest}\n"), &commit(COMMIT), EVENTS);
         Record::read(&record).unwrap().runs.remove(0).usual_bound_ns
     };
-    assert_eq!(
-        of("pit", "policy=edf mode=deterministic"),
-        COUNTED_TOLERANCE_NS
-    );
+    let expected = COUNTED_TOLERANCE_NS;
+    assert_eq!(of("pit", "policy=edf mode=deterministic"), expected);
     assert_eq!(of("pit", "mode=threads"), REAL_TOLERANCE_NS);
     assert_eq!(of("linux true", "policy=edf"), FIFO_TOLERANCE_NS);
-    assert_eq!(
-        of("linux true", "mechanism=sched_ext"),
-        SCHED_EXT_TOLERANCE_NS
-    );
+    let expected = SCHED_EXT_TOLERANCE_NS;
+    assert_eq!(of("linux true", "mechanism=sched_ext"), expected);
     assert_eq!(of("linux", "mechanism=fifo"), NORMAL_TOLERANCE_NS);
     assert_eq!(
         Record::read(&good()).unwrap().runs[0].usual_bound_ns,

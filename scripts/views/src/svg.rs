@@ -13,27 +13,21 @@ impl Svg {
     /// Adds text on a line that ends in the middle, begins or ends at a point, as `anchor` says.
     pub fn text(&mut self, (x, y): (u64, u64), anchor: &str, text: &str) {
         let text = text.replace('&', "&amp;").replace('<', "&lt;");
-        let _ = writeln!(
-            self.0,
-            "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>"
-        );
+        let at = format!(r#"x="{x}" y="{y}" text-anchor="{anchor}""#);
+        let _ = writeln!(self.0, "<text {at}>{text}</text>");
     }
 
     /// Adds a box with its left upper corner at a point.
     pub fn rect(&mut self, (x, y): (u64, u64), (width, height): (u64, u64), fill: &str) {
-        let _ = writeln!(
-            self.0,
-            "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"3\" \
-             fill=\"{fill}\" stroke=\"#333333\"/>"
-        );
+        let at = format!(r#"x="{x}" y="{y}" width="{width}" height="{height}""#);
+        let style = format!("rx=\"3\" fill=\"{fill}\" stroke=\"#333333\"");
+        let _ = writeln!(self.0, "<rect {at} {style}/>");
     }
 
     /// Adds a line with attributes.
     pub fn line(&mut self, (x1, y1): (u64, u64), (x2, y2): (u64, u64), style: &str) {
-        let _ = writeln!(
-            self.0,
-            "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" {style}/>"
-        );
+        let ends = format!(r#"x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}""#);
+        let _ = writeln!(self.0, "<line {ends} {style}/>");
     }
 
     /// Adds a path in SVG's own words, with attributes.

@@ -16,7 +16,7 @@ use crate::record::Run;
 const BOUND_NS: u64 = 5;
 
 /// Makes a run of a commit, and of events in the order of time.
-pub(super) fn run_of(commit: &str, events: &str) -> Run {
+pub(crate) fn run_of(commit: &str, events: &str) -> Run {
     let record = record_of("", &made::commit(commit), "");
     let mut run = Record::read(&record).unwrap().runs.remove(0);
     run.events = lines_of(events).into_iter().map(event).collect();

@@ -11,6 +11,41 @@ use recording::{Commit, CommittedDag, CommittedSubtask, Entry, EntryKind, Header
 use sched_dag::journal::{Event, EventSubject};
 use sched_dag::{CoreId, DagId, SubtaskId};
 
+/// A commit, and the events of its run: a diamond of DAG `a`, `s` before `l` and `r` before `j`, above
+/// `b`, on two cores. In job 0, `b` preempts `r`, which goes on later; job 1 begins before job 0 is
+/// complete, and has not ended when the record ends.
+pub(crate) const DIAMOND: [&str; 2] = [
+    "static 2
+a T=1000 D=1500 O=0 flight=2: s/2 l/2 r/2 j/2; 0>1 0>2 1>3 2>3
+b T=5000 D=100 O=150: x/1",
+    "
+0 released c0 0.0
+1 ready c0 0.0.0
+2 start c0 0.0.0
+90 finish c0 0.0.0
+92 start c0 0.0.1
+93 start c1 0.0.2
+150 released c0 1.0
+152 suspend c1 0.0.2
+152 start c1 1.0.0
+251 missed c0 1.0
+300 finish c1 1.0.0
+300 completed c1 1.0
+300 resume c1 0.0.2
+400 finish c0 0.0.1
+900 skipped c0 1.1
+1000 released c0 0.1
+1001 start c0 0.1.0
+1100 finish c1 0.0.2
+1102 start c1 0.0.3
+1200 finish c1 0.0.3
+1200 completed c1 0.0
+1300 finish c0 0.1.0
+1300 start c0 0.1.1
+1301 start c1 0.1.2
+2501 missed c0 0.1",
+];
+
 /// Returns the lines that are not empty.
 pub(crate) fn lines_of(text: &str) -> Vec<&str> {
     let lines = text.lines().map(str::trim);

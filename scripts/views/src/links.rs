@@ -22,9 +22,11 @@ use sched_dag::journal::Event;
 use sched_dag::law::Distribution;
 use sched_dag::{CoreDivision, CoreId, DagId, DagSpec, Instance, SubtaskId};
 
-use super::{View, complete_from_ns, distribution, object, shown_ns};
+use crate::findings::{distribution, object};
 use crate::json::{Object, quoted};
 use crate::record::{Heard, Hop, Link, Machine, Record, Run, merged, task_set};
+use crate::units::shown;
+use crate::view::{View, complete_from_ns};
 
 type Records = [(String, Record)];
 
@@ -33,7 +35,7 @@ type Records = [(String, Record)];
 /// # Errors
 ///
 /// In words: what stands in the way.
-pub(super) fn join(records: &Records) -> Result<Option<Run>, String> {
+pub fn join(records: &Records) -> Result<Option<Run>, String> {
     if records.len() < 2 || records.iter().all(|(_, record)| record.heard.is_empty()) {
         return Ok(None);
     }
@@ -66,9 +68,8 @@ pub(super) fn join(records: &Records) -> Result<Option<Run>, String> {
         }
     }
     links.sort_by_key(|link| link.edge);
-    let ends = records
-        .iter()
-        .filter_map(|(_, of)| of.runs[0].events.last());
+    let ends = records.iter();
+    let ends = ends.filter_map(|(_, of)| of.runs[0].events.last());
     let longest_ns = ends.map(|event| event.time_ns).max().unwrap_or(0);
     set_clocks(&mut machines, &links, (longest_ns / DRIFT).into())?;
     for link in &mut links {
@@ -239,21 +240,19 @@ fn judge(link: &mut Link, view: &View<'_>, machines: &[Machine]) {
 }
 
 /// Returns the senders and receivers of all messages, or of those over which bounds hold.
-pub(super) fn messages(run: &Run, with_late: bool) -> impl Iterator<Item = (Instance, Instance)> {
+pub fn messages(run: &Run, with_late: bool) -> impl Iterator<Item = (Instance, Instance)> {
     run.links.iter().flat_map(move |link| {
         let hops = link.heard.hops.iter();
         let hops = hops.filter(move |(job, _)| with_late || !link.late.contains(job));
         hops.map(|(job, hop)| {
-            (
-                instance(link.edge.writer, hop.job),
-                instance(link.edge.reader, *job),
-            )
+            let writer = instance(link.edge.writer, hop.job);
+            (writer, instance(link.edge.reader, *job))
         })
     })
 }
 
 /// Returns who has got whose value, by samples and by messages.
-pub(super) fn sampled(run: &Run, with_late: bool, events: &[Event]) -> SampledJobs {
+pub fn sampled(run: &Run, with_late: bool, events: &[Event]) -> SampledJobs {
     let mut sampled = SampledJobs::new(&run.samplings, events.iter().copied());
     messages(run, with_late).for_each(|(writer, reader)| sampled.add(reader, writer));
     sampled
@@ -261,7 +260,7 @@ pub(super) fn sampled(run: &Run, with_late: bool, events: &[Event]) -> SampledJo
 
 /// Returns the links of a chain with their stated delays, and by how much messages may have exceeded
 /// these unnoticed.
-pub(super) fn of_chain(run: &Run, chain: &Chain) -> (Vec<(SampledEdge, u64)>, u64) {
+pub fn of_chain(run: &Run, chain: &Chain) -> (Vec<(SampledEdge, u64)>, u64) {
     let link = |edge| run.links.iter().find(|link| link.edge == edge);
     let over: Vec<&Link> = chain.edges().filter_map(link).collect();
     let stated = over.iter().map(|link| (link.edge, link.stated_ns()));
@@ -270,7 +269,7 @@ pub(super) fn of_chain(run: &Run, chain: &Chain) -> (Vec<(SampledEdge, u64)>, u6
 }
 
 /// Returns the text about links for people, and their machine lines.
-pub(super) fn told(files: &str, run: &Run) -> (String, Vec<String>) {
+pub fn told(files: &str, run: &Run) -> (String, Vec<String>) {
     let mut text = format!("{files}: read as one, by the hops of messages\n");
     let mut lines = Vec::new();
     for link in &run.links {
@@ -279,7 +278,7 @@ pub(super) fn told(files: &str, run: &Run) -> (String, Vec<String>) {
         let names = way.iter().flat_map(|way| way.names(&run.task_set));
         let names: Vec<String> = names.map(|name| name.to_string()).collect();
         let unknown = || "unknown: messages go one way".into();
-        let wrong = link.wrong_ns.map_or_else(unknown, shown_ns);
+        let wrong = link.wrong_ns.map_or_else(unknown, shown);
         let (topic, ahead_ns, stated_ns) = (&link.heard.topic, link.ahead_ns, link.stated_ns());
         let (exceeded, lost) = (link.exceeded, link.lost);
         // Writing into a `String` cannot fail.
@@ -291,7 +290,7 @@ pub(super) fn told(files: &str, run: &Run) -> (String, Vec<String>) {
     clock of the receiver         {ahead_ns} ns ahead, +- {wrong}",
             names.join(" > "),
             distribution(&link.delays),
-            shown_ns(stated_ns)
+            shown(stated_ns)
         );
         let line = Object::new()
             .text("kind", "link")

@@ -72,14 +72,6 @@ impl Value {
         }
     }
 
-    /// Returns the truth value, if this is one.
-    pub fn as_bool(&self) -> Option<bool> {
-        match self {
-            Value::Bool(truth) => Some(*truth),
-            _ => None,
-        }
-    }
-
     /// Returns the elements of an array; nothing if this is not an array.
     pub fn elements(&self) -> &[Value] {
         match self {
@@ -111,7 +103,7 @@ impl fmt::Display for JsonError {
 /// The first place at which `text` departs from the rules above.
 ///
 /// ```
-/// let line = tool::json::parse(r#"{"kind":"progress","done":120}"#).unwrap();
+/// let line = views::json::parse(r#"{"kind":"progress","done":120}"#).unwrap();
 /// assert_eq!(line.get("done").and_then(|done| done.as_u64()), Some(120));
 /// ```
 pub fn parse(text: &str) -> Result<Value, JsonError> {
@@ -465,7 +457,7 @@ impl Object {
 /// Returns text as a JSON string (RFC 8259, section 7).
 ///
 /// ```
-/// assert_eq!(tool::json::quoted("a \"b\"\n"), r#""a \"b\"\u000a""#);
+/// assert_eq!(views::json::quoted("a \"b\"\n"), r#""a \"b\"\u000a""#);
 /// ```
 pub fn quoted(text: &str) -> String {
     recording::Part::Text(text).to_string()
@@ -490,8 +482,8 @@ mod tests {
         assert_eq!(numbers[3], Value::Decimal(1500.0));
         assert_eq!(value.get("b"), Some(&Value::Object(vec![])));
         assert_eq!(value.get("c").unwrap().as_text(), Some("x"));
-        assert_eq!(value.get("d").unwrap().as_bool(), Some(true));
-        assert_eq!(value.get("e").unwrap().as_bool(), Some(false));
+        assert_eq!(value.get("d"), Some(&Value::Bool(true)));
+        assert_eq!(value.get("e"), Some(&Value::Bool(false)));
         assert_eq!(value.get("f"), Some(&Value::Null));
         assert!(value.get("g").unwrap().elements().is_empty());
         assert_eq!(value.get("z"), None);
@@ -553,10 +545,8 @@ nul | 1
         assert_eq!(refused(r#"{"b":1,"a":1,"b":2,"a":2}"#).0, 14);
         let long = format!("\\u001b{}", "k".repeat(5000));
         let (_, message) = refused(&format!(r#"{{"{long}":1,"{long}":2}}"#));
-        assert!(
-            message.len() < 100 && message.contains("\\u{1b}"),
-            "{message}"
-        );
+        let is_told = message.len() < 100 && message.contains("\\u{1b}");
+        assert!(is_told, "{message}");
     }
 
     #[test]
@@ -591,11 +581,8 @@ nul | 1
     #[test]
     fn what_is_written_is_read_back() {
         let inner = Object::new().text("b", "é\u{1}\"\\").into_text();
-        let text = Object::new()
-            .number("a", u64::MAX)
-            .json("c", &inner)
-            .json("d", "[null,true]")
-            .into_text();
+        let text = Object::new().number("a", u64::MAX).json("c", &inner);
+        let text = text.json("d", "[null,true]").into_text();
         let value = parse(&text).expect("valid JSON");
         assert_eq!(value.get("a").and_then(Value::as_u64), Some(u64::MAX));
         let text = value.at(&["c", "b"]).and_then(Value::as_text);

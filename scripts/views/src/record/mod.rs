@@ -20,8 +20,9 @@ use sched_dag::{
     SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
+use text::MOST_CORES;
+
 use crate::protocol::{MachineLine, Transcript, read_line};
-use crate::qemu::{MOST_CORES, Mode};
 
 // The longest time for which an instance may wait for a core that the rules owe it: a decision takes
 // effect only after an interrupt, and where a run's time is real, the host may do something else
@@ -185,9 +186,8 @@ impl Record {
                     let run = record.runs.len();
                     let add = |committed| open.add(&events, committed);
                     let added = record.commits.last().ok_or("no commit is before it".into());
-                    added
-                        .and_then(add)
-                        .map_err(|why| format!("events of run {run}: {why}"))?;
+                    let added = added.and_then(add);
+                    added.map_err(|why| format!("events of run {run}: {why}"))?;
                 }
                 Chunk::Times(times) => {
                     // The times come last: they end the run whose events came before.
@@ -207,10 +207,8 @@ impl Record {
         // Only now, since the line may come in any chunk of text.
         if let Some(boot) = transcript.of_kind("boot").next() {
             let usual_bound_ns = usual_tolerance_ns(boot);
-            record
-                .runs
-                .iter_mut()
-                .for_each(|run| run.usual_bound_ns = usual_bound_ns);
+            let runs = record.runs.iter_mut();
+            runs.for_each(|run| run.usual_bound_ns = usual_bound_ns);
         }
         Ok(record)
     }
@@ -220,10 +218,8 @@ impl Record {
         let Some(committed) = self.commits.last() else {
             return Err(format!("run {number} has no commit before it"));
         };
-        for (cluster, written) in times
-            .iter()
-            .flat_map(|times| times.written.iter().enumerate())
-        {
+        let written = times.iter().flat_map(|times| &times.written);
+        for (cluster, written) in written.enumerate() {
             let taken = open.taken.get(cluster).copied().unwrap_or(0);
             // Events that were written and not sent are lost, too.
             open.lost += written.saturating_sub(taken);
@@ -274,9 +270,8 @@ impl Open {
         let (cluster, task_set) = (usize::from(events.cluster), &committed.task_set);
         let clusters = task_set.clusters().count();
         if cluster >= clusters {
-            return Err(format!(
-                "they are of cluster {cluster}, and there are {clusters}"
-            ));
+            let there = format!("there are {clusters}");
+            return Err(format!("they are of cluster {cluster}, and {there}"));
         }
         self.clusters.resize(clusters, Vec::new());
         self.taken.resize(clusters, 0);
@@ -296,9 +291,8 @@ impl Open {
             let core = CoreId(event.core.0.saturating_add(all.start));
             let dag = task_set.dags().get(event.dag.index());
             let subtasks = dag.map_or(0, |dag| dag.subtasks().len());
-            let is_there = event
-                .subtask
-                .is_none_or(|subtask| subtask.index() < subtasks);
+            let is_known = |subtask: SubtaskId| subtask.index() < subtasks;
+            let is_there = event.subtask.is_none_or(is_known);
             if core.0 >= last || dag.is_none() || !is_there || event.time_ns == u64::MAX {
                 return Err(format!("{event:?} is of nothing that was committed"));
             }
@@ -362,19 +356,18 @@ impl Committed {
     /// The reasons for which a commit would refuse them.
     pub fn new(number: usize, told: Commit) -> Result<Self, String> {
         let in_commit = |why: String| format!("commit {number}: {why}");
-        if !(1..=MOST_CORES).contains(&u64::from(told.cores)) {
+        if !(1..=MOST_CORES).contains(&told.cores) {
+            let possible = format!("1 to {MOST_CORES} are possible");
             return Err(in_commit(format!(
-                "it is for {} cores; 1 to {MOST_CORES} are possible",
+                "it is for {} cores; {possible}",
                 told.cores
             )));
         }
         let known = Policy::WORDS;
         if usize::from(told.policy) >= known.len() {
-            return Err(in_commit(format!(
-                "its policy is number {}; known are {}, from 0 on",
-                told.policy,
-                known.join(", ")
-            )));
+            let (policy, known) = (told.policy, known.join(", "));
+            let why = format!("its policy is number {policy}; known are {known}, from 0 on");
+            return Err(in_commit(why));
         }
         let specs: Result<Vec<_>, String> = told.dags.iter().map(spec).collect();
         let mut specs = specs.map_err(in_commit)?;
@@ -464,10 +457,8 @@ impl Committed {
     /// In words: the first bound that differs.
     pub fn check_bounds(&self) -> Result<(), String> {
         let answer = analysis::answer(&self.task_set, &self.settings());
-        let here = answer
-            .bounds
-            .iter()
-            .map(|bound| bound.map(|bound| bound.bound_ns));
+        let here = answer.bounds.iter();
+        let here = here.map(|bound| bound.map(|bound| bound.bound_ns));
         for (dag, host) in self.told.dags.iter().zip(here) {
             let guest = dag.bound_ns;
             if guest != host {
@@ -570,9 +561,8 @@ fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
             1 => OverrunPolicy::Skip,
             2 => OverrunPolicy::Abort,
             other => {
-                return Err(format!(
-                    "dag `{name}` has overrun policy {other}; 0 to 2 are known"
-                ));
+                let remedy = "0 to 2 are known";
+                return Err(format!("dag `{name}` has overrun policy {other}; {remedy}"));
             }
         },
         on_fault: match dag.survives {
@@ -647,8 +637,8 @@ pub fn tolerance_ns(run: &Run, bound_us: Option<u64>) -> u64 {
 fn usual_tolerance_ns(boot: &MachineLine) -> u64 {
     let words = boot.text_at("command_line").unwrap_or_default();
     let word = |name: &str| words.split(' ').find_map(|word| word.strip_prefix(name));
-    match word("mode=").and_then(Mode::from_name) {
-        Some(Mode::Deterministic) => COUNTED_TOLERANCE_NS,
+    match word("mode=") {
+        Some("deterministic") => COUNTED_TOLERANCE_NS,
         _ if boot.text_at("clock") != Some("linux") => REAL_TOLERANCE_NS,
         // Without preemption an instance waits for others' whole executions.
         _ if !boot.text.contains("\"preemptive\":true") => NORMAL_TOLERANCE_NS,

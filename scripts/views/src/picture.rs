@@ -2,20 +2,22 @@
 //!
 //! At the top stands each graph: a box for each subtask with its WCET, and an arrow for each
 //! edge. Below are the first jobs on a common axis of time: a row for each core with what it
-//! executed, in the colour of its subtask, with arrows of messages between machines, and below that a thin bar for each wait of what has left
-//! the core; then a row for each DAG with the response time of each job, its proven bound and its
-//! deadline.
+//! executed, in the colour of its subtask, with arrows of messages between machines, and a thin bar
+//! below for each wait after that; then a row for each DAG with the response time of each job, its
+//! proven bound and its deadline.
 //!
-//! Coordinates are whole pixels, so that a run whose times differ by less than that has the same
-//! picture, byte by byte. Pages keep such pictures, and tests draw them again.
+//! A [`Window`] says which jobs of which DAGs are drawn. Coordinates are whole pixels, so that a run
+//! whose times differ by less than that has the same picture, byte by byte. Pages keep such pictures,
+//! and tests draw them again.
 
 use std::ops::Range;
 
-use sched_dag::{CoreId, Dag, DagId, SubtaskId};
+use fass_dag_file::time::parse_ns;
+use sched_dag::{CoreId, Dag, DagId, SubtaskId, nearest};
 
-use super::{View, links};
-use crate::record::Run;
+use crate::links;
 use crate::svg::Svg;
+use crate::view::View;
 
 const WIDTH: u64 = 820;
 /// The least width of the rows' names, and where the axis of time begins.
@@ -34,48 +36,93 @@ const COLOURS: [&str; 10] = [
     "#90d5c9", "#e3e3e3",
 ];
 
-/// Draws what the jobs did that were released from one time on and before another.
+/// The part of a run that a person asks for, in the person's words.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Asked<'w> {
+    /// The first time of release, such as `20ms`; else 0, or where machines first hear of each other.
+    pub from: Option<&'w str>,
+    /// The time of release from which on nothing is drawn.
+    pub to: Option<&'w str>,
+    /// The names of the DAGs, with commas between; else all are drawn.
+    pub dags: Option<&'w str>,
+    /// Without `to`: how many times the longest of their periods; else once.
+    pub periods: Option<u64>,
+}
+
+/// The part of a run that a picture shows.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// Jobs that are released then are drawn.
+    pub released_ns: Range<u64>,
+    /// The DAGs.
+    pub dags: Vec<DagId>,
+}
+
+impl Window {
+    /// Finds the part of a run that is asked for.
+    ///
+    /// # Errors
+    ///
+    /// In words: a malformed time, or an unknown DAG.
+    pub fn of(view: &View<'_>, asked: &Asked<'_>) -> Result<Self, String> {
+        let dags = view.run.task_set.dags();
+        let names: Vec<&str> = dags.iter().map(Dag::name).collect();
+        let find = |name: &str| {
+            let mut known = (0..).map(DagId).zip(&names);
+            let found = known.find(|(_, known)| **known == name);
+            found.map(|(dag, _)| dag).ok_or_else(|| {
+                let near = nearest(name, &names);
+                let hint = near.map_or(String::new(), |it| format!("; did you mean `{it}`?"));
+                let there = names.join("`, `");
+                format!("`--dags`: the run has no dag `{name}`; there are `{there}`{hint}")
+            })
+        };
+        let mut drawn: Vec<DagId> = match asked.dags {
+            Some(names) => names.split(',').map(find).collect::<Result<_, _>>()?,
+            None => (0..).map(DagId).take(dags.len()).collect(),
+        };
+        drawn.sort_unstable();
+        drawn.dedup();
+        let time = |name: &str, word: Option<&str>| {
+            let time = word.map(parse_ns).transpose();
+            time.map_err(|why| format!("`--{name}`: {why}"))
+        };
+        let sent = links::messages(view.run, true);
+        let sent_ns = sent.filter_map(|(of, _)| view.jobs.get(&(of.dag, of.job))?.released_ns);
+        let from_ns = time("from", asked.from)?.or(sent_ns.min()).unwrap_or(0);
+        let periods_ns = drawn.iter().map(|dag| dags[dag.index()].period_ns());
+        let longest_ns = periods_ns.max().unwrap_or(0);
+        let span_ns = longest_ns.saturating_mul(asked.periods.unwrap_or(1));
+        let to_ns = time("to", asked.to)?.unwrap_or(from_ns.saturating_add(span_ns));
+        Ok(Self {
+            released_ns: from_ns..to_ns.max(from_ns),
+            dags: drawn,
+        })
+    }
+}
+
+/// Draws what the jobs of a window did.
 ///
 /// # Errors
 ///
 /// In words: no job is left of that time.
-pub fn draw(run: &Run, released_ns: Range<u64>) -> Result<String, String> {
-    let view = View::new(run);
-    let names = run
-        .task_set
-        .dags()
-        .iter()
-        .map(|dag| dag.name().len() as u64);
-    // Those of several machines begin with the machine's.
-    let names = names.filter(|_| !run.machines.is_empty());
-    let mut picture = Picture {
-        view: &view,
-        left: LEFT.max(16 + 8 * names.max().unwrap_or(0)),
-        svg: Svg::default(),
-        end_ns: released_ns.end,
-        released_ns,
-    };
-    let jobs = view
-        .jobs
-        .iter()
-        .filter(|((dag, job), _)| picture.is_drawn(*dag, *job));
+pub fn draw(view: &View<'_>, window: Window) -> Result<String, String> {
+    let mut picture = Picture::new(view, window);
+    let jobs = view.jobs.iter();
+    let jobs = jobs.filter(|((dag, job), _)| picture.is_drawn(*dag, *job));
     let ends = jobs.map(|(_, job)| job.completed_ns.unwrap_or(0));
     let last_ns = ends.max().ok_or_else(|| {
         format!(
             "run {} keeps no job that was released from {} to {}; name another time by `--from`, \
-             or more of it by `--periods` or `--until`",
-            run.number,
-            time(picture.released_ns.start),
-            time(picture.released_ns.end)
+             or more of it by `--periods` or `--to`",
+            view.run.number,
+            time(picture.window.released_ns.start),
+            time(picture.window.released_ns.end)
         )
     })?;
     picture.end_ns = picture.end_ns.max(last_ns);
-    let mut y = 12;
-    for (dag, model) in picture.dags() {
-        y = picture.graph(dag, model, y) + 18;
-    }
-    let axis = y;
-    y = picture.cores(axis);
+    let axis = picture.graphs();
+    let mut y = picture.cores(axis);
     for (dag, model) in picture.dags() {
         y = picture.responses(dag, model, y);
     }
@@ -83,34 +130,57 @@ pub fn draw(run: &Run, released_ns: Range<u64>) -> Result<String, String> {
     Ok(picture.svg.into_text((WIDTH, y + 30)))
 }
 
+/// Draws the graphs of all DAGs alone.
+pub fn graphs(view: &View<'_>) -> String {
+    let window = Window::of(view, &Asked::default()).expect("nothing is asked that could be wrong");
+    let mut picture = Picture::new(view, window);
+    let height = picture.graphs();
+    picture.svg.into_text((picture.right, height))
+}
+
 struct Picture<'v> {
     view: &'v View<'v>,
     svg: Svg,
     left: u64,
-    /// Jobs that are released then are drawn.
-    released_ns: Range<u64>,
+    /// Where the widest graph ends.
+    right: u64,
+    window: Window,
     /// Where the axis of time ends.
     end_ns: u64,
 }
 
 impl<'v> Picture<'v> {
-    fn dags(&self) -> impl Iterator<Item = (DagId, &'v Dag)> + use<'v> {
-        (0..).map(DagId).zip(self.view.run.task_set.dags())
+    fn new(view: &'v View<'v>, window: Window) -> Self {
+        let dags = window.dags.iter().map(|dag| view.run.task_set.dag(*dag));
+        let names = dags.map(|dag| dag.name().len() as u64);
+        // Those of several machines begin with the machine's.
+        let names = names.filter(|_| !view.run.machines.is_empty());
+        Self {
+            view,
+            left: (16 + 8 * names.max().unwrap_or(0)).clamp(LEFT, WIDTH / 2),
+            right: 0,
+            svg: Svg::default(),
+            end_ns: window.released_ns.end,
+            window,
+        }
+    }
+
+    fn dags(&self) -> Vec<(DagId, &'v Dag)> {
+        let model = |dag: &DagId| (*dag, self.view.run.task_set.dag(*dag));
+        self.window.dags.iter().map(model).collect()
     }
 
     fn is_drawn(&self, dag: DagId, job: u64) -> bool {
-        let released_ns = self
-            .view
-            .jobs
-            .get(&(dag, job))
-            .and_then(|job| job.released_ns);
-        released_ns.is_some_and(|at_ns| self.released_ns.contains(&at_ns))
+        let job = self.view.jobs.get(&(dag, job));
+        let released_ns = job.and_then(|job| job.released_ns);
+        self.window.dags.contains(&dag)
+            && released_ns.is_some_and(|at_ns| self.window.released_ns.contains(&at_ns))
     }
 
     /// Where an instant is on the axis.
     fn x(&self, time_ns: u64) -> u64 {
         let pixels = u128::from(WIDTH - self.left - RIGHT);
-        let from_ns = self.released_ns.start;
+        let from_ns = self.window.released_ns.start;
         let span_ns = u128::from((self.end_ns - from_ns).max(1));
         // To the nearest pixel.
         let after_ns = u128::from(time_ns.saturating_sub(from_ns));
@@ -120,9 +190,15 @@ impl<'v> Picture<'v> {
 
     /// The colour of a subtask: the next one for each of all DAGs.
     fn colour(&self, dag: DagId, subtask: SubtaskId) -> &'static str {
-        let before = self.dags().take_while(|&(other, _)| other != dag);
-        let before: usize = before.map(|(_, model)| model.subtasks().len()).sum();
+        let before = &self.view.run.task_set.dags()[..dag.index()];
+        let before: usize = before.iter().map(|model| model.subtasks().len()).sum();
         COLOURS[(before + subtask.0 as usize) % COLOURS.len()]
+    }
+
+    /// Draws all graphs, and returns where they end.
+    fn graphs(&mut self) -> u64 {
+        let dags = self.dags().into_iter();
+        dags.fold(12, |y, (dag, model)| self.graph(dag, model, y) + 18)
     }
 
     /// Draws a DAG from `y` on, by layers: a subtask's is the longest path to it.
@@ -141,6 +217,7 @@ impl<'v> Picture<'v> {
         let waits = model.subtasks().iter().any(|of| of.waiting_ns() > 0);
         let box_height = BOX.1 + if waits { 16 } else { 0 };
         let (width, height) = (BOX.0 + GAP.0, box_height + GAP.1);
+        self.right = self.right.max(self.left + layers.len() as u64 * width);
         let mut corners = vec![(0, 0); model.subtasks().len()];
         for (x, layer) in (0..).zip(&layers) {
             let above = (tallest - layer.len() as u64) * height / 2;
@@ -189,14 +266,19 @@ impl<'v> Picture<'v> {
             }
         }
         for (&instance, history) in &self.view.histories {
-            if !self.is_drawn(instance.dag, instance.job) {
+            if !self.window.dags.contains(&instance.dag) {
                 continue;
             }
             let model = self.view.run.task_set.dag(instance.dag);
             let name = model.subtask(instance.subtask).name();
+            // Also of jobs that were released before or after the others: a core is never shown idle
+            // while it executes.
             for slice in &history.slices {
-                let from = self.x(slice.from_ns.min(self.end_ns));
-                let to = self.x(slice.to_ns.unwrap_or(self.end_ns).min(self.end_ns));
+                let to_ns = slice.to_ns.unwrap_or(self.end_ns).min(self.end_ns);
+                if slice.from_ns >= self.end_ns || to_ns < self.window.released_ns.start {
+                    continue;
+                }
+                let (from, to) = (self.x(slice.from_ns), self.x(to_ns));
                 let (top, width) = (y + u64::from(slice.core.0) * ROW + 3, (to - from).max(1));
                 let colour = self.colour(instance.dag, instance.subtask);
                 self.svg.rect((from, top), (width, ROW - 6), colour);
@@ -258,15 +340,19 @@ impl<'v> Picture<'v> {
             let release_ns = view.due_ns.get(&(dag, job)).copied();
             let release_ns = release_ns.unwrap_or_else(|| model.grid_ns(job));
             let (from, to) = (self.x(release_ns), self.x(completed_ns));
+            let colour = match history.missed_ns {
+                Some(_) => "#f4a6a6",
+                None => "#eeeeee",
+            };
             self.svg
-                .rect((from, y + 8), ((to - from).max(1), 16), "#eeeeee");
-            let response = time(completed_ns - release_ns);
+                .rect((from, y + 8), ((to - from).max(1), 16), colour);
+            let response = time(completed_ns.saturating_sub(release_ns));
             if to - from > LETTER * response.len() as u64 {
                 self.svg
                     .text((from + (to - from) / 2, y + 21), "middle", &response);
             }
             for (row, (after_ns, colour, name)) in (0_u64..).zip(&marks) {
-                let at_ns = release_ns + after_ns;
+                let at_ns = release_ns.saturating_add(*after_ns);
                 if at_ns > self.end_ns {
                     continue;
                 }
@@ -293,11 +379,12 @@ impl<'v> Picture<'v> {
     /// Draws the axis between two heights, with some ten marks.
     fn axis(&mut self, top: u64, bottom: u64) {
         let steps = (0..).flat_map(|power| [1, 2, 5].map(|step| step * 10_u64.pow(power)));
-        let from_ns = self.released_ns.start;
+        let from_ns = self.window.released_ns.start;
         let span_ns = self.end_ns - from_ns;
         let step_ns = steps.take(54).find(|step| span_ns / step <= 12);
         let step_ns = step_ns.unwrap_or(span_ns.max(1));
-        let first_ns = from_ns.next_multiple_of(step_ns);
+        let first_ns = from_ns.checked_next_multiple_of(step_ns);
+        let first_ns = first_ns.unwrap_or(u64::MAX);
         let by = usize::try_from(step_ns).unwrap_or(usize::MAX);
         for time_ns in (first_ns..=self.end_ns).step_by(by) {
             let x = self.x(time_ns);
@@ -325,9 +412,124 @@ fn time(ns: u64) -> String {
     if ns == 0 {
         return "0".into();
     }
-    let tenths = (ns * 10 + unit_ns / 2) / unit_ns;
+    // Of 64 bits there may be no more left.
+    let tenths = (u128::from(ns) * 10 + u128::from(unit_ns / 2)) / u128::from(unit_ns);
     match tenths % 10 {
         0 => format!("{} {unit}", tenths / 10),
         tenth => format!("{}.{tenth} {unit}", tenths / 10),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::findings::tests::run_of;
+    use crate::made::DIAMOND;
+
+    /// Returns how often each of these parts stands in the picture of what is asked for.
+    fn counted<const N: usize>(asked: Asked<'_>, parts: [&str; N]) -> [usize; N] {
+        let run = run_of(DIAMOND[0], DIAMOND[1]);
+        let view = View::new(&run);
+        let window = Window::of(&view, &asked).expect("it is there");
+        let svg = draw(&view, window).expect("it has jobs");
+        parts.map(|part| svg.matches(part).count())
+    }
+
+    #[test]
+    fn a_window_shows_its_jobs_with_their_graphs_executions_and_deadlines() {
+        let parts = [
+            "<rect",
+            "<path",
+            ">core 1<",
+            ">deadline 1.5 us<",
+            ">deadline 100 ns<",
+        ];
+        let whole = Asked {
+            to: Some("1500ns"),
+            ..Asked::default()
+        };
+        // The page, five boxes, five executions in six pieces, three of job 1, two complete jobs;
+        // an arrow for each edge.
+        assert_eq!(counted(whole, parts), [1 + 5 + 6 + 3 + 2, 4, 1, 1, 1]);
+        // There is none, and neither of these is stated.
+        assert_eq!(counted(whole, [">core 2<", "WCET", ">bound"]), [0; 3]);
+        // Without its end it has the longest period, of which job 1 is a part.
+        assert_eq!(counted(Asked::default(), parts), counted(whole, parts));
+        // Of DAG `a` alone once its own one; job 1 only as far as it executes before job 0 ends.
+        let of_a = Asked {
+            dags: Some("a"),
+            ..Asked::default()
+        };
+        assert_eq!(counted(of_a, parts), [1 + 4 + 5 + 1 + 1, 4, 1, 0, 0]);
+        let twice = Asked {
+            periods: Some(2),
+            ..of_a
+        };
+        assert_eq!(counted(twice, parts), [1 + 4 + 5 + 3 + 1, 4, 1, 1, 0]);
+        // From then on: of `a` job 1, which is not complete, and `b`; and what job 0 still executes.
+        let later = Asked {
+            from: Some("1ns"),
+            dags: Some("b,a"),
+            ..whole
+        };
+        assert_eq!(counted(later, parts), [1 + 5 + 3 + 2 + 5, 4, 1, 0, 1]);
+    }
+
+    #[test]
+    fn what_is_not_there_is_named() {
+        let run = run_of(DIAMOND[0], DIAMOND[1]);
+        let view = View::new(&run);
+        let refused = |asked: Asked<'_>| {
+            let window = Window::of(&view, &asked);
+            window.and_then(|window| draw(&view, window)).unwrap_err()
+        };
+        let unknown = refused(Asked {
+            dags: Some("a,A"),
+            ..Asked::default()
+        });
+        let there = "`--dags`: the run has no dag `A`; there are `a`, `b`; did you mean `a`?";
+        assert_eq!(unknown, there);
+        let time = refused(Asked {
+            to: Some("5"),
+            ..Asked::default()
+        });
+        assert!(time.starts_with("`--to`: `5` has no unit"), "{time}");
+        let (from, to) = (
+            Some("18446744073709551614ns"),
+            Some("18446744073709551615ns"),
+        );
+        let none = refused(Asked {
+            from,
+            to,
+            ..Asked::default()
+        });
+        assert!(
+            none.contains("keeps no job that was released from 18446744073.7 s"),
+            "{none}"
+        );
+    }
+
+    #[test]
+    fn a_wait_is_a_thin_bar_and_graphs_stand_alone() {
+        let waits = "
+0 released c0 0.0
+2 start c0 0.0.0
+40 wait c0 0.0.0
+61 resume c1 0.0.0
+70 wait c1 0.0.0
+90 cancelled c0 0.0.0
+1001 start c0 0.1.0
+1010 wait c0 0.1.0";
+        let run = run_of(&format!("{}\nwait 0.0 30\nwait 0.0 20", DIAMOND[0]), waits);
+        let view = View::new(&run);
+        let window = Window::of(&view, &Asked::default()).expect("it is there");
+        let svg = draw(&view, window).expect("it has a job");
+        assert_eq!(svg.matches(">waits 50 ns<").count(), 1, "{svg}");
+        // Job 1 has no release, but executes and waits.
+        assert_eq!(svg.matches(" height=\"4\"").count(), 3, "{svg}");
+        let graphs = graphs(&view);
+        let [boxes, arrows, cores] =
+            ["<rect", "<path", ">core"].map(|it| graphs.matches(it).count());
+        assert_eq!((boxes, arrows, cores), (1 + 5, 4, 0), "{graphs}");
     }
 }
