@@ -5,8 +5,6 @@
 // is found in them by halves, and what is narrower than a pixel is drawn once a pixel: so a frame
 // takes a time by the width of the screen, not by the length of the run.
 
-// Those of the pictures (scripts/views): light enough for dark letters in both themes.
-const COLOURS = "#8ecae6 #ffb703 #b7e4c7 #f4a6a6 #cdb4db #ffe59e #a3b8cc #d9ae94 #90d5c9 #e3e3e3".split(" ");
 const LETTER = 7, AXIS = 20, ROW = 26, HIGH = 18, LANE = 13, MOST_LANES = 6, MOST_HEIGHT = 16_000;
 // The end of a slice, and the bits of a job.
 const FINISHED = 0, PREEMPTED = 1, WAITS = 2, FAULT = 3, MISSED = 1, ABORTED = 2, UNRELEASED = 4, HAS_VALUES = 8;
@@ -141,11 +139,11 @@ function drawAxis() {
 }
 
 function drawCore(core) {
-  const { first_of_core, from, to, subtask, busy, names } = state.shown, last = first_of_core[core + 1];
+  const { first_of_core, from, to, subtask, busy, names, colours } = state.shown, last = first_of_core[core + 1];
   const top = AXIS + core * ROW + 3, after = ns => search(first_of_core[core], last, n => to[n] > ns);
   for (let n = after(view.from), next; n < last && from[n] < view.to; n = next) {
     const left = xOf(from[n]), width = xOf(to[n]) - left;
-    c.fillStyle = COLOURS[subtask[n] % COLOURS.length];
+    c.fillStyle = colours[subtask[n] % colours.length];
     next = n + 1;
     if (width >= 1.5) {
       c.fillRect(left, top, width, HIGH);

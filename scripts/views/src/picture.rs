@@ -30,8 +30,8 @@ const BOX: (u64, u64) = (104, 40);
 const GAP: (u64, u64) = (44, 12);
 /// About how wide a letter is.
 const LETTER: u64 = 7;
-/// Light enough for black letters, and different without colour, too.
-const COLOURS: [&str; 10] = [
+/// The colours of subtasks: light enough for black letters, and different without colour, too.
+pub const COLOURS: [&str; 10] = [
     "#8ecae6", "#ffb703", "#b7e4c7", "#f4a6a6", "#cdb4db", "#ffe59e", "#a3b8cc", "#d9ae94",
     "#90d5c9", "#e3e3e3",
 ];

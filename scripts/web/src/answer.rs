@@ -56,6 +56,7 @@ pub(crate) fn picture(opened: &Opened<'_>, request: &Request<'_>) -> Result<Vec<
         .list("warnings", all_quoted(warnings))
         .list("marks", marks)
         .list("clusters", clusters)
+        .list("colours", picture::COLOURS.map(quoted))
         .list("core_names", cores)
         .list("first_of_core", firsts)
         .list("dags", dags(&view, opened))
