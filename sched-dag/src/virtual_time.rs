@@ -474,7 +474,7 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
         self.now_ns
     }
 
-    fn start(&mut self, _: CoreId, body: &mut B) -> u64 {
+    fn start(&mut self, _: CoreId, body: &mut B, _: u64) -> u64 {
         let execution_ns = self.workload.execute(body, self.now_ns);
         // Nothing can be returned from here; the loop looks at it when the step is over.
         self.begun_ns = execution_ns.ok_or(RunOutcome::Stopped);
@@ -597,7 +597,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         now: &mut VirtualInstant<'_, impl Workload<B>>,
     ) -> Result<(), RunOutcome> {
         let (engine, now_ns) = (&mut self.engine, now.now_ns);
-        match engine.next(core, now) {
+        match engine.next((now_ns, core), now) {
             NextWork::Nothing => Ok(()),
             NextWork::Start(_, body) | NextWork::Proceed(_, body) => {
                 self.run(core, body, now_ns, now.begun_ns)

@@ -267,7 +267,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         body.set_job(job);
         let log = &mut self.scheduler.log;
         let to = body.subject();
-        let start = (EventKind::Start, port.start(core, &mut body), to);
+        let start_ns = port.start(core, &mut body, log.now_ns());
+        let start = (EventKind::Start, start_ns, to);
         // One entry instead of three: the times of finish and ready are the same.
         if IS_UNWRITTEN {
             let finish = (EventKind::Finish, finish_ns, from);
@@ -304,7 +305,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             let (log, subject) = (&mut self.scheduler.log, body.subject());
             let wait = (EventKind::Wait, ended_ns, subject);
             let wake = (EventKind::Wake, log.now_ns(), subject);
-            let resume = (EventKind::Resume, port.proceed(core, &mut body), subject);
+            let resume_ns = port.proceed(core, &mut body, log.now_ns());
+            let resume = (EventKind::Resume, resume_ns, subject);
             log.journal.write_all(core, [wait, wake, resume]);
             return NextAction::Run(body);
         }
@@ -440,20 +442,25 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         cost
     }
 
-    /// Finds what a core without an instance does next. An instance to start has started, and is
-    /// written down; a resumption is [written down](Self::note) by the caller, who knows when.
+    /// Finds what a core without an instance does next, at an instant. An instance to start has
+    /// started, and is written down; a resumption is [written down](Self::note) by the caller, who
+    /// knows when.
     #[inline]
-    pub fn next(&mut self, core: CoreId, port: &mut impl PlatformPort<B>) -> NextWork<B, P> {
+    pub fn next(
+        &mut self,
+        (now_ns, core): (u64, CoreId),
+        port: &mut impl PlatformPort<B>,
+    ) -> NextWork<B, P> {
         let mut next = self.placement.next(core.index());
         if let NextWork::Start(vertex, body) = &mut next {
             let instance = self.scheduler.instance_of(*vertex);
             body.set_job(instance.job);
             let subject = body.subject();
-            // The port reads the clock as late as it can, right before the function is called.
-            let start_ns = port.start(core, body);
+            // A port that reads the clock does so as late as it can, right before the call.
+            let start_ns = port.start(core, body, now_ns);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
         } else if let NextWork::Proceed(vertex, body) = &mut next {
-            self.proceed((core, *vertex), body, port);
+            self.proceed((now_ns, core, *vertex), body, port);
         }
         next
     }
@@ -463,14 +470,14 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     #[inline(never)]
     fn proceed(
         &mut self,
-        (core, vertex): (CoreId, Vertex),
+        (now_ns, core, vertex): (u64, CoreId, Vertex),
         body: &mut B,
         port: &mut impl PlatformPort<B>,
     ) {
         let (_, has_timed_out) = self.scheduler.latest_wait(vertex);
         body.wake(has_timed_out);
         let subject = body.subject();
-        let resume_ns = port.proceed(core, body);
+        let resume_ns = port.proceed(core, body, now_ns);
         (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
     }
 
@@ -674,16 +681,17 @@ pub trait PlatformPort<B> {
         time_ns
     }
 
-    /// A core begins with a body as soon as the engine's lock is free. Returns when.
-    fn start(&mut self, core: CoreId, body: &mut B) -> u64;
+    /// A core begins with a body as soon as the engine's lock is free. Returns when, on the run's
+    /// time: at the step's instant, or by a later reading of the clock.
+    fn start(&mut self, core: CoreId, body: &mut B, instant_ns: u64) -> u64;
 
     /// The instance of a body gives its core up and begins a wait: a turn of it has ended then.
     fn wait(&mut self, _core: CoreId, _body: &mut B, _ended_ns: u64) {}
 
     /// A core goes on with a body whose wait has ended, as it [starts](Self::start) one. Returns
     /// when.
-    fn proceed(&mut self, core: CoreId, body: &mut B) -> u64 {
-        self.start(core, body)
+    fn proceed(&mut self, core: CoreId, body: &mut B, instant_ns: u64) -> u64 {
+        self.start(core, body, instant_ns)
     }
 
     /// Forwards a request to the other clusters that it concerns, and reports whether it does not

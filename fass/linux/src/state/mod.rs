@@ -169,9 +169,9 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     }
 
     #[inline]
-    fn start(&mut self, core: CoreId, _: &mut Box<SubtaskRunner>) -> u64 {
+    fn start(&mut self, core: CoreId, _: &mut Box<SubtaskRunner>, instant_ns: u64) -> u64 {
         self.workers[self.active[core.index()]].run();
-        self.now_ns()
+        instant_ns
     }
 
     /// A thread that sleeps is woken when the lock has been given back.
@@ -419,7 +419,8 @@ impl State {
             return None;
         };
         let (engine, mut port) = self.parts(workers);
-        match engine.next(core, &mut port) {
+        let now_ns = port.now_ns().max(engine.scheduler.now_ns());
+        match engine.next((now_ns, core), &mut port) {
             NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => Some(runner),
             NextWork::Continue(parked) => {
                 self.seats[me] = None;

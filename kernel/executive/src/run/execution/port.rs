@@ -47,7 +47,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     /// Start and finish are stamped with interrupts disabled, so that no preemption can stand
     /// between a stamp and what it says.
     #[inline(always)]
-    fn start(&mut self, _: CoreId, loan: &mut RunnerLoan) -> u64 {
+    fn start(&mut self, _: CoreId, loan: &mut RunnerLoan, _: u64) -> u64 {
         begin_turn(loan, loan.budget_ns)
     }
 
@@ -61,7 +61,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 
     #[inline]
-    fn proceed(&mut self, _: CoreId, loan: &mut RunnerLoan) -> u64 {
+    fn proceed(&mut self, _: CoreId, loan: &mut RunnerLoan, _: u64) -> u64 {
         begin_turn(loan, loan.budget_left_ns)
     }
 

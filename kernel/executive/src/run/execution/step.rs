@@ -147,7 +147,8 @@ impl ClusterRun {
         let here = seat(core);
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
-        match engine.next(here, &mut port) {
+        let instant_ns = engine.scheduler.now_ns();
+        match engine.next((instant_ns, here), &mut port) {
             NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => CoreWork::Run(runner),
             NextWork::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
