@@ -39,12 +39,9 @@
 #![deny(unsafe_code)]
 
 mod blocking;
-mod budgets;
-mod clock;
 mod control;
 mod edge;
 mod level;
-mod lock;
 mod look_out;
 mod machine;
 mod office;

@@ -3,6 +3,7 @@
 //! A run is there, too: its threads while it goes on, and what it leaves behind.
 
 use std::ops::Deref;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -17,15 +18,14 @@ use sched_dag::engine::{self, Engine, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, Request, WaitId};
 use sched_dag::{DagId, Instance, Journal};
 
-use crate::budgets::Budgets;
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, Sending, unpoisoned};
 use crate::level::Levels;
 use crate::office::Office;
 use crate::section;
 use crate::state::{Fault, Number, State, ThreadPort};
-use crate::team::{self, Team, with_own_worker};
-use crate::{clock, sys};
+use crate::sys;
+use crate::team::{self, Budgets, Team, with_own_worker};
 
 /// The platform of the program.
 pub(crate) struct Host {
@@ -66,11 +66,11 @@ impl Platform for Host {
 
     #[inline]
     fn now_ns(&self) -> u64 {
-        clock::now_ns()
+        sys::now_ns()
     }
 
     fn clock(&self) -> &'static Clock {
-        static CLOCK: Clock = clock::now_ns;
+        static CLOCK: Clock = sys::now_ns;
         &CLOCK
     }
 
@@ -185,13 +185,19 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
     let team = |(engine, runners): (Engine<_, _>, _)| {
         let cores = task_set.cores_of(engine.cluster, options.cores);
         let processors = &threads.processors[cores.start as usize..cores.end as usize];
-        let wcets = threads.terms.budget_factor;
-        let state = State::new(engine, office, runners, processors.into(), wcets);
-        let idle = (threads.polls, threads.skips_idle);
-        Arc::new(Team::new(state, office, idle, wcets))
+        let state = State::new(engine, office, runners, processors.into());
+        Arc::new(Team::new(
+            state,
+            office,
+            (threads.polls, threads.skips_idle),
+            threads.terms.budget_factor,
+        ))
     };
     engines.zip(runners).map(team).collect()
 }
+
+/// The stack of each worker. All of it is locked in memory, if memory is.
+const STACK_BYTES: usize = 512 * 1024;
 
 /// Time between the start of a run and its first release.
 const LEAD_NS: u64 = 1_000_000;
@@ -223,7 +229,7 @@ pub(crate) struct Launched {
 pub struct Counts {
     /// Completions that handed their core the next instance: same thread, no wake.
     pub hand_offs: u64,
-    /// Calls of workers, and instances left to them: where workers sleep, a wake of the kernel's each.
+    /// Calls of workers that sleep or are about to: one wake of the kernel's each.
     pub calls: u64,
     /// Instances that lost their core to a more urgent one.
     pub preemptions: u64,
@@ -254,8 +260,8 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
     section::make_room(teams.iter().map(|team| team.workers.len()).sum());
     let workers = teams.iter().map(|team| {
-        let numbers = 0..team.lock().later.start;
-        numbers.map(|number| team.begin_worker(number)).collect()
+        let numbers = 0..team.workers.len();
+        numbers.map(|number| worker(team, number)).collect()
     });
     let workers: Vec<Vec<_>> = workers.collect();
     for (team, workers) in teams.iter().zip(&workers) {
@@ -266,7 +272,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for (team, workers) in teams.iter().zip(&workers) {
         team.wait_until_ready(workers.len() + 1);
     }
-    let epoch_ns = epoch_ns.unwrap_or_else(|| clock::now_ns() + LEAD_NS);
+    let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
     let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
     let allocations = (threads.allocations)();
     teams.iter().for_each(|team| team.begin(epoch_ns));
@@ -283,9 +289,9 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();
     let mut faults = Vec::new();
-    for state in &mut states {
-        counts.hand_offs += state.hand_offs;
-        counts.calls += state.calls;
+    for (team, state) in teams.iter().zip(&mut states) {
+        counts.hand_offs += team.hand_offs.load(Ordering::Relaxed);
+        counts.calls += team.calls.load(Ordering::Relaxed);
         counts.preemptions += state.preemptions;
         faults.append(&mut state.faults);
     }
@@ -329,6 +335,15 @@ fn release(team: &Arc<Team>, budget_factor: u64) -> JoinHandle<()> {
         .name("fass-release".into())
         .spawn(move || team.release(budgets))
         .expect("the system has a thread to release jobs")
+}
+
+fn worker(team: &Arc<Team>, number: usize) -> JoinHandle<()> {
+    let team = Arc::clone(team);
+    thread::Builder::new()
+        .name(format!("fass-worker-{number}"))
+        .stack_size(STACK_BYTES)
+        .spawn(move || team.work(number))
+        .expect("the system has a thread for each core and each subtask")
 }
 
 fn join(thread: JoinHandle<()>) {

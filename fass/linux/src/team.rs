@@ -11,24 +11,34 @@
 //! (`look_out`); where all cores are busy it comes in time, and preempts. Others wake it earlier
 //! with a request, or if the next event has become an earlier one. It makes the step and calls
 //! the workers; it runs nothing itself.
+//!
+//! # Budgets
+//!
+//! A budget is in processor time, which a thread takes only while it has a processor.
+//! Reading that clock is a system call, so no instance does it at its start: this thread
+//! looks often enough, as often as the shortest budget, and begins to count when it
+//! first sees the instance. So an instance ends after its budget, and no later than the
+//! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for
+//! good.
+//!
+//! An instance that waits may go on in another thread. So, of subtasks that wait, each worker reads
+//! its clock at both ends of a turn, and adds up what the instance has taken; at the end of a turn
+//! it sees for itself whether that is too much.
 
 use std::cell::{Cell, RefCell};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::SubtaskRunner;
-use sched_dag::engine::NextAction;
+use sched_dag::engine::{NextAction, PlatformPort as _};
 use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 
-use crate::budgets::Budgets;
 use crate::level::{Levels, Role};
-use crate::lock::{Guard, Lock};
 use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{FaultCause, Left, Number, RunTime, State};
-use crate::worker::{self, Lead, Worker};
-use crate::{clock, edge, panics, section, sys};
+use crate::worker::{Lead, Worker};
+use crate::{edge, panics, section, sys};
 
 thread_local! {
     /// The run and the number of the worker that this thread is.
@@ -61,7 +71,7 @@ pub(crate) fn own_plan() -> Option<u64> {
 /// Reports whether the calling thread may call the app's code: not one that decides, or holds the
 /// scheduler's lock.
 pub(crate) fn may_call_app() -> bool {
-    !is_of_run() || edge::running().is_some()
+    with_own_worker(|worker| !worker.has_returned()).unwrap_or(!is_of_run())
 }
 
 /// Ends the instance that the calling thread runs, which can neither return nor unwind, and reports
@@ -70,8 +80,6 @@ pub(crate) fn strand(cause: &str) -> bool {
     let own = OWN.with_borrow(Clone::clone);
     let instance = edge::running();
     own.zip(instance).is_some_and(|((team, me), instance)| {
-        // It takes the lock, so it may call nothing of the app's.
-        edge::note_running(None);
         team.strand(me, instance, cause);
         true
     })
@@ -79,11 +87,9 @@ pub(crate) fn strand(cause: &str) -> bool {
 
 /// All that the threads of a cluster share.
 pub(crate) struct Team {
-    state: Lock<State>,
+    state: Mutex<State>,
     pub(crate) workers: Box<[Worker]>,
     pub(crate) levels: Option<Levels>,
-    /// Whether a worker can be demoted.
-    demotes: bool,
     polls: bool,
     skips_idle: bool,
     pub(crate) cluster: ClusterId,
@@ -93,14 +99,18 @@ pub(crate) struct Team {
     pub(crate) looks_at_ns: AtomicU64,
     /// How many threads have begun.
     begun: AtomicU32,
+    /// How often a completion gave its own core the next instance.
+    pub(crate) hand_offs: AtomicU64,
+    /// How often a worker was called, which is a wake of the kernel's.
+    pub(crate) calls: AtomicU64,
     /// By vertex, what its instance has taken; of no vertex if no subtask waits.
-    pub(crate) turns: Box<[TurnClock]>,
+    turns: Box<[TurnClock]>,
 }
 
 /// The processor time of an instance that waits.
-pub(crate) struct TurnClock {
+struct TurnClock {
     /// How much those of its turns have taken that are over.
-    pub(crate) taken_ns: AtomicU64,
+    taken_ns: AtomicU64,
     budget_ns: u64,
 }
 
@@ -122,16 +132,11 @@ impl TurnClock {
 impl Team {
     /// Makes it; idle threads poll, and the run's time skips what would pass idly, or not.
     pub(crate) fn new(
-        mut state: State,
+        state: State,
         office: &Arc<Office>,
         (polls, skips_idle): (bool, bool),
         budget_factor: u64,
     ) -> Self {
-        let subtasks = state.engine.task_set.dags().iter();
-        let mut subtasks = subtasks.flat_map(|dag| dag.subtasks());
-        state.port.demotes |= subtasks.any(|of| of.most_execution_ns(budget_factor) < u64::MAX);
-        let is_owned =
-            state.levels.is_none() && !state.port.demotes && state.port.active.len() == 1;
         let workers = state.seats.iter().map(|_| Worker::new(polls));
         Self {
             turns: TurnClock::all(&state.engine.task_set, budget_factor),
@@ -139,28 +144,28 @@ impl Team {
             polls,
             skips_idle,
             levels: state.levels,
-            demotes: state.port.demotes,
             cluster: state.engine.cluster,
             office: Arc::clone(office),
             look_out: LookOut::new(polls),
             looks_at_ns: AtomicU64::new(u64::MAX),
             begun: AtomicU32::new(0),
-            state: Lock::new(state, polls, is_owned),
+            hand_offs: AtomicU64::new(0),
+            calls: AtomicU64::new(0),
+            state: Mutex::new(state),
         }
     }
 
-    /// Takes the scheduler's lock.
-    pub(crate) fn lock(&self) -> Guard<'_, State> {
-        self.state.enter()
-    }
-
-    /// Takes it, as a worker.
-    #[inline]
-    fn lock_as(&self, me: Number) -> Guard<'_, State> {
-        match me {
-            OWNER => self.state.enter_as_owner(),
-            _ => self.state.enter(),
+    /// Takes the scheduler's lock. A panic under it would be ours, and was reported.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
+        if self.polls {
+            for _ in 0..PATIENCE {
+                match self.state.try_lock() {
+                    Ok(state) => return state,
+                    Err(_) => std::hint::spin_loop(),
+                }
+            }
         }
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Says that a thread is ready for the run.
@@ -185,18 +190,12 @@ impl Team {
     /// and where idle workers watch, none but they see to events.
     pub(crate) fn begin(&self, epoch_ns: u64) {
         let mut state = self.lock();
-        state.port.time = RunTime::beginning(epoch_ns);
+        state.time = RunTime::beginning(epoch_ns);
         self.look_out.announce(epoch_ns);
-        let cores = state.port.active.len();
+        let cores = state.active.len();
         drop(state);
         self.workers[..cores].iter().for_each(Worker::call);
         self.office.ring(self.cluster);
-    }
-
-    /// Begins the thread of a worker.
-    pub(crate) fn begin_worker(self: &Arc<Self>, me: Number) -> JoinHandle<()> {
-        let team = Arc::clone(self);
-        worker::begin(me, move || team.work(me))
     }
 
     /// Works until all jobs have ended.
@@ -208,7 +207,7 @@ impl Team {
         worker.bring(self.levels, Role::Run);
         sys::make_timers_exact();
         let mut lead = Lead::default();
-        let mut state = self.lock_as(me);
+        let mut state = self.lock();
         if let Some(core) = state.seats[me] {
             state.pin(me, core, &self.workers);
         }
@@ -217,33 +216,34 @@ impl Team {
         loop {
             let mut next = match self.wait(me, &mut lead) {
                 Woken::ToEnd => return,
-                Woken::WithWork(runner) => Some(runner),
                 Woken::ByCall => {
-                    let mut state = self.lock_as(me);
+                    let mut state = self.lock();
                     if let Some(left) = state.take_left(me) {
                         self.report(me, state, left.runner, Ok(()), left.finish_ns)
                     } else {
-                        let now_ns = state.now_ns();
-                        let next = (state.seats[me])
-                            .and_then(|_| state.find_work(me, &self.workers, now_ns));
+                        let next = state.seats[me].and_then(|_| state.find_work(me, &self.workers));
                         self.settle(me, &state, next.is_some());
                         next
                     }
                 }
                 Woken::ByTime => {
-                    let mut state = self.lock_as(me);
+                    let mut state = self.lock();
                     let core = state.seats[me];
                     // The others' workers may still sleep.
                     state.step(&self.workers, |moment| {
                         core.into_iter().for_each(|core| moment.prefer(core));
                     });
-                    let now_ns = state.engine.scheduler.now_ns();
-                    core.and_then(|_| self.go_on(me, state, now_ns))
+                    match core {
+                        Some(_) => self.go_on(me, state),
+                        None => None,
+                    }
                 }
             };
-            while next.is_some() {
-                if let Err(Abandoned) = self.run_on(me, &mut next) {
-                    return section::forget();
+            while let Some(mut runner) = next.take() {
+                let outcome = self.execute(&mut runner);
+                match self.complete(me, runner, outcome) {
+                    Ok(found) => next = found,
+                    Err(Abandoned) => return section::forget(),
                 }
             }
         }
@@ -258,9 +258,6 @@ impl Team {
                 self.look_out.of_worker(core, next_ns)
             });
             let was_called = worker.wait_for_call(next_ns, lead);
-            if was_called && let Some(runner) = worker.take_given() {
-                break Woken::WithWork(runner);
-            }
             if self.office.is_over() {
                 break Woken::ToEnd;
             }
@@ -270,7 +267,7 @@ impl Team {
             // The event may have been seen to, or another one is to look first.
             let next_ns = self.look_out.next_ns();
             let own_ns = core.map_or(u64::MAX, |core| self.look_out.of_worker(core, next_ns));
-            let now_ns = clock::now_ns();
+            let now_ns = sys::now_ns();
             if own_ns <= now_ns && self.look_out.claim(now_ns) {
                 break Woken::ByTime;
             }
@@ -281,44 +278,20 @@ impl Team {
         woken
     }
 
-    /// Calls one function after the other, as long as the scheduler has one; a panic ends that, and
-    /// the instance. Catching it takes its time, so all are called from one place that does.
-    fn run_on(&self, me: Number, next: &mut Option<Box<SubtaskRunner>>) -> Result<(), Abandoned> {
-        let message = match panics::caught(|| self.run_all(me, next)) {
-            Ok(done) => return done,
-            Err(message) => message,
-        };
-        edge::note_running(None);
-        match next.take() {
-            // It was not in a function.
-            None => std::panic::resume_unwind(Box::new(message)),
-            Some(runner) => {
-                *next = self.complete(me, runner, Err(FaultCause::Panic(message)))?;
+    /// Calls the function; the error is a panic's message.
+    #[inline]
+    fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), FaultCause> {
+        edge::note_running(Some(runner.instance));
+        let outcome = panics::caught(|| match self.turns.get(runner.vertex.index()) {
+            Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
+            _ => {
+                runner.run();
                 Ok(())
             }
-        }
-    }
-
-    /// Calls the functions. A runner stays with the caller until its function has returned.
-    #[inline]
-    fn run_all(&self, me: Number, next: &mut Option<Box<SubtaskRunner>>) -> Result<(), Abandoned> {
-        while let Some(runner) = next {
-            edge::note_running(Some(runner.instance));
-            let outcome = match self.turns.get(runner.vertex.index()) {
-                Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
-                _ => {
-                    runner.run();
-                    Ok(())
-                }
-            };
-            edge::note_running(None);
-            let Some(runner) = next.take() else { break };
-            *next = match self.demotes || outcome.is_err() {
-                true => self.complete(me, runner, outcome)?,
-                false => self.pass_on(me, runner),
-            };
-        }
-        Ok(())
+        });
+        let outcome = outcome.map_err(FaultCause::Panic).flatten();
+        edge::note_running(None);
+        outcome
     }
 
     /// Runs a turn of an instance, and adds what it takes to what the others have taken.
@@ -337,36 +310,18 @@ impl Team {
         }
     }
 
-    /// Reports that a worker's instance has finished, where none is ever demoted, and finds what it
-    /// does next.
-    #[inline(always)]
-    fn pass_on(&self, me: Number, runner: Box<SubtaskRunner>) -> Option<Box<SubtaskRunner>> {
-        let finish_ns = clock::now_ns();
-        let mut state = self.lock_as(me);
-        let Some(core) = state.seats[me] else {
-            return self.report(me, state, runner, Ok(()), finish_ns);
-        };
-        let end_ns = state.end_of(me, finish_ns);
-        match state.end((core, me), runner, end_ns, &self.workers) {
-            NextAction::Run(runner) if state.changes_nothing_else() => {
-                state.hand_offs += 1;
-                Some(runner)
-            }
-            action => self.after_end((core, me), state, action, end_ns),
-        }
-    }
-
     /// Reports that a worker's instance has ended, and finds what it does next.
+    #[inline]
     pub(crate) fn complete(
         &self,
         me: Number,
         runner: Box<SubtaskRunner>,
         outcome: Result<(), FaultCause>,
     ) -> Result<Option<Box<SubtaskRunner>>, Abandoned> {
-        let finish_ns = clock::now_ns();
+        let finish_ns = sys::now_ns();
         let workers = &self.workers;
         let is_raised = workers[me].report(self.levels);
-        let mut state = self.lock_as(me);
+        let mut state = self.lock();
         if is_raised {
             // It has its core until it waits: nobody at its level preempts it.
             workers[me].bring(self.levels, Role::Run);
@@ -387,10 +342,11 @@ impl Team {
     }
 
     /// Tells the scheduler of the end of a worker's instance, and finds what it does next.
+    #[inline]
     pub(crate) fn report(
         &self,
         me: Number,
-        mut state: Guard<'_, State>,
+        mut state: MutexGuard<'_, State>,
         mut runner: Box<SubtaskRunner>,
         outcome: Result<(), FaultCause>,
         finish_ns: u64,
@@ -400,9 +356,28 @@ impl Team {
         let seat = state_now.seats[me];
         match (outcome, seat) {
             (Ok(()), Some(core)) => {
-                let end_ns = state_now.end_of(me, finish_ns);
-                let action = state_now.end((core, me), runner, end_ns, workers);
-                return self.after_end((core, me), state, action, end_ns);
+                let end_ns = state_now.since_epoch(state_now.end_of(me, finish_ns));
+                let is_alone = state_now.left.is_empty();
+                let (engine, mut port) = state_now.parts(workers);
+                let ended = (core, vertex);
+                match engine.complete(ended, runner, end_ns, is_alone, &mut port) {
+                    NextAction::Run(runner) => {
+                        self.hand_offs.fetch_add(1, Ordering::Relaxed);
+                        self.announce(&state);
+                        if !state.rung.is_empty() {
+                            self.call(state);
+                        }
+                        return Some(runner);
+                    }
+                    NextAction::Look { .. } => {}
+                    NextAction::Step(ended) => {
+                        let now_ns = port.now_ns();
+                        engine.step((now_ns, core), &mut port, |moment| {
+                            ended.into_iter().for_each(|turn| moment.end_turn(turn));
+                        });
+                        state_now.carry_out(workers);
+                    }
+                }
             }
             (Ok(()), None) => state_now.end_parked(me, runner, finish_ns, workers),
             (Err(cause), _) => {
@@ -419,55 +394,18 @@ impl Team {
         if let Some(core) = seat {
             state_now.report_left(core, workers);
         }
-        let now_ns = state.now_ns();
-        self.go_on(me, state, now_ns)
+        self.go_on(me, state)
     }
 
-    /// Finds what a worker does after the end of its core's instance.
-    fn after_end(
-        &self,
-        (core, me): (CoreId, Number),
-        mut state: Guard<'_, State>,
-        action: NextAction<Box<SubtaskRunner>>,
-        end_ns: u64,
-    ) -> Option<Box<SubtaskRunner>> {
-        match action {
-            NextAction::Run(runner) => {
-                state.hand_offs += 1;
-                self.announce(&state);
-                self.call(state);
-                return Some(runner);
-            }
-            NextAction::Look { .. } => {}
-            NextAction::Step(ended) => {
-                let (engine, mut port) = state.parts(&self.workers);
-                engine.step((end_ns, core), &mut port, |moment| {
-                    ended.into_iter().for_each(|turn| moment.end_turn(turn));
-                });
-                state.carry_out(&self.workers);
-            }
-        }
-        state.report_left(core, &self.workers);
-        self.go_on(me, state, end_ns)
-    }
-
-    /// Ends a worker's step at an instant: finds what it does next, and calls others.
-    fn go_on(
-        &self,
-        me: Number,
-        mut state: Guard<'_, State>,
-        now_ns: u64,
-    ) -> Option<Box<SubtaskRunner>> {
-        let mut next = state.find_work(me, &self.workers, now_ns);
-        if next.is_none()
-            && self.skips_idle
-            && let Some(now_ns) = state.skip_to_next_event(now_ns)
-        {
+    /// Ends a worker's step: finds what it does next, and calls others.
+    fn go_on(&self, me: Number, mut state: MutexGuard<'_, State>) -> Option<Box<SubtaskRunner>> {
+        let mut next = state.find_work(me, &self.workers);
+        if next.is_none() && self.skips_idle && state.skip_to_next_event() {
             let core = state.seats[me];
-            state.step_at(now_ns, &self.workers, |moment| {
+            state.step(&self.workers, |moment| {
                 core.into_iter().for_each(|core| moment.prefer(core));
             });
-            next = core.and_then(|_| state.find_work(me, &self.workers, now_ns));
+            next = core.and_then(|_| state.find_work(me, &self.workers));
         }
         self.settle(me, &state, next.is_some());
         self.announce(&state);
@@ -486,26 +424,21 @@ impl Team {
 
     /// Gives the lock back, and makes the workers of all cores that should run something
     /// look for it.
-    pub(crate) fn call<'a>(&'a self, mut state: Guard<'a, State>) {
-        if self.polls && !state.calls_none() {
-            state.give(&self.workers);
-        }
-        if state.calls_none() {
-            return;
-        }
+    pub(crate) fn call<'a>(&'a self, mut state: MutexGuard<'a, State>) {
         let mut called = [None; AT_ONCE];
         loop {
             called.fill(None);
             for (place, worker) in called.iter_mut().zip(state.take_called(AT_ONCE)) {
                 *place = Some(worker);
             }
-            let bell = state.port.rung.pop();
-            let has_more = called[AT_ONCE - 1].is_some() || !state.port.rung.is_empty();
+            let bell = state.rung.pop();
+            let has_more = called[AT_ONCE - 1].is_some() || !state.rung.is_empty();
             drop(state);
             if let Some(bell) = bell {
                 sys::wake(&bell, i32::MAX);
             }
             for worker in called.into_iter().flatten() {
+                self.calls.fetch_add(1, Ordering::Relaxed);
                 self.workers[worker].call();
             }
             if !has_more {
@@ -519,7 +452,7 @@ impl Team {
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
         let next_ns = match state.engine.scheduler.next_event_ns() {
-            Some(next_ns) => state.port.time.on_clock(next_ns),
+            Some(next_ns) => state.time.on_clock(next_ns),
             None if state.engine.scheduler.is_finished() => 0,
             None => u64::MAX,
         };
@@ -530,7 +463,10 @@ impl Team {
     #[inline]
     pub(crate) fn announce_at(&self, next_ns: u64) {
         self.look_out.announce(next_ns);
-        if self.look_out.is_late(&self.looks_at_ns, next_ns) {
+        if self
+            .look_out
+            .is_late(self.looks_at_ns.load(Ordering::SeqCst), next_ns)
+        {
             self.looks_at_ns.store(next_ns, Ordering::SeqCst);
             self.office.ring(self.cluster);
         }
@@ -539,8 +475,6 @@ impl Team {
 
 /// Why a worker does not sleep any more.
 enum Woken {
-    /// An instance was started for it.
-    WithWork(Box<SubtaskRunner>),
     /// Its core may have work.
     ByCall,
     /// An event is due.
@@ -549,14 +483,87 @@ enum Woken {
     ToEnd,
 }
 
-/// The worker that owns the scheduler's lock, where it can have an owner: that of the first core.
-const OWNER: Number = 0;
+/// How often a thread that polls tries to take the lock before it sleeps for it.
+const PATIENCE: u32 = 2_000;
 
 /// The most workers that are called before the lock is taken once more.
 const AT_ONCE: usize = 16;
 
 /// The worker's instance was ended while it ran.
 pub(crate) struct Abandoned;
+
+/// The latest look at an instance that has a budget.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// The subtask, the job, and what its earlier turns have taken.
+    what: Option<(Vertex, u64, u64)>,
+    /// The processor time of its thread then.
+    processor_ns: u64,
+}
+
+/// The budgets of a run's subtasks, and what was seen of the instances on each core.
+#[derive(Debug)]
+pub(crate) struct Budgets {
+    by_vertex: Box<[u64]>,
+    shortest_ns: u64,
+    seen: Box<[Seen]>,
+}
+
+impl Budgets {
+    /// Takes each subtask's budget, or so many of its WCETs; 0: then it has none.
+    pub(crate) fn new(state: &State, wcets: u64) -> Self {
+        let dags = state.engine.task_set.dags().iter();
+        let subtasks = dags.flat_map(|dag| dag.subtasks());
+        let by_vertex: Box<[u64]> = subtasks.map(|s| s.most_execution_ns(wcets)).collect();
+        Self {
+            shortest_ns: by_vertex.iter().copied().min().unwrap_or(u64::MAX),
+            seen: vec![Seen::default(); state.active.len()].into(),
+            by_vertex,
+        }
+    }
+
+    /// Looks at what runs. Returns a core whose instance has exceeded its budget, or when
+    /// to look again.
+    fn look(&mut self, team: &Team, state: &State, now_ns: u64) -> Result<u64, CoreId> {
+        if self.shortest_ns == u64::MAX {
+            return Ok(u64::MAX);
+        }
+        let mut next_ns = now_ns.saturating_add(self.shortest_ns);
+        for (core, seen) in (0..).map(CoreId).zip(&mut self.seen) {
+            let Some(vertex) = state.engine.placement.current(core.index()) else {
+                continue;
+            };
+            let budget_ns = self.by_vertex[vertex.index()];
+            let worker = &team.workers[state.active[core.index()]];
+            let processor_ns = worker.thread().and_then(sys::processor_time_ns);
+            let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
+                continue;
+            };
+            let job = state.engine.scheduler.instance_of(vertex).job;
+            let clock = team.turns.get(vertex.index());
+            let taken_ns = clock.map_or(0, |clock| clock.taken_ns.load(Ordering::Relaxed));
+            let what = Some((vertex, job, taken_ns));
+            if seen.what != what {
+                *seen = Seen { what, processor_ns };
+            }
+            let used_ns = taken_ns + processor_ns.saturating_sub(seen.processor_ns);
+            if used_ns > budget_ns {
+                *seen = Seen::default();
+                return Err(core);
+            }
+            next_ns = next_ns.min(now_ns.saturating_add(pause_ns(budget_ns - used_ns)));
+        }
+        Ok(next_ns)
+    }
+}
+
+/// Returns how long to sleep between two looks at an instance that has so much of its budget
+/// left: not before it can have used that up, and for a while in any case. This thread may stand
+/// on the instance's own core, and then that uses nothing up until we sleep.
+fn pause_ns(rest_ns: u64) -> u64 {
+    const LEAST_NS: u64 = 20_000;
+    rest_ns.saturating_add(1).max(LEAST_NS)
+}
 
 impl Team {
     /// Makes the scheduler's steps until all jobs have ended.
@@ -591,11 +598,11 @@ impl Team {
         let alarm = self.office.alarm(self.cluster);
         while alarm.load(Ordering::Acquire) == seen {
             let looks_at_ns = self.settle_look(budgets_ns);
-            if clock::now_ns() < looks_at_ns {
+            if sys::now_ns() < looks_at_ns {
                 let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
                 sys::wait(alarm, seen, until_ns);
             }
-            let now_ns = clock::now_ns();
+            let now_ns = sys::now_ns();
             let own_ns = self.look_out.of_release(self.look_out.next_ns(), now_ns);
             if own_ns <= now_ns && self.look_out.claim(now_ns) || budgets_ns <= now_ns {
                 return;
@@ -608,7 +615,7 @@ impl Team {
     pub(crate) fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {
             let next_ns = self.look_out.next_ns();
-            let own_ns = self.look_out.of_release(next_ns, clock::now_ns());
+            let own_ns = self.look_out.of_release(next_ns, sys::now_ns());
             let looks_at_ns = own_ns.min(budgets_ns);
             self.looks_at_ns.store(looks_at_ns, Ordering::SeqCst);
             if self.look_out.next_ns() == next_ns {
@@ -620,24 +627,24 @@ impl Team {
     /// Makes one step, and returns when to look at budgets; `None` if all jobs have ended.
     fn step_in_time(
         &self,
-        state: &mut Guard<'_, State>,
+        state: &mut State,
         budgets: &mut Budgets,
         rests: &mut bool,
     ) -> Option<u64> {
-        if clock::now_ns() < state.port.time.epoch_ns {
+        if sys::now_ns() < state.time.epoch_ns {
             // What is asked for before time 0 is done then.
-            return Some(state.port.time.epoch_ns);
+            return Some(state.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
         let look_ns = loop {
-            match budgets.look(self, state, clock::now_ns()) {
+            match budgets.look(self, state, sys::now_ns()) {
                 Ok(look_ns) => break look_ns,
                 Err(core) => self.abandon(state, core),
             }
         };
         self.announce(state);
         let is_finished = state.engine.scheduler.is_finished();
-        let opened = std::mem::take(&mut state.port.opened);
+        let opened = std::mem::take(&mut state.opened);
         if !self.office.settle(rests, is_finished, opened) {
             if is_finished {
                 // This one rests.
@@ -649,18 +656,12 @@ impl Team {
         None
     }
 
-    /// Ends the instance of a worker whose thread goes on with nothing, and with it its DAG. Another
-    /// thread begins if need be; were the system to have none, the program would end by this panic.
-    fn strand(self: &Arc<Self>, me: Number, instance: Instance, cause: &str) {
+    /// Ends the instance of a worker whose thread goes on with nothing, and with it its DAG.
+    fn strand(&self, me: Number, instance: Instance, cause: &str) {
         let workers = &self.workers;
         workers[me].report(self.levels);
         let mut state = self.lock();
         if !state.abandoned.contains(&me) {
-            if let Some(number) = state.later.next() {
-                // Nobody joins the thread; the run's end ends it.
-                drop(self.begin_worker(number));
-                state.spare.push(number);
-            }
             let vertex = state.engine.task_set.vertex(instance);
             let cause = FaultCause::Panic(cause.to_owned());
             self.give_up(&mut state, me, vertex, cause);
@@ -672,8 +673,8 @@ impl Team {
 
     /// Ends a core's instance, which has exceeded its budget, and with it its DAG: its function
     /// cannot be taken back.
-    pub(crate) fn abandon(&self, state: &mut Guard<'_, State>, core: CoreId) {
-        let number = state.port.active[core.index()];
+    pub(crate) fn abandon(&self, state: &mut State, core: CoreId) {
+        let number = state.active[core.index()];
         let Some(vertex) = state.engine.placement.current(core.index()) else {
             return;
         };
@@ -687,13 +688,7 @@ impl Team {
     /// Ends the instance of a worker that is never given another one. If it has a core, a spare
     /// worker gets that, and is called, so that it knows: where idle workers watch, one that does not
     /// know of its core would sleep, and none but workers see to events.
-    fn give_up(
-        &self,
-        state: &mut Guard<'_, State>,
-        number: Number,
-        vertex: Vertex,
-        cause: FaultCause,
-    ) {
+    fn give_up(&self, state: &mut State, number: Number, vertex: Vertex, cause: FaultCause) {
         let (workers, seat) = (&self.workers, state.seats[number].take());
         let core = seat.unwrap_or_else(|| state.core_of(number));
         state.abandoned.push(number);
@@ -702,7 +697,7 @@ impl Team {
             Some(core) => {
                 state.engine.placement.lose(core.index());
                 state.replace(core, workers);
-                workers[state.port.active[core.index()]].call();
+                workers[state.active[core.index()]].call();
             }
             None => state.engine.placement.lose_parked(vertex),
         }
@@ -714,17 +709,15 @@ impl Team {
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, Ordering};
     use std::thread;
     use std::time::Duration;
 
     use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 
-    use super::{IS_OF_RUN, may_call_app, strand};
-    use crate::budgets::Budgets;
+    use super::{Budgets, IS_OF_RUN, may_call_app, pause_ns, strand};
     use crate::platform::HOST;
     use crate::state::tests::MACHINE;
-    use crate::{Linux, Mechanism, clock};
+    use crate::{Linux, Mechanism, sys};
 
     /// Runs on one core, by each mechanism that needs no privilege, a job of a DAG that is released
     /// after so long and calls a function, and one of another DAG later. The release thread comes
@@ -746,16 +739,18 @@ mod tests {
             finish_create_dags(&dags).unwrap();
             let team = Arc::clone(&HOST.take_launched().unwrap().control.teams[0]);
             drop((machine, one));
-            let workers = team.lock().later.start;
-            (0..workers).for_each(|worker| drop(team.begin_worker(worker)));
-            team.wait_until_ready(workers);
-            team.begin(clock::now_ns());
+            for worker in 0..team.workers.len() {
+                let team = Arc::clone(&team);
+                thread::spawn(move || team.work(worker));
+            }
+            team.wait_until_ready(team.workers.len());
+            team.begin(sys::now_ns());
             let (releasing, budgets) = (Arc::clone(&team), Budgets::new(&team.lock(), 0));
             thread::spawn(move || releasing.release(budgets));
             // What sleeps for ever makes itself felt by the time, far beyond any delay.
-            let end_ns = clock::now_ns() + 60_000_000_000;
+            let end_ns = sys::now_ns() + 60_000_000_000;
             while !team.office.is_over() {
-                assert!(clock::now_ns() < end_ns, "by {mechanism:?} all sleep");
+                assert!(sys::now_ns() < end_ns, "by {mechanism:?} all sleep");
                 thread::sleep(Duration::from_millis(1));
             }
         }
@@ -768,15 +763,12 @@ mod tests {
 
     #[test]
     fn who_takes_the_place_of_one_that_is_given_up_looks_out() {
-        static MAY_CALL: AtomicBool = AtomicBool::new(false);
         run(Duration::ZERO, || {
             assert!(strand("meant"));
-            MAY_CALL.fetch_or(may_call_app(), Ordering::Relaxed);
             loop {
                 thread::park();
             }
         });
-        assert!(!MAY_CALL.load(Ordering::Relaxed));
     }
 
     #[test]
@@ -784,5 +776,12 @@ mod tests {
         assert!(may_call_app());
         IS_OF_RUN.set(true);
         assert!(!may_call_app());
+    }
+
+    #[test]
+    fn an_instance_at_the_end_of_its_budget_gets_time_to_exceed_it() {
+        // Were it 1 ns, this thread would look without end, on the core that the instance needs.
+        assert!([0, 1, 100].map(pause_ns).iter().all(|ns| *ns >= 10_000));
+        assert_eq!(pause_ns(5_000_000), 5_000_001);
     }
 }

@@ -21,19 +21,16 @@
 //! has nothing else to do can have it pass before the instant: it wakes up a little early, and
 //! watches the clock for the rest.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
-use std::sync::{Mutex, OnceLock, PoisonError};
-use std::thread::{self, JoinHandle};
 
-use fass::platform::SubtaskRunner;
 use sched_dag::CoreId;
 
 use crate::level::{Levels, Role};
 use crate::sys::ThreadId;
-use crate::{clock, section, sys};
+use crate::{section, sys};
 
-/// It runs no instance: it waits, or has the scheduler's lock, or is about to take it. Where none is
-/// ever demoted, always.
+/// It runs no instance: it waits, or has the scheduler's lock, or is about to take it.
 const REPORTS: u32 = 0;
 /// It runs an instance as its core should.
 const RUNS: u32 = 1;
@@ -42,7 +39,6 @@ const DEMOTED: u32 = 2;
 
 /// The part of a worker that other threads see.
 #[derive(Debug, Default)]
-#[repr(align(128))]
 pub(crate) struct Worker {
     /// Its thread, and that as sections know it.
     thread: OnceLock<(ThreadId, u32)>,
@@ -53,23 +49,8 @@ pub(crate) struct Worker {
     holds: AtomicBool,
     /// 1 if it is to look for work.
     call: AtomicU32,
-    /// The runner of an instance that another thread has started for it, if it watches. Its own
-    /// thread takes no other lock meanwhile, so the giver waits for a moment at most.
-    given: Mutex<Option<Box<SubtaskRunner>>>,
     /// Whether it watches for that instead of sleeping.
     polls: bool,
-}
-
-/// The stack of each worker. All of it is locked in memory, if memory is.
-const STACK_BYTES: usize = 512 * 1024;
-
-/// Begins the thread of a worker.
-pub(crate) fn begin(number: usize, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
-    thread::Builder::new()
-        .name(format!("fass-worker-{number}"))
-        .stack_size(STACK_BYTES)
-        .spawn(work)
-        .expect("the system has a thread for each worker of a run")
 }
 
 /// How often a worker looks before it lets other threads have its processor, in case there are
@@ -137,18 +118,6 @@ impl Worker {
         }
     }
 
-    /// Leaves it, while it watches, the runner of an instance that was started for it.
-    pub(crate) fn give(&self, runner: Box<SubtaskRunner>) {
-        *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(runner);
-        self.call.store(1, Ordering::Release);
-    }
-
-    /// Takes the runner, if there is one. By itself.
-    pub(crate) fn take_given(&self) -> Option<Box<SubtaskRunner>> {
-        let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
-        given.take()
-    }
-
     /// Sleeps until it is called, or until an instant, for which it wakes up a little early. By
     /// itself. Reports whether it was called.
     pub(crate) fn wait_for_call(&self, until_ns: u64, lead: &mut Lead) -> bool {
@@ -157,14 +126,14 @@ impl Worker {
         }
         let alarm_ns = (until_ns < u64::MAX).then(|| lead.before(until_ns));
         while self.call.swap(0, Ordering::Acquire) == 0 {
-            if alarm_ns.is_some_and(|alarm_ns| clock::now_ns() >= alarm_ns) {
+            if alarm_ns.is_some_and(|alarm_ns| sys::now_ns() >= alarm_ns) {
                 return self.watch(until_ns);
             }
             sys::wait(&self.call, 0, alarm_ns);
             if let Some(alarm_ns) = alarm_ns
                 && self.call.load(Ordering::Relaxed) == 0
             {
-                let now_ns = clock::now_ns();
+                let now_ns = sys::now_ns();
                 if now_ns >= alarm_ns {
                     lead.learn(alarm_ns, now_ns);
                 }
@@ -174,29 +143,30 @@ impl Worker {
     }
 
     /// Reports whether it watches while it waits: one without a core sleeps in any case.
-    pub(crate) fn watches(&self) -> bool {
+    fn watches(&self) -> bool {
         self.polls && self.seat().is_some()
     }
 
-    /// Watches for a call, and for an instant. Reports whether there is a call; it may also return
-    /// for nothing, so that its caller sees what has changed else.
+    /// Watches for a call, and for an instant every now and then. Reports whether it was called;
+    /// it may also return for nothing, so that its caller sees what has changed else.
     fn poll(&self, until_ns: u64) -> bool {
         for _ in 0..PATIENCE {
+            // Reading leaves the line with all who read it.
             if self.call.load(Ordering::Relaxed) != 0 {
                 return self.call.swap(0, Ordering::Acquire) != 0;
             }
-            if until_ns < u64::MAX && clock::now_ns() >= until_ns {
+            if until_ns < u64::MAX && sys::now_ns() >= until_ns {
                 return false;
             }
             std::hint::spin_loop();
         }
-        thread::yield_now();
+        std::thread::yield_now();
         false
     }
 
     /// Watches the clock until an instant, or until it is called, and reports whether it was.
     fn watch(&self, until_ns: u64) -> bool {
-        while clock::now_ns() < until_ns {
+        while sys::now_ns() < until_ns {
             if self.call.swap(0, Ordering::Acquire) != 0 {
                 return true;
             }
@@ -269,15 +239,13 @@ impl Worker {
     pub(crate) fn hold(&self, mut left_ns: u64) {
         self.holds.store(true, Ordering::SeqCst);
         while left_ns > 0 {
-            // Where nothing is ever demoted, nobody keeps a mode.
-            let mode = self.mode.load(Ordering::SeqCst);
-            if mode == DEMOTED {
+            if self.mode.load(Ordering::SeqCst) == DEMOTED {
                 sys::wait(&self.mode, DEMOTED, None);
                 continue;
             }
-            let from_ns = clock::now_ns();
-            sys::wait(&self.mode, mode, Some(from_ns.saturating_add(left_ns)));
-            left_ns = left_ns.saturating_sub(clock::now_ns().saturating_sub(from_ns));
+            let from_ns = sys::now_ns();
+            sys::wait(&self.mode, RUNS, Some(from_ns.saturating_add(left_ns)));
+            left_ns = left_ns.saturating_sub(sys::now_ns() - from_ns);
         }
         self.holds.store(false, Ordering::Relaxed);
     }
@@ -322,6 +290,8 @@ impl Lead {
 
 #[cfg(test)]
 mod tests {
+    use std::thread;
+
     use super::*;
 
     #[test]
@@ -360,15 +330,15 @@ mod tests {
                     }
                 }
             });
+            // A lost call makes itself felt by the time, far beyond any delay.
+            let end_ns = sys::now_ns() + 60_000_000_000;
             for round in 1..=rounds {
-                // A lost call makes itself felt by the time, far beyond any delay.
-                let end_ns = clock::now_ns() + 60_000_000_000;
                 worker.sit(Some(CoreId(0)));
                 if leaves {
                     worker.sit(None);
                 }
                 while !worker.wait_for_call(end_ns, &mut Lead::default()) {
-                    assert!(clock::now_ns() < end_ns, "call {round} is lost");
+                    assert!(sys::now_ns() < end_ns, "call {round} is lost");
                 }
                 assert_eq!(calls.load(Ordering::Relaxed), round, "what came before it");
                 seen.store(round, Ordering::Release);
@@ -397,21 +367,13 @@ mod tests {
         }
     }
 
-    /// Counted in processor time, so other programs add nothing.
-    #[test]
-    fn one_that_holds_takes_no_processor_time_where_none_is_demoted() {
-        let (from_ns, hold_ns) = (sys::own_processor_time_ns(), 50_000_000);
-        Worker::default().hold(hold_ns);
-        assert!(sys::own_processor_time_ns() - from_ns < hold_ns / 10);
-    }
-
     #[test]
     fn it_wakes_up_by_itself_and_not_before_the_instant() {
         let (worker, mut lead) = (Worker::default(), Lead::default());
         for _ in 0..5 {
-            let instant_ns = clock::now_ns() + 1_000_000;
+            let instant_ns = sys::now_ns() + 1_000_000;
             assert!(!worker.wait_for_call(instant_ns, &mut lead));
-            assert!(clock::now_ns() >= instant_ns);
+            assert!(sys::now_ns() >= instant_ns);
         }
     }
 

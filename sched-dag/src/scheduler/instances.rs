@@ -7,9 +7,8 @@
 
 use super::jobs::Job;
 use super::pins::ReadyLines;
-use super::timers::TimerKind;
 use super::vertices::{InstancePhase, Vertex, VertexTable};
-use super::{DagPhase, EventLog, OWED, Scheduler};
+use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
 
@@ -245,19 +244,18 @@ impl Scheduler {
     #[inline]
     pub(super) fn set_timer(&mut self, dag: DagId) {
         let model = self.task_set.dag(dag);
-        let jobs = &self.dags[dag.index()].jobs;
-        self.set_timer_to(dag, jobs.next_event(model, self.log.now_ns));
-    }
-
-    /// Notes the next event of a DAG without a completion.
-    #[inline(always)]
-    pub(super) fn set_timer_to(&mut self, dag: DagId, event: Option<(u64, TimerKind)>) {
-        self.timers.set_dag(dag.index(), event);
-        self.quiet_until_ns = self.timers.earliest_ns();
+        match self.dags[dag.index()]
+            .jobs
+            .next_event_ns(model, self.log.now_ns)
+        {
+            Some(event_ns) => self.timers.set(dag.index(), event_ns),
+            None => self.timers.remove(dag.index()),
+        }
+        self.quiet_until_ns = earliest_ns(&self.timers);
     }
 }
 
-/// Puts the next instance of a vertex, which is ready and of a job, in line.
+/// Puts the next instance of a vertex, which is ready, in line.
 #[inline(always)]
 pub(super) fn line_up(
     number: u32,
@@ -266,21 +264,8 @@ pub(super) fn line_up(
     ready: &mut ReadyLines,
     log: &mut EventLog,
 ) {
-    vertex.job = job.number;
-    make_ready(number, vertex, || job, ready, log);
-}
-
-/// Puts the instance that a vertex is to do next in line. It is of the job that `job` finds.
-#[inline(always)]
-pub(super) fn make_ready<'j>(
-    number: u32,
-    vertex: &mut Vertex,
-    job: impl FnOnce() -> &'j Job,
-    ready: &mut ReadyLines,
-    log: &mut EventLog,
-) {
     vertex.phase = InstancePhase::Ready;
-    ready.insert(vertex.line, ready.key(number, vertex, job));
-    // No driver hears of it: the short way leaves it to the driver to write it down.
-    log.on_this(EventKind::Ready, log.now_ns, vertex.present_instance());
+    vertex.job = job.number;
+    ready.insert(vertex.line, ready.key(number, vertex, || job));
+    log.of_instance(EventKind::Ready, vertex.instance(job));
 }

@@ -13,7 +13,6 @@
 
 extern crate alloc;
 
-mod empty;
 mod shape;
 
 use alloc::format;
@@ -27,7 +26,6 @@ use core::time::Duration;
 use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
 use fork_join::each_arity;
 
-pub use empty::{Tick, commit, empty};
 pub use shape::Shape;
 
 /// Which bodies stamp.

@@ -21,42 +21,22 @@
 //!   has ended, by the thread that reports that, or, if the scheduler gives the parked one a core
 //!   before, by its own thread, there. For the model it was suspended so long.
 //! - A fault takes an instance away wherever it is: no core is asked for.
-//!
-//! # How many workers there are
-//!
-//! At any instant each core has one, its active worker. A cluster has more for two reasons:
-//!
-//! - A suspended instance keeps its worker. [`most_suspended`](sched_dag::Dag::most_suspended) bounds
-//!   the instances of a DAG that have started, have not ended and may be suspended, those with a core
-//!   among them. So it holds here, too, where suspensions and resumptions come later than the
-//!   scheduler's decisions. The worker of a parked instance that reports its end is no spare one before
-//!   the step is over, in which others may be suspended; but no successor has started yet, so the
-//!   ended instance's place in the bound is free for so long.
-//! - An instance that is given up keeps its worker for ever. The first of a DAG ends the DAG, and with
-//!   it all instances that are ready or wait. So those that can follow have a core or are suspended: a
-//!   DAG loses no more workers than there are cores and suspended instances of it, nor more than it has
-//!   subtasks.
-//!
-//! An instance that waits between two turns has no worker. Without preemption nothing is suspended.
-//! Workers are lost by exceeded budgets, and by panics that cannot unwind. Where a DAG has no budget,
-//! the latter alone can be: so many threads begin only when a panic takes one away.
 
 use std::borrow::Cow;
-use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
 use fass::platform::{SubtaskRunner, at_edge};
-use sched_dag::engine::{Engine, FaultCost, NextAction, PlatformPort};
+use sched_dag::engine::{Engine, FaultCost, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, Request};
 use sched_dag::placement::NextWork;
-use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Preemption, Subtask, Vertex};
+use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::office::Office;
 use crate::worker::Worker;
-use crate::{clock, edge, sys};
+use crate::{edge, sys};
 
 /// An instance that has finished, and is not reported yet.
 pub(crate) struct Left {
@@ -97,14 +77,16 @@ pub struct Fault {
 
 /// The scheduler of a cluster, its bodies, and which worker runs what.
 pub(crate) struct State {
-    pub(crate) port: PortState,
+    pub(crate) office: Arc<Office>,
     pub(crate) engine: Engine<Box<SubtaskRunner>, Number>,
+    /// By core, the worker that runs what the core should.
+    pub(crate) active: Box<[Number]>,
     /// By worker, the core of which it is the active one.
     pub(crate) seats: Box<[Option<CoreId>]>,
     /// By worker, the core to whose processor it is pinned.
     pinned: Box<[Option<CoreId>]>,
-    /// By worker, the time before which its instance does not end: its latest start or resumption,
-    /// or a step of another thread that was written down as of the core.
+    /// By worker, on the clock, the time before which its instance does not end: when that last went
+    /// on after it had lost its core, or another thread's step was written down as of the core.
     resumed_ns: Box<[u64]>,
     /// The core and vertex from which a worker that reports an end has just taken the processor.
     interrupted: Option<(CoreId, Vertex)>,
@@ -112,36 +94,19 @@ pub(crate) struct State {
     pub(crate) left: Vec<Left>,
     /// Workers without a core and without an instance.
     pub(crate) spare: Vec<Number>,
-    /// Workers whose threads have not begun. One begins where a panic has taken another one away.
-    pub(crate) later: Range<Number>,
-    /// Workers whose instance has exceeded its budget, or cannot unwind. They are never used again.
+    /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
+    /// How many letters were taken that the release thread has not settled yet.
+    pub(crate) opened: u64,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
     called: Vec<CoreId>,
-    pub(crate) processors: Box<[u32]>,
-    pub(crate) levels: Option<Levels>,
-    pub(crate) preemptions: u64,
-    /// How often a completion gave its own core the next instance.
-    pub(crate) hand_offs: u64,
-    /// How often a worker was called, or left an instance. Where workers sleep, a wake of the
-    /// kernel's each.
-    pub(crate) calls: u64,
-}
-
-/// The part of a cluster's state that its engine's port needs.
-pub(crate) struct PortState {
-    office: Arc<Office>,
-    cluster: ClusterId,
-    /// By core, the worker that runs what the core should.
-    pub(crate) active: Box<[Number]>,
-    pub(crate) time: RunTime,
-    /// How many letters were taken that the release thread has not settled yet.
-    pub(crate) opened: u64,
     /// The words on which threads of drivers may sleep that a question was just posted for.
     pub(crate) rung: Vec<Arc<AtomicU32>>,
-    /// Whether a worker can be demoted: instances can be preempted, or have budgets.
-    pub(crate) demotes: bool,
+    pub(crate) processors: Box<[u32]>,
+    pub(crate) levels: Option<Levels>,
+    pub(crate) time: RunTime,
+    pub(crate) preemptions: u64,
 }
 
 /// The time of a cluster's run, as it follows from the clock.
@@ -178,8 +143,13 @@ impl RunTime {
 
 /// Linux below a cluster's engine: its clock, its threads, and the office.
 pub(crate) struct ThreadPort<'s> {
-    state: &'s mut PortState,
+    office: &'s Office,
+    cluster: ClusterId,
+    time: RunTime,
+    active: &'s [Number],
     workers: &'s [Worker],
+    opened: &'s mut u64,
+    rung: &'s mut Vec<Arc<AtomicU32>>,
 }
 
 impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
@@ -191,39 +161,37 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     }
 
     fn now_ns(&self) -> u64 {
-        self.state.time.of_run(clock::now_ns())
+        self.time.of_run(sys::now_ns())
     }
 
     fn on_clock(&self, time_ns: u64) -> u64 {
-        self.state.time.on_clock(time_ns)
+        self.time.on_clock(time_ns)
     }
 
     #[inline]
     fn start(&mut self, core: CoreId, _: &mut Box<SubtaskRunner>, instant_ns: u64) -> u64 {
-        if self.state.demotes {
-            self.workers[self.state.active[core.index()]].run();
-        }
+        self.workers[self.active[core.index()]].run();
         instant_ns
     }
 
     /// A thread that sleeps is woken when the lock has been given back.
     fn wait(&mut self, _: CoreId, runner: &mut Box<SubtaskRunner>, _: u64) {
-        self.state.rung.extend(runner.body.bell());
+        self.rung.extend(runner.body.bell());
     }
 
     fn forward(&mut self, request: Request) -> bool {
-        self.state.office.send(Some(self.state.cluster), request)
+        self.office.send(Some(self.cluster), request)
     }
 
     #[inline]
     fn has_letters(&self) -> bool {
-        self.state.office.has_letters(self.state.cluster)
+        self.office.has_letters(self.cluster)
     }
 
     fn take_letters(&mut self) -> Option<&Mailboxes> {
-        let letters = self.state.office.open(self.state.cluster);
-        self.state.opened += letters;
-        (letters > 0).then_some(&self.state.office.letters)
+        let letters = self.office.open(self.cluster);
+        *self.opened += letters;
+        (letters > 0).then_some(&self.office.letters)
     }
 }
 
@@ -234,13 +202,9 @@ impl State {
         office: &Arc<Office>,
         runners: Vec<SubtaskRunner>,
         processors: Box<[u32]>,
-        budget_factor: u64,
     ) -> Self {
-        let (cores, subtasks) = (processors.len(), runners.len());
-        let later = workers(&engine, cores, budget_factor);
-        let workers = later.end;
-        let mut spare = Vec::with_capacity(workers);
-        spare.extend(cores..later.start);
+        let cores = processors.len();
+        let workers = cores + runners.len();
         for runner in runners {
             engine.put(runner.vertex, Box::new(runner));
         }
@@ -248,75 +212,59 @@ impl State {
         for (core, seat) in (0..).map(CoreId).zip(&mut seats[..cores]) {
             *seat = Some(core);
         }
-        let port = PortState {
-            office: Arc::clone(office),
-            cluster: engine.cluster,
-            active: (0..cores).collect(),
-            time: RunTime::NOT_BEGUN,
-            opened: 0,
-            rung: Vec::with_capacity(subtasks),
-            demotes: engine.scheduler.options().preemption == Preemption::Enabled,
-        };
         Self {
-            port,
+            office: Arc::clone(office),
             engine,
+            active: (0..cores).collect(),
             seats,
             pinned: vec![None; workers].into_boxed_slice(),
             resumed_ns: vec![0; workers].into_boxed_slice(),
             interrupted: None,
             left: Vec::with_capacity(workers),
-            spare,
-            later,
+            spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
+            opened: 0,
             // Each subtask's, if no fault is survived.
-            faults: Vec::with_capacity(subtasks),
+            faults: Vec::with_capacity(workers),
             called: Vec::with_capacity(2 * cores),
+            rung: Vec::with_capacity(workers),
             processors,
             levels: office.levels,
+            time: RunTime::NOT_BEGUN,
             preemptions: 0,
-            hand_offs: 0,
-            calls: 0,
         }
     }
 
     /// Returns a time of the clock on the run's time.
     pub(crate) const fn since_epoch(&self, time_ns: u64) -> u64 {
-        self.port.time.of_run(time_ns)
+        self.time.of_run(time_ns)
     }
 
-    /// Begins the instant at which the clock is, and returns that, or the latest instant that was
-    /// written down: another thread may have read the clock later.
-    pub(crate) fn now_ns(&mut self) -> u64 {
-        let now_ns = self.since_epoch(clock::now_ns());
-        self.begin(now_ns)
-    }
-
-    /// Begins the instant of a time that was read, likewise.
-    pub(crate) fn begin(&mut self, read_ns: u64) -> u64 {
-        let _ = self.engine.scheduler.at(read_ns);
-        self.engine.scheduler.now_ns()
-    }
-
-    /// If nothing runs, lets the next event be due now, and returns when that is.
-    pub(crate) fn skip_to_next_event(&mut self, now_ns: u64) -> Option<u64> {
-        let mut cores = 0..self.port.active.len();
+    /// If nothing runs, lets the next event be due now; reports whether that is to be seen to.
+    pub(crate) fn skip_to_next_event(&mut self) -> bool {
+        let cores = 0..self.active.len();
         let is_idle = |core| {
             self.engine.placement.current(core).is_none() && !self.engine.placement.is_wanted(core)
         };
-        let has_begun = now_ns > 0;
-        let next_ns = self.engine.scheduler.next_event_ns()?;
-        if !has_begun || !cores.all(is_idle) {
-            return None;
-        }
-        self.port.time.skipped_ns += next_ns.saturating_sub(now_ns);
-        Some(next_ns.max(now_ns))
+        let next_ns = self.engine.scheduler.next_event_ns();
+        let has_begun = sys::now_ns() >= self.time.epoch_ns;
+        let Some(next_ns) = next_ns.filter(|_| has_begun && cores.into_iter().all(is_idle)) else {
+            return false;
+        };
+        let now_ns = self.time.of_run(sys::now_ns());
+        self.time.skipped_ns += next_ns.saturating_sub(now_ns);
+        true
     }
 
-    /// Writes down what has happened now to an instance, and returns when.
-    pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) -> u64 {
-        let now_ns = self.now_ns();
-        self.engine.note(what, core, vertex, now_ns);
-        now_ns
+    /// Writes down what has happened now to an instance.
+    pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) {
+        self.note_at(sys::now_ns(), what, core, vertex);
+    }
+
+    /// Writes down what happened to an instance at a time on the clock.
+    fn note_at(&mut self, time_ns: u64, what: EventKind, core: CoreId, vertex: Vertex) {
+        let time_ns = self.since_epoch(time_ns);
+        self.engine.note(what, core, vertex, time_ns);
     }
 
     /// Returns the engine, and the port for a step of it.
@@ -325,44 +273,25 @@ impl State {
         &'s mut self,
         workers: &'s [Worker],
     ) -> (&'s mut Engine<Box<SubtaskRunner>, Number>, ThreadPort<'s>) {
-        let state = &mut self.port;
-        (&mut self.engine, ThreadPort { state, workers })
-    }
-
-    /// Takes note that the instance of a core and its worker has ended, at a time of the run.
-    #[inline(always)]
-    pub(crate) fn end(
-        &mut self,
-        (core, me): (CoreId, Number),
-        runner: Box<SubtaskRunner>,
-        end_ns: u64,
-        workers: &[Worker],
-    ) -> NextAction<Box<SubtaskRunner>> {
-        let is_alone = self.left.is_empty();
-        let (engine, mut port) = self.parts(workers);
-        let ended = (core, runner.vertex);
-        let next = engine.complete(ended, runner, end_ns, is_alone, &mut port);
-        self.resumed_ns[me] = self.engine.scheduler.now_ns();
-        next
+        let port = ThreadPort {
+            office: &self.office,
+            cluster: self.engine.cluster,
+            time: self.time,
+            active: &self.active,
+            workers,
+            opened: &mut self.opened,
+            rung: &mut self.rung,
+        };
+        (&mut self.engine, port)
     }
 
     /// Lets the scheduler see what happens now, and decide.
     pub(crate) fn step(&mut self, workers: &[Worker], event: impl FnOnce(&mut Moment<'_>)) {
-        let now_ns = self.now_ns();
-        self.step_at(now_ns, workers, event);
-    }
-
-    /// Lets the scheduler see what happens at an instant, and decide.
-    pub(crate) fn step_at(
-        &mut self,
-        now_ns: u64,
-        workers: &[Worker],
-        event: impl FnOnce(&mut Moment<'_>),
-    ) {
         let (engine, mut port) = self.parts(workers);
-        let here = engine.scheduler.log.here;
+        let (now_ns, here) = (port.now_ns(), engine.scheduler.log.here);
         engine.step((now_ns, here), &mut port, event);
-        self.resumed_ns[self.port.active[here.index()]] = self.engine.scheduler.now_ns();
+        let worker = self.active[here.index()];
+        self.resumed_ns[worker] = self.resumed_ns[worker].max(self.time.on_clock(now_ns));
         self.carry_out(workers);
     }
 
@@ -380,12 +309,10 @@ impl State {
             FaultCause::Overrun => ("its budget was exceeded".into(), true),
         };
         let instance = self.engine.scheduler.instance_of(vertex);
-        at_edge::failed(instance, clock::now_ns());
-        let now_ns = self.now_ns();
+        at_edge::failed(instance, sys::now_ns());
         let (engine, mut port) = self.parts(workers);
+        let now_ns = port.now_ns();
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
-        // What the core has may have returned already, as this one may have lost the core.
-        self.resumed_ns[self.port.active[core.index()]] = self.engine.scheduler.now_ns();
         self.faults.push(Fault {
             instance,
             core,
@@ -399,9 +326,10 @@ impl State {
 
     pub(crate) fn carry_out(&mut self, workers: &[Worker]) {
         if let Some((core, occupant)) = self.interrupted.take() {
+            let now_ns = sys::now_ns();
             // It may have returned already, and wait for the lock.
-            let now_ns = self.note(EventKind::Resume, core, occupant);
-            self.resumed_ns[self.port.active[core.index()]] = now_ns;
+            self.resumed_ns[self.active[core.index()]] = now_ns;
+            self.note_at(now_ns, EventKind::Resume, core, occupant);
         }
         for place in 0..self.engine.decisions().len() {
             let core = self.engine.decisions()[place].core;
@@ -416,7 +344,7 @@ impl State {
 
     /// Takes its instance away from a core, unless it has just ended.
     fn suspend(&mut self, core: CoreId, workers: &[Worker]) {
-        let demoted = self.port.active[core.index()];
+        let demoted = self.active[core.index()];
         if !workers[demoted].demote(self.levels, Role::Demoted) {
             return;
         }
@@ -424,7 +352,7 @@ impl State {
             return;
         }
         self.preemptions += 1;
-        let now_ns = self.now_ns();
+        let now_ns = self.since_epoch(sys::now_ns());
         let waiting = self.engine.suspend(core, now_ns, demoted);
         self.seats[demoted] = None;
         self.replace(core, workers);
@@ -436,12 +364,12 @@ impl State {
     /// Gives a core a spare worker.
     pub(crate) fn replace(&mut self, core: CoreId, workers: &[Worker]) {
         let spare = self.spare.pop();
-        // There are as many as the module's head counts.
-        self.seat(spare.expect("a spare worker"), core, workers);
+        // Each subtask has at most one started instance, and so many there are.
+        self.seat(spare.expect("a worker for each subtask"), core, workers);
     }
 
     fn seat(&mut self, worker: Number, core: CoreId, workers: &[Worker]) {
-        self.port.active[core.index()] = worker;
+        self.active[core.index()] = worker;
         self.seats[worker] = Some(core);
         self.pin(worker, core, workers);
     }
@@ -465,48 +393,14 @@ impl State {
         }
     }
 
-    /// Starts the instances of cores whose workers watch, and leaves these their runners: so they
-    /// need no look at the state.
-    pub(crate) fn give(&mut self, workers: &[Worker]) {
-        let now_ns = self.engine.scheduler.now_ns();
-        let mut called = std::mem::take(&mut self.called);
-        called.retain(|core| {
-            let number = self.port.active[core.index()];
-            let is_wanted = self.engine.placement.is_wanted(core.index());
-            if !is_wanted || !workers[number].watches() {
-                return is_wanted;
-            }
-            if let Some(runner) = self.find_work(number, workers, now_ns) {
-                self.calls += 1;
-                workers[number].give(runner);
-            }
-            false
-        });
-        self.called = called;
-    }
-
-    /// Reports whether no worker is to look for work, and no bell to be rung.
-    pub(crate) fn calls_none(&self) -> bool {
-        self.called.is_empty() && self.port.rung.is_empty()
-    }
-
-    /// Reports whether a hop that has just been made is all: the next event stays what it was.
-    #[inline]
-    pub(crate) fn changes_nothing_else(&mut self) -> bool {
-        !self.engine.scheduler.log.take_job_event() && self.port.rung.is_empty()
-    }
-
     /// Returns workers that are to look for work, `most` at a time, and forgets them.
     pub(crate) fn take_called(&mut self, most: usize) -> impl Iterator<Item = Number> + '_ {
-        let (active, placement) = (&self.port.active, &self.engine.placement);
+        let (active, placement) = (&self.active, &self.engine.placement);
         let left = self.called.len().saturating_sub(most);
         let called = self.called.drain(left..);
         // The one that makes the step has looked already.
         let called = called.filter(|core| placement.is_wanted(core.index()));
-        let calls = &mut self.calls;
-        called
-            .inspect(|_| *calls += 1)
-            .map(|core| active[core.index()])
+        called.map(|core| active[core.index()])
     }
 
     /// Returns the core that a worker is pinned to.
@@ -514,28 +408,20 @@ impl State {
         self.pinned[worker].unwrap_or(CoreId(0))
     }
 
-    /// Finds what a worker without an instance does next, at an instant: run this, or nothing.
+    /// Finds what a worker without an instance does next: run this, or nothing.
     pub(crate) fn find_work(
         &mut self,
         me: Number,
         workers: &[Worker],
-        now_ns: u64,
     ) -> Option<Box<SubtaskRunner>> {
         let Some(core) = self.seats[me] else {
             self.spare.push(me);
             return None;
         };
-        // Another thread may have started something for it just before.
-        if self.engine.placement.current(core.index()).is_some() {
-            return None;
-        }
-        let now_ns = self.begin(now_ns);
         let (engine, mut port) = self.parts(workers);
+        let now_ns = port.now_ns().max(engine.scheduler.now_ns());
         match engine.next((now_ns, core), &mut port) {
-            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => {
-                self.resumed_ns[me] = now_ns;
-                Some(runner)
-            }
+            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => Some(runner),
             NextWork::Continue(parked) => {
                 self.seats[me] = None;
                 self.spare.push(me);
@@ -545,7 +431,8 @@ impl State {
                     workers[parked].call();
                 }
                 if let Some(vertex) = self.engine.placement.current(core.index()) {
-                    self.resumed_ns[parked] = self.note(EventKind::Resume, core, vertex);
+                    self.resumed_ns[parked] = sys::now_ns();
+                    self.note_at(self.resumed_ns[parked], EventKind::Resume, core, vertex);
                 }
                 None
             }
@@ -554,35 +441,12 @@ impl State {
     }
 }
 
-/// Counts the workers of a cluster: up to the start of the range those with which a run begins, in it
-/// those that begin later.
-fn workers(
-    engine: &Engine<Box<SubtaskRunner>, Number>,
-    cores: usize,
-    budget_factor: u64,
-) -> Range<Number> {
-    let is_preemptive = engine.scheduler.options().preemption == Preemption::Enabled;
-    let (mut first, mut later) = (cores, 0);
-    let dags = engine.task_set.dags().iter();
-    for dag in dags.filter(|dag| dag.cluster() == engine.cluster) {
-        let suspended = dag.most_suspended() * usize::from(is_preemptive);
-        let given_up = (cores + suspended).min(dag.subtasks().len());
-        let has_budget = |of: &Subtask| of.most_execution_ns(budget_factor) < u64::MAX;
-        first += suspended;
-        *match dag.subtasks().iter().any(has_budget) {
-            true => &mut first,
-            false => &mut later,
-        } += given_up;
-    }
-    first..first + later
-}
-
 impl State {
-    /// Returns when the instance of a worker has ended whose function returned at a time on the
-    /// clock. If it lost its core and got it back before it could say so, it ends there; or with a
-    /// step that was taken before.
+    /// Returns when the instance of a worker has ended whose function returned at a time. If it
+    /// lost its core and got it back before it could say so, it ends there; or with a step that was
+    /// taken before.
     pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
-        self.since_epoch(returned_ns).max(self.resumed_ns[worker])
+        returned_ns.max(self.resumed_ns[worker])
     }
 
     /// Reports whether a worker whose instance has finished has to leave the report of that.
@@ -597,7 +461,7 @@ impl State {
             let instance = self.engine.scheduler.instance_of(occupant);
             let dag = self.engine.task_set.dag(instance.dag);
             dag.subtask(instance.subtask).is_non_preemptive()
-                || workers[self.port.active[core]].has_returned()
+                || workers[self.active[core]].has_returned()
         })
     }
 
@@ -643,8 +507,9 @@ impl State {
         self.note(EventKind::Resume, core, vertex);
         // It goes on after the step that the end brings about, and within it nothing does.
         self.interrupted = occupant.map(|occupant| (core, occupant));
-        let times_ns = (self.since_epoch(finish_ns), self.now_ns());
+        let finish_ns = self.since_epoch(finish_ns);
         let (engine, mut port) = self.parts(workers);
+        let times_ns = (finish_ns, port.now_ns());
         engine.complete_parked((core, vertex), runner, times_ns, &mut port);
         self.carry_out(workers);
     }

@@ -15,7 +15,7 @@ use sched_dag::{CoreId, DagId};
 use crate::platform::HOST;
 use crate::state::{FaultCause, Number};
 use crate::team::Team;
-use crate::{Linux, Mechanism, clock};
+use crate::{Linux, Mechanism, sys};
 use fass::platform::SubtaskRunner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
@@ -65,7 +65,7 @@ impl Stage {
         for core in 0..cores {
             state.pin(core as usize, CoreId(core), &team.workers);
         }
-        state.port.time = crate::state::RunTime::beginning(clock::now_ns());
+        state.time = crate::state::RunTime::beginning(sys::now_ns());
         drop(state);
         Self {
             team,
@@ -87,10 +87,9 @@ impl Stage {
                 state.step(&team.workers, |moment| moment.serve(Request::Signal(dag)));
                 let is_wanted = |core: &usize| state.engine.placement.is_wanted(*core);
                 if what == "begin" {
-                    let worker = state.port.active[(0..2).find(is_wanted).unwrap()];
+                    let worker = state.active[(0..2).find(is_wanted).unwrap()];
                     self.began.insert(name, worker);
-                    let now_ns = state.now_ns();
-                    let runner = state.find_work(worker, &team.workers, now_ns);
+                    let runner = state.find_work(worker, &team.workers);
                     self.running.insert(name, (worker, runner.unwrap()));
                 }
             }
@@ -107,16 +106,16 @@ impl Stage {
                 assert_eq!(next.is_err(), what == "end-in-vain", "{step}");
                 self.go_on(worker, next.ok().flatten());
             }
-            // Its worker reports that, behind another thread that has had the lock.
-            "end-behind-signal" | "end-behind-fault" => {
+            // Its worker reports that, behind another thread that has had the lock, for a signal.
+            "end-behind" => {
                 let (worker, runner) = self.running.remove(name).unwrap();
-                let finish_ns = clock::now_ns();
+                let finish_ns = sys::now_ns();
                 team.workers[worker].report(None);
-                self.play(match what {
-                    "end-behind-signal" => "signal urgent",
-                    _ => "fail low",
+                let mut state = team.lock();
+                state.step(&team.workers, |moment| {
+                    moment.serve(Request::Signal(DagId(1)));
                 });
-                let next = team.report(worker, team.lock(), runner, Ok(()), finish_ns);
+                let next = team.report(worker, state, runner, Ok(()), finish_ns);
                 self.go_on(worker, next);
             }
             // Its worker looks whether it reports what it has left, which it does with a core.
@@ -134,9 +133,8 @@ impl Stage {
                 let mut state = team.lock();
                 team.abandon(&mut state, CoreId(0));
                 assert_eq!(state.engine.placement.current(0), None);
-                let worker = state.port.active[0];
-                let now_ns = state.now_ns();
-                let next = state.find_work(worker, &team.workers, now_ns);
+                let worker = state.active[0];
+                let next = state.find_work(worker, &team.workers);
                 drop(state);
                 self.go_on(worker, next);
             }
@@ -184,7 +182,7 @@ impl Stage {
 /// Cores; whether `urgent` keeps its core, or both; the steps; the story.
 type Case = (u32, &'static [bool], &'static str, &'static str);
 
-const CASES: [Case; 9] = [
+const CASES: [Case; 8] = [
     // One that has returned, and waits for the scheduler's lock, ends before the parked one.
     (
         1,
@@ -228,7 +226,7 @@ const CASES: [Case; 9] = [
     (
         2,
         &[false, true],
-        "begin low, end-behind-signal low, end low",
+        "begin low, end-behind low, end low",
         "start low 0, finish low 0, start low 1, finish low 1",
     ),
     // A parked one that fails takes no core from any.
@@ -236,13 +234,6 @@ const CASES: [Case; 9] = [
         1,
         &[false, true],
         "begin low, begin urgent, fail low, end urgent",
-        "start low 0, suspend low 0, start urgent 0, ended low 0, finish urgent 0",
-    ),
-    // Nor is that fault behind the end of what has returned before.
-    (
-        1,
-        &[false, true],
-        "begin low, begin urgent, end-behind-fault urgent",
         "start low 0, suspend low 0, start urgent 0, ended low 0, finish urgent 0",
     ),
     // What was left to one that is abandoned is reported.
@@ -276,7 +267,7 @@ fn an_earlier_event_is_not_missed() {
     let rounds = if cfg!(miri) { 5 } else { 2_000 };
     for round in 0..rounds {
         // In the far future, so that none is due while it is settled.
-        let event_ns = clock::now_ns() + 1_000_000_000_000;
+        let event_ns = sys::now_ns() + 1_000_000_000_000;
         let before_ns = if round % 2 == 0 {
             u64::MAX
         } else {
