@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use fass::shared::{Device, DeviceDriver, Ticket, create_device};
 
-use crate::sys;
+use crate::{clock, sys};
 
 /// How long the thread waits at most until it looks whether the device is still used.
 const LOOK: Duration = Duration::from_millis(100);
@@ -77,12 +77,12 @@ where
 pub fn next_question<Q, A>(driver: &mut DeviceDriver<Q, A>, most: Duration) -> Option<(Ticket, Q)> {
     let bell = driver.bell();
     let most_ns = u64::try_from(most.as_nanos()).unwrap_or(u64::MAX);
-    let until_ns = sys::now_ns().saturating_add(most_ns);
+    let until_ns = clock::now_ns().saturating_add(most_ns);
     loop {
         // Before the look: a question that comes after that changes it.
         let seen = bell.load(Ordering::Acquire);
         let found = driver.question();
-        if found.is_some() || sys::now_ns() >= until_ns {
+        if found.is_some() || clock::now_ns() >= until_ns {
             return found;
         }
         sys::wait(&bell, seen, Some(until_ns));

@@ -10,8 +10,8 @@ use sched_dag::{DagId, DagKey, Scheduler, SchedulerQuery, TaskSet};
 
 use crate::level::Role;
 use crate::office::Office;
-use crate::sys;
 use crate::team::Team;
+use crate::{clock, sys};
 
 /// The handle of a committed run. Its requests are carried out by the release thread of the DAG's
 /// cluster, at once; after the run it does nothing.
@@ -196,7 +196,7 @@ impl Control {
         /// How long the thread outlives its run.
         const MOST_NS: u64 = 1_000_000_000;
         self.watch("fass-ends", |control| {
-            let has_come = EndSignals::wait(sys::now_ns() + MOST_NS);
+            let has_come = EndSignals::wait(clock::now_ns() + MOST_NS);
             if has_come {
                 control.close();
             }

@@ -16,7 +16,7 @@ use fass::edge::{BootRecord, Drain, Edge, Outgoing, Sink};
 use sched_dag::Instance;
 use sched_dag::engine::Run;
 
-use crate::sys;
+use crate::clock;
 
 /// The time between two looks for what waits.
 const LOOK: Duration = Duration::from_millis(1);
@@ -103,7 +103,7 @@ pub(crate) fn running() -> Option<Instance> {
 /// Returns what this thread runs, and the time of the run.
 pub(crate) fn here() -> (Option<Instance>, u64) {
     let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
-    (running(), sys::now_ns().saturating_sub(epoch_ns))
+    (running(), clock::now_ns().saturating_sub(epoch_ns))
 }
 
 /// A thread that sends what waits, as long as a run goes on.

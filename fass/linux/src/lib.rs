@@ -39,6 +39,7 @@
 #![deny(unsafe_code)]
 
 mod blocking;
+mod clock;
 mod control;
 mod edge;
 mod level;

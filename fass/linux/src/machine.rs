@@ -25,9 +25,9 @@ use crate::level::{Levels, Seats, USUAL_TOP};
 use crate::panics;
 use crate::platform::HOST;
 use crate::platform::{self, Run, Threads};
-use crate::sys;
 use crate::team::{self, with_own_worker};
 use crate::worker::Worker;
+use crate::{clock, sys};
 
 /// How the scheduler's decisions are carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +98,7 @@ pub fn own_core() -> Option<u32> {
 
 /// Returns the time on the clock, whatever functions are told.
 pub fn now_ns() -> u64 {
-    sys::now_ns()
+    clock::now_ns()
 }
 
 /// Returns how many processors this program may use.

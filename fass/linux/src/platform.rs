@@ -24,8 +24,8 @@ use crate::level::Levels;
 use crate::office::Office;
 use crate::section;
 use crate::state::{Fault, Number, State, ThreadPort};
-use crate::sys;
 use crate::team::{self, Budgets, Team, with_own_worker};
+use crate::{clock, sys};
 
 /// The platform of the program.
 pub(crate) struct Host {
@@ -66,11 +66,11 @@ impl Platform for Host {
 
     #[inline]
     fn now_ns(&self) -> u64 {
-        sys::now_ns()
+        clock::now_ns()
     }
 
     fn clock(&self) -> &'static Clock {
-        static CLOCK: Clock = sys::now_ns;
+        static CLOCK: Clock = clock::now_ns;
         &CLOCK
     }
 
@@ -272,7 +272,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for (team, workers) in teams.iter().zip(&workers) {
         team.wait_until_ready(workers.len() + 1);
     }
-    let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
+    let epoch_ns = epoch_ns.unwrap_or_else(|| clock::now_ns() + LEAD_NS);
     let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
     let allocations = (threads.allocations)();
     teams.iter().for_each(|team| team.begin(epoch_ns));

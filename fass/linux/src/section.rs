@@ -11,7 +11,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::LockWords;
 
-use crate::sys;
+use crate::clock;
 
 /// The threads that are given up. Taken by a thread that reads or changes a lock's words.
 static GIVEN_UP: Mutex<Vec<u32>> = Mutex::new(Vec::new());
@@ -69,9 +69,9 @@ pub(crate) fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     drop(given_up);
     // A panic ends the section, too.
     let _held = Held(lock);
-    let entered_ns = sys::now_ns();
+    let entered_ns = clock::now_ns();
     section();
-    Some(sys::now_ns().saturating_sub(entered_ns))
+    Some(clock::now_ns().saturating_sub(entered_ns))
 }
 
 fn given_up() -> MutexGuard<'static, Vec<u32>> {

@@ -74,9 +74,8 @@ fn time_of(clock: i32) -> Option<u64> {
     (result == 0).then(|| s * 1_000_000_000 + ns)
 }
 
-/// Returns the time of the clock that never jumps.
-#[inline]
-pub(crate) fn now_ns() -> u64 {
+/// Returns the time of CLOCK_MONOTONIC.
+pub(crate) fn monotonic_ns() -> u64 {
     time_of(CLOCK_MONOTONIC).expect("every Linux has this clock")
 }
 

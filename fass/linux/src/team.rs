@@ -38,7 +38,7 @@ use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{FaultCause, Left, Number, RunTime, State};
 use crate::worker::{Lead, Worker};
-use crate::{edge, panics, section, sys};
+use crate::{clock, edge, panics, section, sys};
 
 thread_local! {
     /// The run and the number of the worker that this thread is.
@@ -267,7 +267,7 @@ impl Team {
             // The event may have been seen to, or another one is to look first.
             let next_ns = self.look_out.next_ns();
             let own_ns = core.map_or(u64::MAX, |core| self.look_out.of_worker(core, next_ns));
-            let now_ns = sys::now_ns();
+            let now_ns = clock::now_ns();
             if own_ns <= now_ns && self.look_out.claim(now_ns) {
                 break Woken::ByTime;
             }
@@ -318,7 +318,7 @@ impl Team {
         runner: Box<SubtaskRunner>,
         outcome: Result<(), FaultCause>,
     ) -> Result<Option<Box<SubtaskRunner>>, Abandoned> {
-        let finish_ns = sys::now_ns();
+        let finish_ns = clock::now_ns();
         let workers = &self.workers;
         let is_raised = workers[me].report(self.levels);
         let mut state = self.lock();
@@ -598,11 +598,11 @@ impl Team {
         let alarm = self.office.alarm(self.cluster);
         while alarm.load(Ordering::Acquire) == seen {
             let looks_at_ns = self.settle_look(budgets_ns);
-            if sys::now_ns() < looks_at_ns {
+            if clock::now_ns() < looks_at_ns {
                 let until_ns = (looks_at_ns < u64::MAX).then_some(looks_at_ns);
                 sys::wait(alarm, seen, until_ns);
             }
-            let now_ns = sys::now_ns();
+            let now_ns = clock::now_ns();
             let own_ns = self.look_out.of_release(self.look_out.next_ns(), now_ns);
             if own_ns <= now_ns && self.look_out.claim(now_ns) || budgets_ns <= now_ns {
                 return;
@@ -615,7 +615,7 @@ impl Team {
     pub(crate) fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {
             let next_ns = self.look_out.next_ns();
-            let own_ns = self.look_out.of_release(next_ns, sys::now_ns());
+            let own_ns = self.look_out.of_release(next_ns, clock::now_ns());
             let looks_at_ns = own_ns.min(budgets_ns);
             self.looks_at_ns.store(looks_at_ns, Ordering::SeqCst);
             if self.look_out.next_ns() == next_ns {
@@ -631,13 +631,13 @@ impl Team {
         budgets: &mut Budgets,
         rests: &mut bool,
     ) -> Option<u64> {
-        if sys::now_ns() < state.time.epoch_ns {
+        if clock::now_ns() < state.time.epoch_ns {
             // What is asked for before time 0 is done then.
             return Some(state.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
         let look_ns = loop {
-            match budgets.look(self, state, sys::now_ns()) {
+            match budgets.look(self, state, clock::now_ns()) {
                 Ok(look_ns) => break look_ns,
                 Err(core) => self.abandon(state, core),
             }
@@ -717,7 +717,7 @@ mod tests {
     use super::{Budgets, IS_OF_RUN, may_call_app, pause_ns, strand};
     use crate::platform::HOST;
     use crate::state::tests::MACHINE;
-    use crate::{Linux, Mechanism, sys};
+    use crate::{Linux, Mechanism, clock};
 
     /// Runs on one core, by each mechanism that needs no privilege, a job of a DAG that is released
     /// after so long and calls a function, and one of another DAG later. The release thread comes
@@ -744,13 +744,13 @@ mod tests {
                 thread::spawn(move || team.work(worker));
             }
             team.wait_until_ready(team.workers.len());
-            team.begin(sys::now_ns());
+            team.begin(clock::now_ns());
             let (releasing, budgets) = (Arc::clone(&team), Budgets::new(&team.lock(), 0));
             thread::spawn(move || releasing.release(budgets));
             // What sleeps for ever makes itself felt by the time, far beyond any delay.
-            let end_ns = sys::now_ns() + 60_000_000_000;
+            let end_ns = clock::now_ns() + 60_000_000_000;
             while !team.office.is_over() {
-                assert!(sys::now_ns() < end_ns, "by {mechanism:?} all sleep");
+                assert!(clock::now_ns() < end_ns, "by {mechanism:?} all sleep");
                 thread::sleep(Duration::from_millis(1));
             }
         }

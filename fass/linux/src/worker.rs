@@ -28,7 +28,7 @@ use sched_dag::CoreId;
 
 use crate::level::{Levels, Role};
 use crate::sys::ThreadId;
-use crate::{section, sys};
+use crate::{clock, section, sys};
 
 /// It runs no instance: it waits, or has the scheduler's lock, or is about to take it.
 const REPORTS: u32 = 0;
@@ -126,14 +126,14 @@ impl Worker {
         }
         let alarm_ns = (until_ns < u64::MAX).then(|| lead.before(until_ns));
         while self.call.swap(0, Ordering::Acquire) == 0 {
-            if alarm_ns.is_some_and(|alarm_ns| sys::now_ns() >= alarm_ns) {
+            if alarm_ns.is_some_and(|alarm_ns| clock::now_ns() >= alarm_ns) {
                 return self.watch(until_ns);
             }
             sys::wait(&self.call, 0, alarm_ns);
             if let Some(alarm_ns) = alarm_ns
                 && self.call.load(Ordering::Relaxed) == 0
             {
-                let now_ns = sys::now_ns();
+                let now_ns = clock::now_ns();
                 if now_ns >= alarm_ns {
                     lead.learn(alarm_ns, now_ns);
                 }
@@ -155,7 +155,7 @@ impl Worker {
             if self.call.load(Ordering::Relaxed) != 0 {
                 return self.call.swap(0, Ordering::Acquire) != 0;
             }
-            if until_ns < u64::MAX && sys::now_ns() >= until_ns {
+            if until_ns < u64::MAX && clock::now_ns() >= until_ns {
                 return false;
             }
             std::hint::spin_loop();
@@ -166,7 +166,7 @@ impl Worker {
 
     /// Watches the clock until an instant, or until it is called, and reports whether it was.
     fn watch(&self, until_ns: u64) -> bool {
-        while sys::now_ns() < until_ns {
+        while clock::now_ns() < until_ns {
             if self.call.swap(0, Ordering::Acquire) != 0 {
                 return true;
             }
@@ -243,9 +243,9 @@ impl Worker {
                 sys::wait(&self.mode, DEMOTED, None);
                 continue;
             }
-            let from_ns = sys::now_ns();
+            let from_ns = clock::now_ns();
             sys::wait(&self.mode, RUNS, Some(from_ns.saturating_add(left_ns)));
-            left_ns = left_ns.saturating_sub(sys::now_ns() - from_ns);
+            left_ns = left_ns.saturating_sub(clock::now_ns() - from_ns);
         }
         self.holds.store(false, Ordering::Relaxed);
     }
@@ -331,14 +331,14 @@ mod tests {
                 }
             });
             // A lost call makes itself felt by the time, far beyond any delay.
-            let end_ns = sys::now_ns() + 60_000_000_000;
+            let end_ns = clock::now_ns() + 60_000_000_000;
             for round in 1..=rounds {
                 worker.sit(Some(CoreId(0)));
                 if leaves {
                     worker.sit(None);
                 }
                 while !worker.wait_for_call(end_ns, &mut Lead::default()) {
-                    assert!(sys::now_ns() < end_ns, "call {round} is lost");
+                    assert!(clock::now_ns() < end_ns, "call {round} is lost");
                 }
                 assert_eq!(calls.load(Ordering::Relaxed), round, "what came before it");
                 seen.store(round, Ordering::Release);
@@ -371,9 +371,9 @@ mod tests {
     fn it_wakes_up_by_itself_and_not_before_the_instant() {
         let (worker, mut lead) = (Worker::default(), Lead::default());
         for _ in 0..5 {
-            let instant_ns = sys::now_ns() + 1_000_000;
+            let instant_ns = clock::now_ns() + 1_000_000;
             assert!(!worker.wait_for_call(instant_ns, &mut lead));
-            assert!(sys::now_ns() >= instant_ns);
+            assert!(clock::now_ns() >= instant_ns);
         }
     }
 

@@ -36,7 +36,7 @@ use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Vertex};
 use crate::level::{Levels, Role};
 use crate::office::Office;
 use crate::worker::Worker;
-use crate::{edge, sys};
+use crate::{clock, edge, sys};
 
 /// An instance that has finished, and is not reported yet.
 pub(crate) struct Left {
@@ -161,7 +161,7 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     }
 
     fn now_ns(&self) -> u64 {
-        self.time.of_run(sys::now_ns())
+        self.time.of_run(clock::now_ns())
     }
 
     fn on_clock(&self, time_ns: u64) -> u64 {
@@ -247,18 +247,18 @@ impl State {
             self.engine.placement.current(core).is_none() && !self.engine.placement.is_wanted(core)
         };
         let next_ns = self.engine.scheduler.next_event_ns();
-        let has_begun = sys::now_ns() >= self.time.epoch_ns;
+        let has_begun = clock::now_ns() >= self.time.epoch_ns;
         let Some(next_ns) = next_ns.filter(|_| has_begun && cores.into_iter().all(is_idle)) else {
             return false;
         };
-        let now_ns = self.time.of_run(sys::now_ns());
+        let now_ns = self.time.of_run(clock::now_ns());
         self.time.skipped_ns += next_ns.saturating_sub(now_ns);
         true
     }
 
     /// Writes down what has happened now to an instance.
     pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) {
-        self.note_at(sys::now_ns(), what, core, vertex);
+        self.note_at(clock::now_ns(), what, core, vertex);
     }
 
     /// Writes down what happened to an instance at a time on the clock.
@@ -309,7 +309,7 @@ impl State {
             FaultCause::Overrun => ("its budget was exceeded".into(), true),
         };
         let instance = self.engine.scheduler.instance_of(vertex);
-        at_edge::failed(instance, sys::now_ns());
+        at_edge::failed(instance, clock::now_ns());
         let (engine, mut port) = self.parts(workers);
         let now_ns = port.now_ns();
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
@@ -326,7 +326,7 @@ impl State {
 
     pub(crate) fn carry_out(&mut self, workers: &[Worker]) {
         if let Some((core, occupant)) = self.interrupted.take() {
-            let now_ns = sys::now_ns();
+            let now_ns = clock::now_ns();
             // It may have returned already, and wait for the lock.
             self.resumed_ns[self.active[core.index()]] = now_ns;
             self.note_at(now_ns, EventKind::Resume, core, occupant);
@@ -352,7 +352,7 @@ impl State {
             return;
         }
         self.preemptions += 1;
-        let now_ns = self.since_epoch(sys::now_ns());
+        let now_ns = self.since_epoch(clock::now_ns());
         let waiting = self.engine.suspend(core, now_ns, demoted);
         self.seats[demoted] = None;
         self.replace(core, workers);
@@ -431,7 +431,7 @@ impl State {
                     workers[parked].call();
                 }
                 if let Some(vertex) = self.engine.placement.current(core.index()) {
-                    self.resumed_ns[parked] = sys::now_ns();
+                    self.resumed_ns[parked] = clock::now_ns();
                     self.note_at(self.resumed_ns[parked], EventKind::Resume, core, vertex);
                 }
                 None

@@ -15,7 +15,7 @@ use sched_dag::{CoreId, DagId};
 use crate::platform::HOST;
 use crate::state::{FaultCause, Number};
 use crate::team::Team;
-use crate::{Linux, Mechanism, sys};
+use crate::{Linux, Mechanism, clock, sys};
 use fass::platform::SubtaskRunner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
@@ -65,7 +65,7 @@ impl Stage {
         for core in 0..cores {
             state.pin(core as usize, CoreId(core), &team.workers);
         }
-        state.time = crate::state::RunTime::beginning(sys::now_ns());
+        state.time = crate::state::RunTime::beginning(clock::now_ns());
         drop(state);
         Self {
             team,
@@ -109,7 +109,7 @@ impl Stage {
             // Its worker reports that, behind another thread that has had the lock, for a signal.
             "end-behind" => {
                 let (worker, runner) = self.running.remove(name).unwrap();
-                let finish_ns = sys::now_ns();
+                let finish_ns = clock::now_ns();
                 team.workers[worker].report(None);
                 let mut state = team.lock();
                 state.step(&team.workers, |moment| {
@@ -267,7 +267,7 @@ fn an_earlier_event_is_not_missed() {
     let rounds = if cfg!(miri) { 5 } else { 2_000 };
     for round in 0..rounds {
         // In the far future, so that none is due while it is settled.
-        let event_ns = sys::now_ns() + 1_000_000_000_000;
+        let event_ns = clock::now_ns() + 1_000_000_000_000;
         let before_ns = if round % 2 == 0 {
             u64::MAX
         } else {

@@ -1,0 +1,276 @@
+//! The clock of all threads, read from the processor's counter.
+//!
+//! A *base* is a reading of the counter, the time of CLOCK_MONOTONIC then, and the rate of both.
+//! The time is that of the latest base, and so many ticks more. A thread that finds the base older
+//! than some 100 us asks the system's clock, and makes a new base unless another thread does so
+//! just then: no thread waits for another.
+//!
+//! # Bounds
+//!
+//! - The time never goes back: a base begins where the base before can have come to, at the least.
+//! - A reading is ahead of CLOCK_MONOTONIC by the duration of that call, mostly 20 ns and 4 us at
+//!   most, and differs by the slew of two bases, 0.1 us at most. A base that is ahead runs slower,
+//!   so that the next base is not. A jump of the system's clock is taken with the next base.
+//! - A processor may read its counter some tens of nanoseconds ahead of the program's order. So a
+//!   reading after another thread's may be lower by so much: events of different threads are put
+//!   in order where they are written down (`State::now_ns`).
+//! - Where the counter is not the system's own clock, each reading asks the system.
+
+#![allow(unsafe_code, reason = "the processor's counter")]
+
+use std::sync::atomic::{AtomicU64, Ordering, fence};
+use std::sync::{Mutex, OnceLock};
+
+use crate::sys;
+
+/// How many ticks a base is good for.
+const FRESH: u64 = 1 << 18;
+
+/// How many ticks the call of the system's clock may take, for a base to be made of it.
+const PROMPT: u64 = 1 << 13;
+
+/// How far the rate is measured back, in ticks: once to twice that.
+const WINDOW: u64 = 1 << 31;
+
+/// From this much on, the system's clock has jumped, or the counter has.
+const JUMP_NS: u64 = 1_000_000;
+
+/// The counter and the time at an instant.
+#[derive(Clone, Copy, Debug, Default)]
+struct Base {
+    ticks: u64,
+    ns: u64,
+    /// Nanoseconds a tick, times 2^32.
+    rate: u64,
+}
+
+impl Base {
+    /// Returns the time so many ticks later.
+    const fn after(self, ticks: u64) -> u64 {
+        self.ns + (ticks * self.rate >> 32)
+    }
+}
+
+/// The latest two bases, on lines of their own. While the next is written, the latest stays.
+#[repr(align(128))]
+struct Bases {
+    /// How many bases there were.
+    made: AtomicU64,
+    places: [[AtomicU64; 3]; 2],
+}
+
+static BASES: Bases = Bases {
+    made: AtomicU64::new(0),
+    places: [const { [const { AtomicU64::new(0) }; 3] }; 2],
+};
+
+impl Bases {
+    /// Returns the latest base, and how many ticks ago it was.
+    #[inline]
+    fn latest(&self) -> (Base, u64) {
+        loop {
+            let made = self.made.load(Ordering::Acquire);
+            let place = &self.places[(made & 1) as usize];
+            let [ticks, ns, rate] = [0, 1, 2].map(|word| place[word].load(Ordering::Relaxed));
+            let since = counter().wrapping_sub(ticks);
+            // If any word is of a later base, so is the number.
+            fence(Ordering::Acquire);
+            if self.made.load(Ordering::Relaxed) == made {
+                return (Base { ticks, ns, rate }, since);
+            }
+        }
+    }
+
+    /// Puts a base in the place of the older. By one thread at a time.
+    fn put(&self, base: Base) {
+        let made = self.made.load(Ordering::Relaxed) + 1;
+        fence(Ordering::Release);
+        let words = [base.ticks, base.ns, base.rate];
+        for (place, word) in self.places[(made & 1) as usize].iter().zip(words) {
+            place.store(word, Ordering::Relaxed);
+        }
+        self.made.store(made, Ordering::Release);
+    }
+}
+
+/// Returns the time, which never jumps back.
+#[inline]
+pub(crate) fn now_ns() -> u64 {
+    let (base, since) = BASES.latest();
+    match since < FRESH {
+        true => base.after(since),
+        false => renew(base),
+    }
+}
+
+/// Asks the system's clock, and makes a base of that if it can.
+#[cold]
+#[inline(never)]
+fn renew(latest: Base) -> u64 {
+    static RATES: Mutex<Rates> = Mutex::new(Rates::NONE);
+    let ticks = counter();
+    let system_ns = sys::monotonic_ns();
+    let is_prompt = counter().wrapping_sub(ticks) < PROMPT;
+    // No reading of the latest base was above that.
+    let ns = system_ns.max(latest.after(FRESH));
+    if is_prompt
+        && has_counter()
+        && let Ok(mut rates) = RATES.try_lock()
+        && BASES.latest().0.ticks == latest.ticks
+        && let Some(rate) = rates.learn(ticks, system_ns)
+    {
+        let slower = ((ns - system_ns).min(1 << 20) << 32) / FRESH;
+        let rate = rate - slower.min(rate / 2);
+        BASES.put(Base { ticks, ns, rate });
+    }
+    ns
+}
+
+/// The instants between which the rate is measured.
+struct Rates {
+    older: Base,
+    newer: Base,
+}
+
+impl Rates {
+    const NONE: Self = Self {
+        older: Base {
+            ticks: 0,
+            ns: 0,
+            rate: 0,
+        },
+        newer: Base {
+            ticks: 0,
+            ns: 0,
+            rate: 0,
+        },
+    };
+
+    /// Takes an instant, and returns the rate up to it; `None` at first.
+    fn learn(&mut self, ticks: u64, ns: u64) -> Option<u64> {
+        let Self { older, newer } = *self;
+        let expected_ns =
+            u128::from(ticks.wrapping_sub(older.ticks)) * u128::from(newer.rate) >> 32;
+        let passed_ns = u128::from(ns.saturating_sub(older.ns));
+        let has_jumped = passed_ns.abs_diff(expected_ns) > u128::from(JUMP_NS);
+        let here = Base {
+            ticks,
+            ns,
+            rate: newer.rate,
+        };
+        if older.ticks == 0 || newer.rate > 0 && has_jumped {
+            *self = Self {
+                older: here,
+                newer: here,
+            };
+        } else if ticks - newer.ticks > WINDOW {
+            *self = Self {
+                older: newer,
+                newer: here,
+            };
+        }
+        let since = ticks - self.older.ticks;
+        if since > 8 * FRESH {
+            let rate = (u128::from(ns - self.older.ns) << 32) / u128::from(since);
+            self.newer.rate = u64::try_from(rate).unwrap_or(0);
+        }
+        (self.newer.rate > 0).then_some(self.newer.rate)
+    }
+}
+
+/// Reports whether the counter runs alike on all processors, at any speed of theirs, as far as the
+/// system relies on that.
+fn has_counter() -> bool {
+    static HAS: OnceLock<bool> = OnceLock::new();
+    *HAS.get_or_init(|| {
+        let source = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
+        let source = std::fs::read_to_string(source).unwrap_or_default();
+        matches!(source.trim(), "tsc" | "kvm-clock") && is_counter_invariant()
+    })
+}
+
+/// Reports whether the processor says that its counter always runs at one rate (AMD manual 3,
+/// CPUID function 8000_0007h).
+#[cfg(target_arch = "x86_64")]
+fn is_counter_invariant() -> bool {
+    use std::arch::x86_64::__cpuid;
+    const POWER: u32 = 0x8000_0007;
+    __cpuid(0x8000_0000).eax >= POWER && __cpuid(POWER).edx >> 8 & 1 == 1
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+const fn is_counter_invariant() -> bool {
+    false
+}
+
+/// Returns the processor's counter.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+fn counter() -> u64 {
+    // SAFETY: every x86-64 has the instruction, and Linux lets programs use it.
+    unsafe { std::arch::x86_64::_rdtsc() }
+}
+
+/// Without one each reading asks the system.
+#[cfg(not(target_arch = "x86_64"))]
+const fn counter() -> u64 {
+    u64::MAX
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use super::*;
+
+    /// Until there have been so many bases, or for so many readings where there is no counter.
+    fn readings() -> impl Iterator<Item = u64> {
+        let from = BASES.made.load(Ordering::Relaxed);
+        let goes_on = move |round: &u32| {
+            BASES.made.load(Ordering::Relaxed) < from + 20 && (has_counter() || *round < 1_000)
+        };
+        (0..).take_while(goes_on).map(|_| now_ns())
+    }
+
+    #[test]
+    fn it_is_the_systems_clock() {
+        const BOUND_NS: u64 = 10_000;
+        let mut before_ns = sys::monotonic_ns();
+        for now_ns in readings() {
+            let after_ns = sys::monotonic_ns();
+            assert!(before_ns <= now_ns + BOUND_NS && now_ns <= after_ns + BOUND_NS);
+            before_ns = after_ns;
+        }
+    }
+
+    #[test]
+    fn it_never_goes_back_in_a_thread_and_hardly_between_threads() {
+        const BOUND_NS: u64 = 1_000;
+        let latest_ns = AtomicU64::new(0);
+        thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(|| {
+                    let mut own_ns = 0;
+                    let mut others_ns = 0;
+                    for now_ns in readings() {
+                        assert!(now_ns >= own_ns && now_ns + BOUND_NS >= others_ns);
+                        own_ns = now_ns;
+                        latest_ns.fetch_max(now_ns, Ordering::AcqRel);
+                        others_ns = latest_ns.load(Ordering::Acquire);
+                    }
+                });
+            }
+        });
+    }
+
+    #[test]
+    fn a_jump_leaves_the_rate() {
+        let mut rates = Rates::NONE;
+        let (tick, ns) = (9 * FRESH, 9 * FRESH / 2);
+        assert_eq!(rates.learn(tick, 0), None);
+        assert_eq!(rates.learn(2 * tick, ns), Some(1 << 31));
+        let later_ns = 2 * ns + 2 * JUMP_NS;
+        assert_eq!(rates.learn(3 * tick, later_ns), Some(1 << 31));
+        assert_eq!(rates.learn(4 * tick, later_ns + ns), Some(1 << 31));
+    }
+}
