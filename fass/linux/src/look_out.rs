@@ -58,7 +58,11 @@ impl LookOut {
     /// Says when the next event is. Under the scheduler's lock.
     #[inline]
     pub(crate) fn announce(&self, next_ns: u64) {
-        self.next_ns.store(next_ns, Ordering::SeqCst);
+        // Where workers poll, the release thread looks at the end alone.
+        match self.polls && next_ns > 0 {
+            true => self.next_ns.store(next_ns, Ordering::Release),
+            false => self.next_ns.store(next_ns, Ordering::SeqCst),
+        }
         self.claimed_until_ns.store(0, Ordering::Release);
     }
 
@@ -125,9 +129,12 @@ impl LookOut {
 
     /// Reports whether the release thread, which looks at `looks_at_ns`, would come too late for
     /// the next event, or longer after it than it ever may.
-    pub(crate) const fn is_late(&self, looks_at_ns: u64, next_ns: u64) -> bool {
+    #[inline]
+    pub(crate) fn is_late(&self, looks_at_ns: &AtomicU64, next_ns: u64) -> bool {
         // At the end of all it has to look in any case.
-        (!self.polls || next_ns == 0) && next_ns.saturating_add(2 * PATIENCE_NS) < looks_at_ns
+        let is_needed = !self.polls || next_ns == 0;
+        let latest_ns = next_ns.saturating_add(2 * PATIENCE_NS);
+        is_needed && latest_ns < looks_at_ns.load(Ordering::SeqCst)
     }
 }
 
@@ -149,7 +156,7 @@ mod tests {
         assert_eq!(look_out.of_worker(CoreId(0), 7), 7);
         assert_eq!(look_out.of_worker(CoreId(1), 7), 7 + PATIENCE_NS);
         assert_eq!(look_out.of_release(7, 0), 7 + 2 * PATIENCE_NS);
-        assert!(!look_out.is_late(7 + 2 * PATIENCE_NS, 7));
+        assert!(!look_out.is_late(&(7 + 2 * PATIENCE_NS).into(), 7));
         look_out.leave(CoreId(0));
         // The first one has work.
         assert_eq!(look_out.of_worker(CoreId(1), 7), 7);

@@ -3,7 +3,6 @@
 //! A run is there, too: its threads while it goes on, and what it leaves behind.
 
 use std::ops::Deref;
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -289,9 +288,9 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();
     let mut faults = Vec::new();
-    for (team, state) in teams.iter().zip(&mut states) {
-        counts.hand_offs += team.hand_offs.load(Ordering::Relaxed);
-        counts.calls += team.calls.load(Ordering::Relaxed);
+    for state in &mut states {
+        counts.hand_offs += state.hand_offs;
+        counts.calls += state.calls;
         counts.preemptions += state.preemptions;
         faults.append(&mut state.faults);
     }

@@ -30,7 +30,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::SubtaskRunner;
-use sched_dag::engine::{NextAction, PlatformPort as _};
+use sched_dag::engine::NextAction;
 use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 
 use crate::level::{Levels, Role};
@@ -71,7 +71,7 @@ pub(crate) fn own_plan() -> Option<u64> {
 /// Reports whether the calling thread may call the app's code: not one that decides, or holds the
 /// scheduler's lock.
 pub(crate) fn may_call_app() -> bool {
-    with_own_worker(|worker| !worker.has_returned()).unwrap_or(!is_of_run())
+    !is_of_run() || edge::running().is_some()
 }
 
 /// Ends the instance that the calling thread runs, which can neither return nor unwind, and reports
@@ -90,6 +90,8 @@ pub(crate) struct Team {
     state: Mutex<State>,
     pub(crate) workers: Box<[Worker]>,
     pub(crate) levels: Option<Levels>,
+    /// Whether a worker can be demoted.
+    demotes: bool,
     polls: bool,
     skips_idle: bool,
     pub(crate) cluster: ClusterId,
@@ -99,10 +101,6 @@ pub(crate) struct Team {
     pub(crate) looks_at_ns: AtomicU64,
     /// How many threads have begun.
     begun: AtomicU32,
-    /// How often a completion gave its own core the next instance.
-    pub(crate) hand_offs: AtomicU64,
-    /// How often a worker was called, which is a wake of the kernel's.
-    pub(crate) calls: AtomicU64,
     /// By vertex, what its instance has taken; of no vertex if no subtask waits.
     turns: Box<[TurnClock]>,
 }
@@ -132,11 +130,14 @@ impl TurnClock {
 impl Team {
     /// Makes it; idle threads poll, and the run's time skips what would pass idly, or not.
     pub(crate) fn new(
-        state: State,
+        mut state: State,
         office: &Arc<Office>,
         (polls, skips_idle): (bool, bool),
         budget_factor: u64,
     ) -> Self {
+        let subtasks = state.engine.task_set.dags().iter();
+        let mut subtasks = subtasks.flat_map(|dag| dag.subtasks());
+        state.port.demotes |= subtasks.any(|of| of.most_execution_ns(budget_factor) < u64::MAX);
         let workers = state.seats.iter().map(|_| Worker::new(polls));
         Self {
             turns: TurnClock::all(&state.engine.task_set, budget_factor),
@@ -144,13 +145,12 @@ impl Team {
             polls,
             skips_idle,
             levels: state.levels,
+            demotes: state.port.demotes,
             cluster: state.engine.cluster,
             office: Arc::clone(office),
             look_out: LookOut::new(polls),
             looks_at_ns: AtomicU64::new(u64::MAX),
             begun: AtomicU32::new(0),
-            hand_offs: AtomicU64::new(0),
-            calls: AtomicU64::new(0),
             state: Mutex::new(state),
         }
     }
@@ -190,9 +190,9 @@ impl Team {
     /// and where idle workers watch, none but they see to events.
     pub(crate) fn begin(&self, epoch_ns: u64) {
         let mut state = self.lock();
-        state.time = RunTime::beginning(epoch_ns);
+        state.port.time = RunTime::beginning(epoch_ns);
         self.look_out.announce(epoch_ns);
-        let cores = state.active.len();
+        let cores = state.port.active.len();
         drop(state);
         self.workers[..cores].iter().for_each(Worker::call);
         self.office.ring(self.cluster);
@@ -221,7 +221,9 @@ impl Team {
                     if let Some(left) = state.take_left(me) {
                         self.report(me, state, left.runner, Ok(()), left.finish_ns)
                     } else {
-                        let next = state.seats[me].and_then(|_| state.find_work(me, &self.workers));
+                        let now_ns = state.now_ns();
+                        let next = (state.seats[me])
+                            .and_then(|_| state.find_work(me, &self.workers, now_ns));
                         self.settle(me, &state, next.is_some());
                         next
                     }
@@ -233,17 +235,13 @@ impl Team {
                     state.step(&self.workers, |moment| {
                         core.into_iter().for_each(|core| moment.prefer(core));
                     });
-                    match core {
-                        Some(_) => self.go_on(me, state),
-                        None => None,
-                    }
+                    let now_ns = state.engine.scheduler.now_ns();
+                    core.and_then(|_| self.go_on(me, state, now_ns))
                 }
             };
-            while let Some(mut runner) = next.take() {
-                let outcome = self.execute(&mut runner);
-                match self.complete(me, runner, outcome) {
-                    Ok(found) => next = found,
-                    Err(Abandoned) => return section::forget(),
+            while next.is_some() {
+                if let Err(Abandoned) = self.run_on(me, &mut next) {
+                    return section::forget();
                 }
             }
         }
@@ -278,20 +276,44 @@ impl Team {
         woken
     }
 
-    /// Calls the function; the error is a panic's message.
-    #[inline]
-    fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), FaultCause> {
-        edge::note_running(Some(runner.instance));
-        let outcome = panics::caught(|| match self.turns.get(runner.vertex.index()) {
-            Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
-            _ => {
-                runner.run();
+    /// Calls one function after the other, as long as the scheduler has one; a panic ends that, and
+    /// the instance. Catching it takes its time, so all are called from one place that does.
+    fn run_on(&self, me: Number, next: &mut Option<Box<SubtaskRunner>>) -> Result<(), Abandoned> {
+        let message = match panics::caught(|| self.run_all(me, next)) {
+            Ok(done) => return done,
+            Err(message) => message,
+        };
+        edge::note_running(None);
+        match next.take() {
+            // It was not in a function.
+            None => std::panic::resume_unwind(Box::new(message)),
+            Some(runner) => {
+                *next = self.complete(me, runner, Err(FaultCause::Panic(message)))?;
                 Ok(())
             }
-        });
-        let outcome = outcome.map_err(FaultCause::Panic).flatten();
-        edge::note_running(None);
-        outcome
+        }
+    }
+
+    /// Calls the functions. A runner stays with the caller until its function has returned.
+    #[inline]
+    fn run_all(&self, me: Number, next: &mut Option<Box<SubtaskRunner>>) -> Result<(), Abandoned> {
+        while let Some(runner) = next {
+            edge::note_running(Some(runner.instance));
+            let outcome = match self.turns.get(runner.vertex.index()) {
+                Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
+                _ => {
+                    runner.run();
+                    Ok(())
+                }
+            };
+            edge::note_running(None);
+            let Some(runner) = next.take() else { break };
+            *next = match self.demotes || outcome.is_err() {
+                true => self.complete(me, runner, outcome)?,
+                false => self.pass_on(me, runner),
+            };
+        }
+        Ok(())
     }
 
     /// Runs a turn of an instance, and adds what it takes to what the others have taken.
@@ -310,8 +332,26 @@ impl Team {
         }
     }
 
+    /// Reports that a worker's instance has finished, where none is ever demoted, and finds what it
+    /// does next.
+    #[inline(always)]
+    fn pass_on(&self, me: Number, runner: Box<SubtaskRunner>) -> Option<Box<SubtaskRunner>> {
+        let finish_ns = clock::now_ns();
+        let mut state = self.lock();
+        let Some(core) = state.seats[me] else {
+            return self.report(me, state, runner, Ok(()), finish_ns);
+        };
+        let end_ns = state.end_of(me, finish_ns);
+        match state.end((core, me), runner, end_ns, &self.workers) {
+            NextAction::Run(runner) if state.changes_nothing_else() => {
+                state.hand_offs += 1;
+                Some(runner)
+            }
+            action => self.after_end((core, me), state, action, end_ns),
+        }
+    }
+
     /// Reports that a worker's instance has ended, and finds what it does next.
-    #[inline]
     pub(crate) fn complete(
         &self,
         me: Number,
@@ -342,7 +382,6 @@ impl Team {
     }
 
     /// Tells the scheduler of the end of a worker's instance, and finds what it does next.
-    #[inline]
     pub(crate) fn report(
         &self,
         me: Number,
@@ -356,28 +395,9 @@ impl Team {
         let seat = state_now.seats[me];
         match (outcome, seat) {
             (Ok(()), Some(core)) => {
-                let end_ns = state_now.since_epoch(state_now.end_of(me, finish_ns));
-                let is_alone = state_now.left.is_empty();
-                let (engine, mut port) = state_now.parts(workers);
-                let ended = (core, vertex);
-                match engine.complete(ended, runner, end_ns, is_alone, &mut port) {
-                    NextAction::Run(runner) => {
-                        self.hand_offs.fetch_add(1, Ordering::Relaxed);
-                        self.announce(&state);
-                        if !state.rung.is_empty() {
-                            self.call(state);
-                        }
-                        return Some(runner);
-                    }
-                    NextAction::Look { .. } => {}
-                    NextAction::Step(ended) => {
-                        let now_ns = port.now_ns();
-                        engine.step((now_ns, core), &mut port, |moment| {
-                            ended.into_iter().for_each(|turn| moment.end_turn(turn));
-                        });
-                        state_now.carry_out(workers);
-                    }
-                }
+                let end_ns = state_now.end_of(me, finish_ns);
+                let action = state_now.end((core, me), runner, end_ns, workers);
+                return self.after_end((core, me), state, action, end_ns);
             }
             (Ok(()), None) => state_now.end_parked(me, runner, finish_ns, workers),
             (Err(cause), _) => {
@@ -394,18 +414,55 @@ impl Team {
         if let Some(core) = seat {
             state_now.report_left(core, workers);
         }
-        self.go_on(me, state)
+        let now_ns = state.now_ns();
+        self.go_on(me, state, now_ns)
     }
 
-    /// Ends a worker's step: finds what it does next, and calls others.
-    fn go_on(&self, me: Number, mut state: MutexGuard<'_, State>) -> Option<Box<SubtaskRunner>> {
-        let mut next = state.find_work(me, &self.workers);
-        if next.is_none() && self.skips_idle && state.skip_to_next_event() {
+    /// Finds what a worker does after the end of its core's instance.
+    fn after_end(
+        &self,
+        (core, me): (CoreId, Number),
+        mut state: MutexGuard<'_, State>,
+        action: NextAction<Box<SubtaskRunner>>,
+        end_ns: u64,
+    ) -> Option<Box<SubtaskRunner>> {
+        match action {
+            NextAction::Run(runner) => {
+                state.hand_offs += 1;
+                self.announce(&state);
+                self.call(state);
+                return Some(runner);
+            }
+            NextAction::Look { .. } => {}
+            NextAction::Step(ended) => {
+                let (engine, mut port) = state.parts(&self.workers);
+                engine.step((end_ns, core), &mut port, |moment| {
+                    ended.into_iter().for_each(|turn| moment.end_turn(turn));
+                });
+                state.carry_out(&self.workers);
+            }
+        }
+        state.report_left(core, &self.workers);
+        self.go_on(me, state, end_ns)
+    }
+
+    /// Ends a worker's step at an instant: finds what it does next, and calls others.
+    fn go_on(
+        &self,
+        me: Number,
+        mut state: MutexGuard<'_, State>,
+        now_ns: u64,
+    ) -> Option<Box<SubtaskRunner>> {
+        let mut next = state.find_work(me, &self.workers, now_ns);
+        if next.is_none()
+            && self.skips_idle
+            && let Some(now_ns) = state.skip_to_next_event(now_ns)
+        {
             let core = state.seats[me];
-            state.step(&self.workers, |moment| {
+            state.step_at(now_ns, &self.workers, |moment| {
                 core.into_iter().for_each(|core| moment.prefer(core));
             });
-            next = core.and_then(|_| state.find_work(me, &self.workers));
+            next = core.and_then(|_| state.find_work(me, &self.workers, now_ns));
         }
         self.settle(me, &state, next.is_some());
         self.announce(&state);
@@ -425,20 +482,22 @@ impl Team {
     /// Gives the lock back, and makes the workers of all cores that should run something
     /// look for it.
     pub(crate) fn call<'a>(&'a self, mut state: MutexGuard<'a, State>) {
+        if state.calls_none() {
+            return;
+        }
         let mut called = [None; AT_ONCE];
         loop {
             called.fill(None);
             for (place, worker) in called.iter_mut().zip(state.take_called(AT_ONCE)) {
                 *place = Some(worker);
             }
-            let bell = state.rung.pop();
-            let has_more = called[AT_ONCE - 1].is_some() || !state.rung.is_empty();
+            let bell = state.port.rung.pop();
+            let has_more = called[AT_ONCE - 1].is_some() || !state.port.rung.is_empty();
             drop(state);
             if let Some(bell) = bell {
                 sys::wake(&bell, i32::MAX);
             }
             for worker in called.into_iter().flatten() {
-                self.calls.fetch_add(1, Ordering::Relaxed);
                 self.workers[worker].call();
             }
             if !has_more {
@@ -452,7 +511,7 @@ impl Team {
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
         let next_ns = match state.engine.scheduler.next_event_ns() {
-            Some(next_ns) => state.time.on_clock(next_ns),
+            Some(next_ns) => state.port.time.on_clock(next_ns),
             None if state.engine.scheduler.is_finished() => 0,
             None => u64::MAX,
         };
@@ -463,10 +522,7 @@ impl Team {
     #[inline]
     pub(crate) fn announce_at(&self, next_ns: u64) {
         self.look_out.announce(next_ns);
-        if self
-            .look_out
-            .is_late(self.looks_at_ns.load(Ordering::SeqCst), next_ns)
-        {
+        if self.look_out.is_late(&self.looks_at_ns, next_ns) {
             self.looks_at_ns.store(next_ns, Ordering::SeqCst);
             self.office.ring(self.cluster);
         }
@@ -517,7 +573,7 @@ impl Budgets {
         let by_vertex: Box<[u64]> = subtasks.map(|s| s.most_execution_ns(wcets)).collect();
         Self {
             shortest_ns: by_vertex.iter().copied().min().unwrap_or(u64::MAX),
-            seen: vec![Seen::default(); state.active.len()].into(),
+            seen: vec![Seen::default(); state.port.active.len()].into(),
             by_vertex,
         }
     }
@@ -534,7 +590,7 @@ impl Budgets {
                 continue;
             };
             let budget_ns = self.by_vertex[vertex.index()];
-            let worker = &team.workers[state.active[core.index()]];
+            let worker = &team.workers[state.port.active[core.index()]];
             let processor_ns = worker.thread().and_then(sys::processor_time_ns);
             let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
                 continue;
@@ -631,9 +687,9 @@ impl Team {
         budgets: &mut Budgets,
         rests: &mut bool,
     ) -> Option<u64> {
-        if clock::now_ns() < state.time.epoch_ns {
+        if clock::now_ns() < state.port.time.epoch_ns {
             // What is asked for before time 0 is done then.
-            return Some(state.time.epoch_ns);
+            return Some(state.port.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
         let look_ns = loop {
@@ -644,7 +700,7 @@ impl Team {
         };
         self.announce(state);
         let is_finished = state.engine.scheduler.is_finished();
-        let opened = std::mem::take(&mut state.opened);
+        let opened = std::mem::take(&mut state.port.opened);
         if !self.office.settle(rests, is_finished, opened) {
             if is_finished {
                 // This one rests.
@@ -674,7 +730,7 @@ impl Team {
     /// Ends a core's instance, which has exceeded its budget, and with it its DAG: its function
     /// cannot be taken back.
     pub(crate) fn abandon(&self, state: &mut State, core: CoreId) {
-        let number = state.active[core.index()];
+        let number = state.port.active[core.index()];
         let Some(vertex) = state.engine.placement.current(core.index()) else {
             return;
         };
@@ -697,7 +753,7 @@ impl Team {
             Some(core) => {
                 state.engine.placement.lose(core.index());
                 state.replace(core, workers);
-                workers[state.active[core.index()]].call();
+                workers[state.port.active[core.index()]].call();
             }
             None => state.engine.placement.lose_parked(vertex),
         }

@@ -196,7 +196,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
 
     /// Takes note that a core has finished an instance. Where `is_alone`, that may be all of the
     /// instant, and the core may go on without a step.
-    #[inline]
+    #[inline(always)]
     pub fn complete<C: PlatformPort<B>>(
         &mut self,
         (core, vertex): (CoreId, Vertex),

@@ -121,6 +121,9 @@ impl Journal {
             happened.map(|(what, time_ns, subject)| Event::words(time_ns, what, core, subject));
         if self.events.capacity() - self.events.len() >= N {
             self.events.extend(words);
+        } else if self.events.capacity() == 0 && !(self.grows | self.is_closed) {
+            self.lost += N as u64;
+            self.is_incomplete = true;
         } else {
             // By values, so that the words need not lie in memory for the other case.
             for [time_ns, job, rest] in words {

@@ -27,11 +27,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
 use fass::platform::{SubtaskRunner, at_edge};
-use sched_dag::engine::{Engine, FaultCost, PlatformPort};
+use sched_dag::engine::{Engine, FaultCost, NextAction, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, Request};
 use sched_dag::placement::NextWork;
-use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Vertex};
+use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Preemption, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::office::Office;
@@ -77,16 +77,14 @@ pub struct Fault {
 
 /// The scheduler of a cluster, its bodies, and which worker runs what.
 pub(crate) struct State {
-    pub(crate) office: Arc<Office>,
+    pub(crate) port: PortState,
     pub(crate) engine: Engine<Box<SubtaskRunner>, Number>,
-    /// By core, the worker that runs what the core should.
-    pub(crate) active: Box<[Number]>,
     /// By worker, the core of which it is the active one.
     pub(crate) seats: Box<[Option<CoreId>]>,
     /// By worker, the core to whose processor it is pinned.
     pinned: Box<[Option<CoreId>]>,
-    /// By worker, on the clock, the time before which its instance does not end: when that last went
-    /// on after it had lost its core, or another thread's step was written down as of the core.
+    /// By worker, the time before which its instance does not end: when that has begun, or last gone
+    /// on, or another thread's step was written down as of the core.
     resumed_ns: Box<[u64]>,
     /// The core and vertex from which a worker that reports an end has just taken the processor.
     interrupted: Option<(CoreId, Vertex)>,
@@ -96,17 +94,31 @@ pub(crate) struct State {
     pub(crate) spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
-    /// How many letters were taken that the release thread has not settled yet.
-    pub(crate) opened: u64,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
     called: Vec<CoreId>,
-    /// The words on which threads of drivers may sleep that a question was just posted for.
-    pub(crate) rung: Vec<Arc<AtomicU32>>,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
-    pub(crate) time: RunTime,
     pub(crate) preemptions: u64,
+    /// How often a completion gave its own core the next instance.
+    pub(crate) hand_offs: u64,
+    /// How often a worker was called, which is a wake of the kernel's.
+    pub(crate) calls: u64,
+}
+
+/// The part of a cluster's state that its engine's port needs.
+pub(crate) struct PortState {
+    office: Arc<Office>,
+    cluster: ClusterId,
+    /// By core, the worker that runs what the core should.
+    pub(crate) active: Box<[Number]>,
+    pub(crate) time: RunTime,
+    /// How many letters were taken that the release thread has not settled yet.
+    pub(crate) opened: u64,
+    /// The words on which threads of drivers may sleep that a question was just posted for.
+    pub(crate) rung: Vec<Arc<AtomicU32>>,
+    /// Whether a worker can be demoted: instances can be preempted, or have budgets.
+    pub(crate) demotes: bool,
 }
 
 /// The time of a cluster's run, as it follows from the clock.
@@ -143,13 +155,8 @@ impl RunTime {
 
 /// Linux below a cluster's engine: its clock, its threads, and the office.
 pub(crate) struct ThreadPort<'s> {
-    office: &'s Office,
-    cluster: ClusterId,
-    time: RunTime,
-    active: &'s [Number],
+    state: &'s mut PortState,
     workers: &'s [Worker],
-    opened: &'s mut u64,
-    rung: &'s mut Vec<Arc<AtomicU32>>,
 }
 
 impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
@@ -161,37 +168,39 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     }
 
     fn now_ns(&self) -> u64 {
-        self.time.of_run(clock::now_ns())
+        self.state.time.of_run(clock::now_ns())
     }
 
     fn on_clock(&self, time_ns: u64) -> u64 {
-        self.time.on_clock(time_ns)
+        self.state.time.on_clock(time_ns)
     }
 
     #[inline]
     fn start(&mut self, core: CoreId, _: &mut Box<SubtaskRunner>, instant_ns: u64) -> u64 {
-        self.workers[self.active[core.index()]].run();
+        if self.state.demotes {
+            self.workers[self.state.active[core.index()]].run();
+        }
         instant_ns
     }
 
     /// A thread that sleeps is woken when the lock has been given back.
     fn wait(&mut self, _: CoreId, runner: &mut Box<SubtaskRunner>, _: u64) {
-        self.rung.extend(runner.body.bell());
+        self.state.rung.extend(runner.body.bell());
     }
 
     fn forward(&mut self, request: Request) -> bool {
-        self.office.send(Some(self.cluster), request)
+        self.state.office.send(Some(self.state.cluster), request)
     }
 
     #[inline]
     fn has_letters(&self) -> bool {
-        self.office.has_letters(self.cluster)
+        self.state.office.has_letters(self.state.cluster)
     }
 
     fn take_letters(&mut self) -> Option<&Mailboxes> {
-        let letters = self.office.open(self.cluster);
-        *self.opened += letters;
-        (letters > 0).then_some(&self.office.letters)
+        let letters = self.state.office.open(self.state.cluster);
+        self.state.opened += letters;
+        (letters > 0).then_some(&self.state.office.letters)
     }
 }
 
@@ -212,10 +221,18 @@ impl State {
         for (core, seat) in (0..).map(CoreId).zip(&mut seats[..cores]) {
             *seat = Some(core);
         }
-        Self {
+        let port = PortState {
             office: Arc::clone(office),
-            engine,
+            cluster: engine.cluster,
             active: (0..cores).collect(),
+            time: RunTime::NOT_BEGUN,
+            opened: 0,
+            rung: Vec::with_capacity(workers),
+            demotes: engine.scheduler.options().preemption == Preemption::Enabled,
+        };
+        Self {
+            port,
+            engine,
             seats,
             pinned: vec![None; workers].into_boxed_slice(),
             resumed_ns: vec![0; workers].into_boxed_slice(),
@@ -223,48 +240,55 @@ impl State {
             left: Vec::with_capacity(workers),
             spare: (cores..workers).collect(),
             abandoned: Vec::with_capacity(workers),
-            opened: 0,
             // Each subtask's, if no fault is survived.
             faults: Vec::with_capacity(workers),
             called: Vec::with_capacity(2 * cores),
-            rung: Vec::with_capacity(workers),
             processors,
             levels: office.levels,
-            time: RunTime::NOT_BEGUN,
             preemptions: 0,
+            hand_offs: 0,
+            calls: 0,
         }
     }
 
     /// Returns a time of the clock on the run's time.
     pub(crate) const fn since_epoch(&self, time_ns: u64) -> u64 {
-        self.time.of_run(time_ns)
+        self.port.time.of_run(time_ns)
     }
 
-    /// If nothing runs, lets the next event be due now; reports whether that is to be seen to.
-    pub(crate) fn skip_to_next_event(&mut self) -> bool {
-        let cores = 0..self.active.len();
+    /// Begins the instant at which the clock is, and returns that: another thread may have read the
+    /// clock later, and what it has written down is never behind what is written now.
+    pub(crate) fn now_ns(&mut self) -> u64 {
+        let now_ns = self.since_epoch(clock::now_ns());
+        self.begin(now_ns)
+    }
+
+    /// Begins the instant of a time that was read, likewise.
+    pub(crate) fn begin(&mut self, read_ns: u64) -> u64 {
+        let _ = self.engine.scheduler.at(read_ns);
+        self.engine.scheduler.now_ns()
+    }
+
+    /// If nothing runs, lets the next event be due now, and returns when that is.
+    pub(crate) fn skip_to_next_event(&mut self, now_ns: u64) -> Option<u64> {
+        let mut cores = 0..self.port.active.len();
         let is_idle = |core| {
             self.engine.placement.current(core).is_none() && !self.engine.placement.is_wanted(core)
         };
-        let next_ns = self.engine.scheduler.next_event_ns();
-        let has_begun = clock::now_ns() >= self.time.epoch_ns;
-        let Some(next_ns) = next_ns.filter(|_| has_begun && cores.into_iter().all(is_idle)) else {
-            return false;
-        };
-        let now_ns = self.time.of_run(clock::now_ns());
-        self.time.skipped_ns += next_ns.saturating_sub(now_ns);
-        true
+        let has_begun = now_ns > 0;
+        let next_ns = self.engine.scheduler.next_event_ns()?;
+        if !has_begun || !cores.all(is_idle) {
+            return None;
+        }
+        self.port.time.skipped_ns += next_ns.saturating_sub(now_ns);
+        Some(next_ns.max(now_ns))
     }
 
-    /// Writes down what has happened now to an instance.
-    pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) {
-        self.note_at(clock::now_ns(), what, core, vertex);
-    }
-
-    /// Writes down what happened to an instance at a time on the clock.
-    fn note_at(&mut self, time_ns: u64, what: EventKind, core: CoreId, vertex: Vertex) {
-        let time_ns = self.since_epoch(time_ns);
-        self.engine.note(what, core, vertex, time_ns);
+    /// Writes down what has happened now to an instance, and returns when.
+    pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) -> u64 {
+        let now_ns = self.now_ns();
+        self.engine.note(what, core, vertex, now_ns);
+        now_ns
     }
 
     /// Returns the engine, and the port for a step of it.
@@ -273,25 +297,44 @@ impl State {
         &'s mut self,
         workers: &'s [Worker],
     ) -> (&'s mut Engine<Box<SubtaskRunner>, Number>, ThreadPort<'s>) {
-        let port = ThreadPort {
-            office: &self.office,
-            cluster: self.engine.cluster,
-            time: self.time,
-            active: &self.active,
-            workers,
-            opened: &mut self.opened,
-            rung: &mut self.rung,
-        };
-        (&mut self.engine, port)
+        let state = &mut self.port;
+        (&mut self.engine, ThreadPort { state, workers })
+    }
+
+    /// Takes note that the instance of a core and its worker has ended, at a time of the run.
+    #[inline(always)]
+    pub(crate) fn end(
+        &mut self,
+        (core, me): (CoreId, Number),
+        runner: Box<SubtaskRunner>,
+        end_ns: u64,
+        workers: &[Worker],
+    ) -> NextAction<Box<SubtaskRunner>> {
+        let is_alone = self.left.is_empty();
+        let (engine, mut port) = self.parts(workers);
+        let ended = (core, runner.vertex);
+        let next = engine.complete(ended, runner, end_ns, is_alone, &mut port);
+        self.resumed_ns[me] = self.engine.scheduler.now_ns();
+        next
     }
 
     /// Lets the scheduler see what happens now, and decide.
     pub(crate) fn step(&mut self, workers: &[Worker], event: impl FnOnce(&mut Moment<'_>)) {
+        let now_ns = self.now_ns();
+        self.step_at(now_ns, workers, event);
+    }
+
+    /// Lets the scheduler see what happens at an instant, and decide.
+    pub(crate) fn step_at(
+        &mut self,
+        now_ns: u64,
+        workers: &[Worker],
+        event: impl FnOnce(&mut Moment<'_>),
+    ) {
         let (engine, mut port) = self.parts(workers);
-        let (now_ns, here) = (port.now_ns(), engine.scheduler.log.here);
+        let here = engine.scheduler.log.here;
         engine.step((now_ns, here), &mut port, event);
-        let worker = self.active[here.index()];
-        self.resumed_ns[worker] = self.resumed_ns[worker].max(self.time.on_clock(now_ns));
+        self.resumed_ns[self.port.active[here.index()]] = self.engine.scheduler.now_ns();
         self.carry_out(workers);
     }
 
@@ -310,8 +353,8 @@ impl State {
         };
         let instance = self.engine.scheduler.instance_of(vertex);
         at_edge::failed(instance, clock::now_ns());
+        let now_ns = self.now_ns();
         let (engine, mut port) = self.parts(workers);
-        let now_ns = port.now_ns();
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
         self.faults.push(Fault {
             instance,
@@ -326,10 +369,9 @@ impl State {
 
     pub(crate) fn carry_out(&mut self, workers: &[Worker]) {
         if let Some((core, occupant)) = self.interrupted.take() {
-            let now_ns = clock::now_ns();
             // It may have returned already, and wait for the lock.
-            self.resumed_ns[self.active[core.index()]] = now_ns;
-            self.note_at(now_ns, EventKind::Resume, core, occupant);
+            let now_ns = self.note(EventKind::Resume, core, occupant);
+            self.resumed_ns[self.port.active[core.index()]] = now_ns;
         }
         for place in 0..self.engine.decisions().len() {
             let core = self.engine.decisions()[place].core;
@@ -344,7 +386,7 @@ impl State {
 
     /// Takes its instance away from a core, unless it has just ended.
     fn suspend(&mut self, core: CoreId, workers: &[Worker]) {
-        let demoted = self.active[core.index()];
+        let demoted = self.port.active[core.index()];
         if !workers[demoted].demote(self.levels, Role::Demoted) {
             return;
         }
@@ -352,7 +394,7 @@ impl State {
             return;
         }
         self.preemptions += 1;
-        let now_ns = self.since_epoch(clock::now_ns());
+        let now_ns = self.now_ns();
         let waiting = self.engine.suspend(core, now_ns, demoted);
         self.seats[demoted] = None;
         self.replace(core, workers);
@@ -369,7 +411,7 @@ impl State {
     }
 
     fn seat(&mut self, worker: Number, core: CoreId, workers: &[Worker]) {
-        self.active[core.index()] = worker;
+        self.port.active[core.index()] = worker;
         self.seats[worker] = Some(core);
         self.pin(worker, core, workers);
     }
@@ -393,14 +435,28 @@ impl State {
         }
     }
 
+    /// Reports whether no worker is to look for work, and no bell to be rung.
+    pub(crate) fn calls_none(&self) -> bool {
+        self.called.is_empty() && self.port.rung.is_empty()
+    }
+
+    /// Reports whether a hop that has just been made is all: the next event stays what it was.
+    #[inline]
+    pub(crate) fn changes_nothing_else(&mut self) -> bool {
+        !self.engine.scheduler.log.take_job_event() && self.port.rung.is_empty()
+    }
+
     /// Returns workers that are to look for work, `most` at a time, and forgets them.
     pub(crate) fn take_called(&mut self, most: usize) -> impl Iterator<Item = Number> + '_ {
-        let (active, placement) = (&self.active, &self.engine.placement);
+        let (active, placement) = (&self.port.active, &self.engine.placement);
         let left = self.called.len().saturating_sub(most);
         let called = self.called.drain(left..);
         // The one that makes the step has looked already.
         let called = called.filter(|core| placement.is_wanted(core.index()));
-        called.map(|core| active[core.index()])
+        let calls = &mut self.calls;
+        called
+            .inspect(|_| *calls += 1)
+            .map(|core| active[core.index()])
     }
 
     /// Returns the core that a worker is pinned to.
@@ -408,20 +464,24 @@ impl State {
         self.pinned[worker].unwrap_or(CoreId(0))
     }
 
-    /// Finds what a worker without an instance does next: run this, or nothing.
+    /// Finds what a worker without an instance does next, at an instant: run this, or nothing.
     pub(crate) fn find_work(
         &mut self,
         me: Number,
         workers: &[Worker],
+        now_ns: u64,
     ) -> Option<Box<SubtaskRunner>> {
         let Some(core) = self.seats[me] else {
             self.spare.push(me);
             return None;
         };
+        let now_ns = self.begin(now_ns);
         let (engine, mut port) = self.parts(workers);
-        let now_ns = port.now_ns().max(engine.scheduler.now_ns());
         match engine.next((now_ns, core), &mut port) {
-            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => Some(runner),
+            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => {
+                self.resumed_ns[me] = now_ns;
+                Some(runner)
+            }
             NextWork::Continue(parked) => {
                 self.seats[me] = None;
                 self.spare.push(me);
@@ -431,8 +491,7 @@ impl State {
                     workers[parked].call();
                 }
                 if let Some(vertex) = self.engine.placement.current(core.index()) {
-                    self.resumed_ns[parked] = clock::now_ns();
-                    self.note_at(self.resumed_ns[parked], EventKind::Resume, core, vertex);
+                    self.resumed_ns[parked] = self.note(EventKind::Resume, core, vertex);
                 }
                 None
             }
@@ -442,11 +501,11 @@ impl State {
 }
 
 impl State {
-    /// Returns when the instance of a worker has ended whose function returned at a time. If it
+    /// Returns when the instance of a worker has ended whose function returned at a time on the clock. If it
     /// lost its core and got it back before it could say so, it ends there; or with a step that was
     /// taken before.
     pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
-        returned_ns.max(self.resumed_ns[worker])
+        self.since_epoch(returned_ns).max(self.resumed_ns[worker])
     }
 
     /// Reports whether a worker whose instance has finished has to leave the report of that.
@@ -461,7 +520,7 @@ impl State {
             let instance = self.engine.scheduler.instance_of(occupant);
             let dag = self.engine.task_set.dag(instance.dag);
             dag.subtask(instance.subtask).is_non_preemptive()
-                || workers[self.active[core]].has_returned()
+                || workers[self.port.active[core]].has_returned()
         })
     }
 
@@ -507,9 +566,8 @@ impl State {
         self.note(EventKind::Resume, core, vertex);
         // It goes on after the step that the end brings about, and within it nothing does.
         self.interrupted = occupant.map(|occupant| (core, occupant));
-        let finish_ns = self.since_epoch(finish_ns);
+        let times_ns = (self.since_epoch(finish_ns), self.now_ns());
         let (engine, mut port) = self.parts(workers);
-        let times_ns = (finish_ns, port.now_ns());
         engine.complete_parked((core, vertex), runner, times_ns, &mut port);
         self.carry_out(workers);
     }

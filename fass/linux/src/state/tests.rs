@@ -15,7 +15,7 @@ use sched_dag::{CoreId, DagId};
 use crate::platform::HOST;
 use crate::state::{FaultCause, Number};
 use crate::team::Team;
-use crate::{Linux, Mechanism, clock, sys};
+use crate::{Linux, Mechanism, clock};
 use fass::platform::SubtaskRunner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
@@ -65,7 +65,7 @@ impl Stage {
         for core in 0..cores {
             state.pin(core as usize, CoreId(core), &team.workers);
         }
-        state.time = crate::state::RunTime::beginning(clock::now_ns());
+        state.port.time = crate::state::RunTime::beginning(clock::now_ns());
         drop(state);
         Self {
             team,
@@ -87,9 +87,10 @@ impl Stage {
                 state.step(&team.workers, |moment| moment.serve(Request::Signal(dag)));
                 let is_wanted = |core: &usize| state.engine.placement.is_wanted(*core);
                 if what == "begin" {
-                    let worker = state.active[(0..2).find(is_wanted).unwrap()];
+                    let worker = state.port.active[(0..2).find(is_wanted).unwrap()];
                     self.began.insert(name, worker);
-                    let runner = state.find_work(worker, &team.workers);
+                    let now_ns = state.now_ns();
+                    let runner = state.find_work(worker, &team.workers, now_ns);
                     self.running.insert(name, (worker, runner.unwrap()));
                 }
             }
@@ -133,8 +134,9 @@ impl Stage {
                 let mut state = team.lock();
                 team.abandon(&mut state, CoreId(0));
                 assert_eq!(state.engine.placement.current(0), None);
-                let worker = state.active[0];
-                let next = state.find_work(worker, &team.workers);
+                let worker = state.port.active[0];
+                let now_ns = state.now_ns();
+                let next = state.find_work(worker, &team.workers, now_ns);
                 drop(state);
                 self.go_on(worker, next);
             }
