@@ -43,6 +43,7 @@ mod clock;
 mod control;
 mod edge;
 mod level;
+mod lock;
 mod look_out;
 mod machine;
 mod office;

@@ -47,6 +47,10 @@ const CLOCK_THREAD: i32 = 3;
 const SYS_GETTID: i64 = 186;
 #[cfg(target_arch = "x86_64")]
 const SYS_BPF: i64 = 321;
+#[cfg(target_arch = "x86_64")]
+const SYS_MEMBARRIER: i64 = 324;
+#[cfg(not(target_arch = "x86_64"))]
+const SYS_MEMBARRIER: i64 = 283;
 #[cfg(not(target_arch = "x86_64"))]
 const SYS_GETTID: i64 = 178;
 #[cfg(not(target_arch = "x86_64"))]
@@ -141,6 +145,22 @@ pub(crate) fn make_timers_exact() {
     const TIMER_SLACK: i32 = 29;
     // SAFETY: the option takes a number.
     unsafe { prctl(TIMER_SLACK, 1_u64) };
+}
+
+/// Prepares for [`barrier`], and reports whether that can be called.
+pub(crate) fn register_barrier() -> bool {
+    const REGISTER_PRIVATE_EXPEDITED: i32 = 1 << 4;
+    // SAFETY: the call takes numbers.
+    !cfg!(miri) && unsafe { syscall(SYS_MEMBARRIER, REGISTER_PRIVATE_EXPEDITED, 0, 0) == 0 }
+}
+
+/// Makes each running thread of the program pass a full barrier. What they have done before is seen
+/// after the call, and what was done before the call is seen by what they do next.
+pub(crate) fn barrier() {
+    const PRIVATE_EXPEDITED: i32 = 1 << 3;
+    // SAFETY: the call takes numbers.
+    let result = unsafe { syscall(SYS_MEMBARRIER, PRIVATE_EXPEDITED, 0, 0) };
+    assert!(result == 0, "a program that has registered may call this");
 }
 
 /// Keeps all memory of the program, also what it will have, from being paged out.

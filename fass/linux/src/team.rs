@@ -26,14 +26,15 @@
 //! it sees for itself whether that is too much.
 
 use std::cell::{Cell, RefCell};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::SubtaskRunner;
 use sched_dag::engine::NextAction;
 use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 
 use crate::level::{Levels, Role};
+use crate::lock::{Guard, Lock};
 use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{FaultCause, Left, Number, RunTime, State};
@@ -87,12 +88,11 @@ pub(crate) fn strand(cause: &str) -> bool {
 
 /// All that the threads of a cluster share.
 pub(crate) struct Team {
-    state: Mutex<State>,
+    state: Lock<State>,
     pub(crate) workers: Box<[Worker]>,
     pub(crate) levels: Option<Levels>,
     /// Whether a worker can be demoted.
     demotes: bool,
-    polls: bool,
     skips_idle: bool,
     pub(crate) cluster: ClusterId,
     pub(crate) office: Arc<Office>,
@@ -138,11 +138,12 @@ impl Team {
         let subtasks = state.engine.task_set.dags().iter();
         let mut subtasks = subtasks.flat_map(|dag| dag.subtasks());
         state.port.demotes |= subtasks.any(|of| of.most_execution_ns(budget_factor) < u64::MAX);
+        let is_owned =
+            state.levels.is_none() && !state.port.demotes && state.port.active.len() == 1;
         let workers = state.seats.iter().map(|_| Worker::new(polls));
         Self {
             turns: TurnClock::all(&state.engine.task_set, budget_factor),
             workers: workers.collect(),
-            polls,
             skips_idle,
             levels: state.levels,
             demotes: state.port.demotes,
@@ -151,21 +152,22 @@ impl Team {
             look_out: LookOut::new(polls),
             looks_at_ns: AtomicU64::new(u64::MAX),
             begun: AtomicU32::new(0),
-            state: Mutex::new(state),
+            state: Lock::new(state, polls, is_owned),
         }
     }
 
     /// Takes the scheduler's lock. A panic under it would be ours, and was reported.
-    pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
-        if self.polls {
-            for _ in 0..PATIENCE {
-                match self.state.try_lock() {
-                    Ok(state) => return state,
-                    Err(_) => std::hint::spin_loop(),
-                }
-            }
+    pub(crate) fn lock(&self) -> Guard<'_, State> {
+        self.state.enter()
+    }
+
+    /// Takes it, as a worker.
+    #[inline]
+    fn lock_as(&self, me: Number) -> Guard<'_, State> {
+        match me {
+            OWNER => self.state.enter_as_owner(),
+            _ => self.state.enter(),
         }
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Says that a thread is ready for the run.
@@ -207,7 +209,7 @@ impl Team {
         worker.bring(self.levels, Role::Run);
         sys::make_timers_exact();
         let mut lead = Lead::default();
-        let mut state = self.lock();
+        let mut state = self.lock_as(me);
         if let Some(core) = state.seats[me] {
             state.pin(me, core, &self.workers);
         }
@@ -217,7 +219,7 @@ impl Team {
             let mut next = match self.wait(me, &mut lead) {
                 Woken::ToEnd => return,
                 Woken::ByCall => {
-                    let mut state = self.lock();
+                    let mut state = self.lock_as(me);
                     if let Some(left) = state.take_left(me) {
                         self.report(me, state, left.runner, Ok(()), left.finish_ns)
                     } else {
@@ -229,7 +231,7 @@ impl Team {
                     }
                 }
                 Woken::ByTime => {
-                    let mut state = self.lock();
+                    let mut state = self.lock_as(me);
                     let core = state.seats[me];
                     // The others' workers may still sleep.
                     state.step(&self.workers, |moment| {
@@ -337,7 +339,7 @@ impl Team {
     #[inline(always)]
     fn pass_on(&self, me: Number, runner: Box<SubtaskRunner>) -> Option<Box<SubtaskRunner>> {
         let finish_ns = clock::now_ns();
-        let mut state = self.lock();
+        let mut state = self.lock_as(me);
         let Some(core) = state.seats[me] else {
             return self.report(me, state, runner, Ok(()), finish_ns);
         };
@@ -361,7 +363,7 @@ impl Team {
         let finish_ns = clock::now_ns();
         let workers = &self.workers;
         let is_raised = workers[me].report(self.levels);
-        let mut state = self.lock();
+        let mut state = self.lock_as(me);
         if is_raised {
             // It has its core until it waits: nobody at its level preempts it.
             workers[me].bring(self.levels, Role::Run);
@@ -385,7 +387,7 @@ impl Team {
     pub(crate) fn report(
         &self,
         me: Number,
-        mut state: MutexGuard<'_, State>,
+        mut state: Guard<'_, State>,
         mut runner: Box<SubtaskRunner>,
         outcome: Result<(), FaultCause>,
         finish_ns: u64,
@@ -422,7 +424,7 @@ impl Team {
     fn after_end(
         &self,
         (core, me): (CoreId, Number),
-        mut state: MutexGuard<'_, State>,
+        mut state: Guard<'_, State>,
         action: NextAction<Box<SubtaskRunner>>,
         end_ns: u64,
     ) -> Option<Box<SubtaskRunner>> {
@@ -450,7 +452,7 @@ impl Team {
     fn go_on(
         &self,
         me: Number,
-        mut state: MutexGuard<'_, State>,
+        mut state: Guard<'_, State>,
         now_ns: u64,
     ) -> Option<Box<SubtaskRunner>> {
         let mut next = state.find_work(me, &self.workers, now_ns);
@@ -481,7 +483,7 @@ impl Team {
 
     /// Gives the lock back, and makes the workers of all cores that should run something
     /// look for it.
-    pub(crate) fn call<'a>(&'a self, mut state: MutexGuard<'a, State>) {
+    pub(crate) fn call<'a>(&'a self, mut state: Guard<'a, State>) {
         if state.calls_none() {
             return;
         }
@@ -539,8 +541,8 @@ enum Woken {
     ToEnd,
 }
 
-/// How often a thread that polls tries to take the lock before it sleeps for it.
-const PATIENCE: u32 = 2_000;
+/// The worker that owns the scheduler's lock, where it can have an owner: that of the first core.
+const OWNER: Number = 0;
 
 /// The most workers that are called before the lock is taken once more.
 const AT_ONCE: usize = 16;
@@ -683,7 +685,7 @@ impl Team {
     /// Makes one step, and returns when to look at budgets; `None` if all jobs have ended.
     fn step_in_time(
         &self,
-        state: &mut State,
+        state: &mut Guard<'_, State>,
         budgets: &mut Budgets,
         rests: &mut bool,
     ) -> Option<u64> {
@@ -729,7 +731,7 @@ impl Team {
 
     /// Ends a core's instance, which has exceeded its budget, and with it its DAG: its function
     /// cannot be taken back.
-    pub(crate) fn abandon(&self, state: &mut State, core: CoreId) {
+    pub(crate) fn abandon(&self, state: &mut Guard<'_, State>, core: CoreId) {
         let number = state.port.active[core.index()];
         let Some(vertex) = state.engine.placement.current(core.index()) else {
             return;
@@ -744,9 +746,18 @@ impl Team {
     /// Ends the instance of a worker that is never given another one. If it has a core, a spare
     /// worker gets that, and is called, so that it knows: where idle workers watch, one that does not
     /// know of its core would sleep, and none but workers see to events.
-    fn give_up(&self, state: &mut State, number: Number, vertex: Vertex, cause: FaultCause) {
+    fn give_up(
+        &self,
+        state: &mut Guard<'_, State>,
+        number: Number,
+        vertex: Vertex,
+        cause: FaultCause,
+    ) {
         let (workers, seat) = (&self.workers, state.seats[number].take());
         let core = seat.unwrap_or_else(|| state.core_of(number));
+        if number == OWNER {
+            state.disown();
+        }
         state.abandoned.push(number);
         workers[number].give_up_sections();
         match seat {

@@ -1,0 +1,263 @@
+//! The lock around a cluster's state.
+//!
+//! # The owner
+//!
+//! Where a cluster has one core, nothing has a level, and nothing is preempted, one thread takes
+//! nearly every step. As the lock's *owner* it enters by two plain stores: it says that it is inside,
+//! and looks whether the lock is wanted. Any other thread first has the *word* of the lock, then says
+//! that the lock is wanted, and has Linux make each running thread pass a barrier (`membarrier`).
+//! Either the owner was inside before its barrier, and the other thread sees that and waits; or the
+//! owner looks after its barrier, sees that the lock is wanted, and takes the word, too.
+//!
+//! Not with levels: a thread that waits for an owner below its own level, on the same processor, would
+//! wait for ever.
+//!
+//! # Waiting
+//!
+//! A thread looks for a while, and sleeps then. Where threads poll, it sleeps for a moment, and the
+//! thread that leaves wakes none, which would take a locked instruction.
+
+#![allow(unsafe_code, reason = "a lock")]
+
+use std::cell::UnsafeCell;
+use std::ops::{Deref, DerefMut};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
+use std::thread;
+use std::time::Duration;
+
+use crate::sys;
+
+/// How often a thread looks before it sleeps.
+const LOOKS: u32 = 100;
+
+/// How often it looks where threads poll.
+const LOOKS_POLLING: u32 = 2_000;
+
+/// How long it sleeps where threads poll.
+const NAP: Duration = Duration::from_micros(20);
+
+const FREE: u32 = 0;
+const TAKEN: u32 = 1;
+/// Taken, and a thread may sleep for it.
+const AWAITED: u32 = 2;
+
+/// A value that one thread at a time has.
+#[repr(align(128))]
+pub(crate) struct Lock<T> {
+    word: AtomicU32,
+    /// Whether the owner has the lock without the word. Written by the owner alone.
+    is_inside: AtomicBool,
+    /// Whether the owner has to take the word. Written by the thread that has the word.
+    is_wanted: AtomicBool,
+    /// Whether there is an owner. Written, and read by all but the owner, with the word.
+    is_owned: AtomicBool,
+    polls: bool,
+    value: UnsafeCell<T>,
+}
+
+// SAFETY: the value is reached by a guard alone, and one thread at a time has a guard: the thread
+// that has the word, while the owner is not inside, or the owner inside, while no thread has the
+// word and has seen the owner outside.
+unsafe impl<T: Send> Sync for Lock<T> {}
+
+/// The right to the value, until it is dropped.
+pub(crate) struct Guard<'l, T> {
+    lock: &'l Lock<T>,
+    entered: Entry,
+}
+
+/// How a thread has entered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Entry {
+    /// As the owner, without the word.
+    Inside,
+    /// As the owner, with the word.
+    InTurn,
+    /// As any other thread.
+    Other,
+}
+
+impl<T> Lock<T> {
+    /// Makes one for threads that poll, or do not, and with an owner if there is to be one.
+    pub(crate) fn new(value: T, polls: bool, is_owned: bool) -> Self {
+        let is_owned = is_owned && sys::register_barrier();
+        Self {
+            word: AtomicU32::new(FREE),
+            is_inside: AtomicBool::new(false),
+            is_wanted: AtomicBool::new(!is_owned),
+            is_owned: AtomicBool::new(is_owned),
+            polls,
+            value: UnsafeCell::new(value),
+        }
+    }
+
+    /// Waits for the value, as the owner. One thread alone may call this.
+    #[inline]
+    pub(crate) fn enter_as_owner(&self) -> Guard<'_, T> {
+        self.is_inside.store(true, Ordering::Relaxed);
+        // The processor may still look first; the other thread's barrier sees to that.
+        compiler_fence(Ordering::SeqCst);
+        // Acquires what a thread that wanted the lock has written.
+        if !self.is_wanted.load(Ordering::Acquire) {
+            let entered = Entry::Inside;
+            return Guard {
+                lock: self,
+                entered,
+            };
+        }
+        self.is_inside.store(false, Ordering::Release);
+        self.take_word();
+        let entered = Entry::InTurn;
+        Guard {
+            lock: self,
+            entered,
+        }
+    }
+
+    /// Waits for the value.
+    #[inline]
+    pub(crate) fn enter(&self) -> Guard<'_, T> {
+        self.take_word();
+        if self.is_owned.load(Ordering::Relaxed) {
+            self.keep_owner_out();
+        }
+        let entered = Entry::Other;
+        Guard {
+            lock: self,
+            entered,
+        }
+    }
+
+    /// Sees to it that the owner is not inside, nor will be. With the word.
+    #[cold]
+    #[inline(never)]
+    fn keep_owner_out(&self) {
+        self.is_wanted.store(true, Ordering::SeqCst);
+        sys::barrier();
+        let mut looks = 0;
+        while self.is_inside.load(Ordering::Acquire) {
+            looks += 1;
+            match looks % LOOKS_POLLING {
+                // It may have lost its processor to this thread.
+                0 => thread::sleep(NAP),
+                _ => std::hint::spin_loop(),
+            }
+        }
+    }
+
+    #[inline]
+    fn take_word(&self) {
+        if !self.try_word(TAKEN) {
+            self.wait_for_word();
+        }
+    }
+
+    #[inline]
+    fn try_word(&self, taken: u32) -> bool {
+        let (won, lost) = (Ordering::Acquire, Ordering::Relaxed);
+        let word = &self.word;
+        word.compare_exchange(FREE, taken, won, lost).is_ok()
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn wait_for_word(&self) {
+        let looks = if self.polls { LOOKS_POLLING } else { LOOKS };
+        let mut taken = TAKEN;
+        loop {
+            for _ in 0..looks {
+                if self.word.load(Ordering::Relaxed) == FREE && self.try_word(taken) {
+                    return;
+                }
+                std::hint::spin_loop();
+            }
+            if self.polls {
+                thread::sleep(NAP);
+                continue;
+            }
+            // From its first sleep on it cannot know whether another thread sleeps, too.
+            taken = AWAITED;
+            if self.word.swap(AWAITED, Ordering::Acquire) == FREE {
+                return;
+            }
+            sys::wait(&self.word, AWAITED, None);
+        }
+    }
+}
+
+impl<T> Guard<'_, T> {
+    /// Lets the lock have no owner any more, if another thread than the owner has it.
+    pub(crate) fn disown(&self) {
+        if self.entered == Entry::Other {
+            // It stays wanted, so that the owner takes the word from now on.
+            self.lock.is_owned.store(false, Ordering::Relaxed);
+        }
+    }
+}
+
+impl<T> Drop for Guard<'_, T> {
+    #[inline]
+    fn drop(&mut self) {
+        let lock = self.lock;
+        match self.entered {
+            Entry::Inside => return lock.is_inside.store(false, Ordering::Release),
+            Entry::Other if lock.is_owned.load(Ordering::Relaxed) => {
+                lock.is_wanted.store(false, Ordering::Release);
+            }
+            _ => {}
+        }
+        if lock.polls {
+            lock.word.store(FREE, Ordering::Release);
+        } else if lock.word.swap(FREE, Ordering::Release) == AWAITED {
+            sys::wake(&lock.word, 1);
+        }
+    }
+}
+
+impl<T> Deref for Guard<'_, T> {
+    type Target = T;
+
+    #[inline]
+    fn deref(&self) -> &T {
+        // SAFETY: a guard is the right to the value.
+        unsafe { &*self.lock.value.get() }
+    }
+}
+
+impl<T> DerefMut for Guard<'_, T> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: a guard is the right to the value, and is borrowed for as long as the value.
+        unsafe { &mut *self.lock.value.get() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The owner and two other threads add to two numbers, which differ if two are ever inside.
+    #[test]
+    fn one_is_inside_at_a_time() {
+        let rounds = if cfg!(miri) { 20 } else { 3_000 };
+        for (polls, is_owned) in [(true, true), (false, true), (true, false), (false, false)] {
+            let lock = Lock::new([0; 2], polls, is_owned);
+            let add = |mut numbers: Guard<'_, [u32; 2]>| {
+                assert_eq!(numbers[0], numbers[1]);
+                numbers[0] += 1;
+                std::hint::black_box(&mut numbers)[1] += 1;
+            };
+            thread::scope(|scope| {
+                scope.spawn(|| (0..40 * rounds).for_each(|_| add(lock.enter_as_owner())));
+                for _ in 0..2 {
+                    scope.spawn(|| {
+                        (0..rounds).for_each(|_| add(lock.enter()));
+                        lock.enter().disown();
+                        (0..rounds).for_each(|_| add(lock.enter()));
+                    });
+                }
+            });
+            assert_eq!(*lock.enter(), [44 * rounds; 2]);
+        }
+    }
+}
