@@ -1,4 +1,4 @@
-//! The lock around a cluster's state.
+//! The lock around a cluster's state, and a place in which a thread leaves a value for another.
 //!
 //! # The owner
 //!
@@ -21,7 +21,8 @@
 
 use std::cell::UnsafeCell;
 use std::ops::{Deref, DerefMut};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
+use std::ptr;
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering, compiler_fence};
 use std::thread;
 use std::time::Duration;
 
@@ -232,8 +233,55 @@ impl<T> DerefMut for Guard<'_, T> {
     }
 }
 
+/// A place in which one thread leaves a value for another.
+#[derive(Debug)]
+pub(crate) struct Slot<T: Send>(AtomicPtr<T>);
+
+impl<T: Send> Default for Slot<T> {
+    fn default() -> Self {
+        Self(AtomicPtr::default())
+    }
+}
+
+impl<T: Send> Slot<T> {
+    /// Leaves a value in place of what is there.
+    #[inline]
+    pub(crate) fn put(&self, value: Box<T>) {
+        let before = self.0.swap(Box::into_raw(value), Ordering::AcqRel);
+        drop(Self::owned(before));
+    }
+
+    /// Reports whether there is a value. Reading leaves the line with all who read it.
+    #[inline]
+    pub(crate) fn is_full(&self) -> bool {
+        !self.0.load(Ordering::Relaxed).is_null()
+    }
+
+    /// Takes the value, if there is one.
+    #[inline]
+    pub(crate) fn take(&self) -> Option<Box<T>> {
+        if !self.is_full() {
+            return None;
+        }
+        Self::owned(self.0.swap(ptr::null_mut(), Ordering::Acquire))
+    }
+
+    fn owned(value: *mut T) -> Option<Box<T>> {
+        // SAFETY: each pointer comes from a box, and only the thread that swaps it out gets it.
+        (!value.is_null()).then(|| unsafe { Box::from_raw(value) })
+    }
+}
+
+impl<T: Send> Drop for Slot<T> {
+    fn drop(&mut self) {
+        drop(self.take());
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
 
     /// The owner and two other threads add to two numbers, which differ if two are ever inside.
@@ -259,5 +307,15 @@ mod tests {
             });
             assert_eq!(*lock.enter(), [44 * rounds; 2]);
         }
+    }
+
+    #[test]
+    fn a_value_is_taken_once_or_dropped_with_its_place() {
+        let (slot, value) = (Slot::default(), Arc::new(()));
+        slot.put(Box::new(Arc::clone(&value)));
+        assert!(slot.take().is_some() && slot.take().is_none());
+        slot.put(Box::new(Arc::clone(&value)));
+        drop(slot);
+        assert_eq!(Arc::strong_count(&value), 1);
     }
 }

@@ -93,6 +93,7 @@ pub(crate) struct Team {
     pub(crate) levels: Option<Levels>,
     /// Whether a worker can be demoted.
     demotes: bool,
+    polls: bool,
     skips_idle: bool,
     pub(crate) cluster: ClusterId,
     pub(crate) office: Arc<Office>,
@@ -144,6 +145,7 @@ impl Team {
         Self {
             turns: TurnClock::all(&state.engine.task_set, budget_factor),
             workers: workers.collect(),
+            polls,
             skips_idle,
             levels: state.levels,
             demotes: state.port.demotes,
@@ -218,6 +220,7 @@ impl Team {
         loop {
             let mut next = match self.wait(me, &mut lead) {
                 Woken::ToEnd => return,
+                Woken::WithWork(runner) => Some(runner),
                 Woken::ByCall => {
                     let mut state = self.lock_as(me);
                     if let Some(left) = state.take_left(me) {
@@ -258,6 +261,9 @@ impl Team {
                 self.look_out.of_worker(core, next_ns)
             });
             let was_called = worker.wait_for_call(next_ns, lead);
+            if let Some(runner) = worker.given.take() {
+                break Woken::WithWork(runner);
+            }
             if self.office.is_over() {
                 break Woken::ToEnd;
             }
@@ -484,6 +490,9 @@ impl Team {
     /// Gives the lock back, and makes the workers of all cores that should run something
     /// look for it.
     pub(crate) fn call<'a>(&'a self, mut state: Guard<'a, State>) {
+        if self.polls && !state.calls_none() {
+            state.give(&self.workers);
+        }
         if state.calls_none() {
             return;
         }
@@ -533,6 +542,8 @@ impl Team {
 
 /// Why a worker does not sleep any more.
 enum Woken {
+    /// An instance was started for it.
+    WithWork(Box<SubtaskRunner>),
     /// Its core may have work.
     ByCall,
     /// An event is due.

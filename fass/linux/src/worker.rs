@@ -24,9 +24,11 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 
+use fass::platform::SubtaskRunner;
 use sched_dag::CoreId;
 
 use crate::level::{Levels, Role};
+use crate::lock::Slot;
 use crate::sys::ThreadId;
 use crate::{clock, section, sys};
 
@@ -39,6 +41,7 @@ const DEMOTED: u32 = 2;
 
 /// The part of a worker that other threads see.
 #[derive(Debug, Default)]
+#[repr(align(128))]
 pub(crate) struct Worker {
     /// Its thread, and that as sections know it.
     thread: OnceLock<(ThreadId, u32)>,
@@ -49,6 +52,8 @@ pub(crate) struct Worker {
     holds: AtomicBool,
     /// 1 if it is to look for work.
     call: AtomicU32,
+    /// The runner of an instance that another thread has started for it, if it watches.
+    pub(crate) given: Slot<SubtaskRunner>,
     /// Whether it watches for that instead of sleeping.
     polls: bool,
 }
@@ -143,15 +148,17 @@ impl Worker {
     }
 
     /// Reports whether it watches while it waits: one without a core sleeps in any case.
-    fn watches(&self) -> bool {
+    pub(crate) fn watches(&self) -> bool {
         self.polls && self.seat().is_some()
     }
 
-    /// Watches for a call, and for an instant every now and then. Reports whether it was called;
+    /// Watches for a call or a runner, and for an instant. Reports whether there is either;
     /// it may also return for nothing, so that its caller sees what has changed else.
     fn poll(&self, until_ns: u64) -> bool {
         for _ in 0..PATIENCE {
-            // Reading leaves the line with all who read it.
+            if self.given.is_full() {
+                return true;
+            }
             if self.call.load(Ordering::Relaxed) != 0 {
                 return self.call.swap(0, Ordering::Acquire) != 0;
             }

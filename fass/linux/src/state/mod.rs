@@ -435,6 +435,26 @@ impl State {
         }
     }
 
+    /// Starts the instances of cores whose workers watch, and leaves these their runners: so they
+    /// need no look at the state.
+    pub(crate) fn give(&mut self, workers: &[Worker]) {
+        let now_ns = self.engine.scheduler.now_ns();
+        let mut called = std::mem::take(&mut self.called);
+        called.retain(|core| {
+            let number = self.port.active[core.index()];
+            let is_wanted = self.engine.placement.is_wanted(core.index());
+            if !is_wanted || !workers[number].watches() {
+                return is_wanted;
+            }
+            if let Some(runner) = self.find_work(number, workers, now_ns) {
+                self.calls += 1;
+                workers[number].given.put(runner);
+            }
+            false
+        });
+        self.called = called;
+    }
+
     /// Reports whether no worker is to look for work, and no bell to be rung.
     pub(crate) fn calls_none(&self) -> bool {
         self.called.is_empty() && self.port.rung.is_empty()
@@ -475,6 +495,10 @@ impl State {
             self.spare.push(me);
             return None;
         };
+        // Another thread may have started something for it just before.
+        if self.engine.placement.current(core.index()).is_some() {
+            return None;
+        }
         let now_ns = self.begin(now_ns);
         let (engine, mut port) = self.parts(workers);
         match engine.next((now_ns, core), &mut port) {
