@@ -47,7 +47,7 @@ struct Base {
 impl Base {
     /// Returns the time so many ticks later.
     const fn after(self, ticks: u64) -> u64 {
-        self.ns + (ticks * self.rate >> 32)
+        self.ns + ((ticks * self.rate) >> 32)
     }
 }
 
@@ -150,7 +150,7 @@ impl Rates {
     fn learn(&mut self, ticks: u64, ns: u64) -> Option<u64> {
         let Self { older, newer } = *self;
         let expected_ns =
-            u128::from(ticks.wrapping_sub(older.ticks)) * u128::from(newer.rate) >> 32;
+            (u128::from(ticks.wrapping_sub(older.ticks)) * u128::from(newer.rate)) >> 32;
         let passed_ns = u128::from(ns.saturating_sub(older.ns));
         let has_jumped = passed_ns.abs_diff(expected_ns) > u128::from(JUMP_NS);
         let here = Base {

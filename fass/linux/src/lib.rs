@@ -39,6 +39,7 @@
 #![deny(unsafe_code)]
 
 mod blocking;
+mod budgets;
 mod clock;
 mod control;
 mod edge;

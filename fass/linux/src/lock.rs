@@ -3,19 +3,19 @@
 //! # The owner
 //!
 //! Where a cluster has one core, nothing has a level, and nothing is preempted, one thread takes
-//! nearly every step. As the lock's *owner* it enters by two plain stores: it says that it is inside,
-//! and looks whether the lock is wanted. Any other thread first has the *word* of the lock, then says
-//! that the lock is wanted, and has Linux make each running thread pass a barrier (`membarrier`).
-//! Either the owner was inside before its barrier, and the other thread sees that and waits; or the
-//! owner looks after its barrier, sees that the lock is wanted, and takes the word, too.
+//! nearly every step. As the lock's *owner* that thread enters by plain stores: it says "inside",
+//! and looks whether the lock is wanted. Any other thread takes the *word* of the lock, says that
+//! the lock is wanted, and has Linux make each running thread pass a barrier (`membarrier`).
+//! Either the owner was inside before its barrier: then the other thread sees that, and waits. Or
+//! the owner looks after its barrier, sees that the lock is wanted, and takes the word, too.
 //!
-//! Not with levels: a thread that waits for an owner below its own level, on the same processor, would
-//! wait for ever.
+//! Where threads have levels there is no owner: a thread would wait for an owner from whom it has
+//! the processor.
 //!
 //! # Waiting
 //!
-//! A thread looks for a while, and sleeps then. Where threads poll, it sleeps for a moment, and the
-//! thread that leaves wakes none, which would take a locked instruction.
+//! A thread looks for a while, and then sleeps. Where threads poll, each sleep is a short nap, and
+//! no thread is woken: leaving the lock takes no locked instruction.
 
 #![allow(unsafe_code, reason = "a lock")]
 

@@ -17,13 +17,14 @@ use sched_dag::engine::{self, Engine, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, Request, WaitId};
 use sched_dag::{DagId, Instance, Journal};
 
+use crate::budgets::Budgets;
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, Sending, unpoisoned};
 use crate::level::Levels;
 use crate::office::Office;
 use crate::section;
 use crate::state::{Fault, Number, State, ThreadPort};
-use crate::team::{self, Budgets, Team, with_own_worker};
+use crate::team::{self, Team, with_own_worker};
 use crate::{clock, sys};
 
 /// The platform of the program.

@@ -11,19 +11,6 @@
 //! (`look_out`); where all cores are busy it comes in time, and preempts. Others wake it earlier
 //! with a request, or if the next event has become an earlier one. It makes the step and calls
 //! the workers; it runs nothing itself.
-//!
-//! # Budgets
-//!
-//! A budget is in processor time, which a thread takes only while it has a processor.
-//! Reading that clock is a system call, so no instance does it at its start: this thread
-//! looks often enough, as often as the shortest budget, and begins to count when it
-//! first sees the instance. So an instance ends after its budget, and no later than the
-//! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for
-//! good.
-//!
-//! An instance that waits may go on in another thread. So, of subtasks that wait, each worker reads
-//! its clock at both ends of a turn, and adds up what the instance has taken; at the end of a turn
-//! it sees for itself whether that is too much.
 
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
@@ -33,6 +20,7 @@ use fass::platform::SubtaskRunner;
 use sched_dag::engine::NextAction;
 use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 
+use crate::budgets::Budgets;
 use crate::level::{Levels, Role};
 use crate::lock::{Guard, Lock};
 use crate::look_out::LookOut;
@@ -103,13 +91,13 @@ pub(crate) struct Team {
     /// How many threads have begun.
     begun: AtomicU32,
     /// By vertex, what its instance has taken; of no vertex if no subtask waits.
-    turns: Box<[TurnClock]>,
+    pub(crate) turns: Box<[TurnClock]>,
 }
 
 /// The processor time of an instance that waits.
-struct TurnClock {
+pub(crate) struct TurnClock {
     /// How much those of its turns have taken that are over.
-    taken_ns: AtomicU64,
+    pub(crate) taken_ns: AtomicU64,
     budget_ns: u64,
 }
 
@@ -561,79 +549,6 @@ const AT_ONCE: usize = 16;
 /// The worker's instance was ended while it ran.
 pub(crate) struct Abandoned;
 
-/// The latest look at an instance that has a budget.
-#[derive(Clone, Copy, Debug, Default)]
-struct Seen {
-    /// The subtask, the job, and what its earlier turns have taken.
-    what: Option<(Vertex, u64, u64)>,
-    /// The processor time of its thread then.
-    processor_ns: u64,
-}
-
-/// The budgets of a run's subtasks, and what was seen of the instances on each core.
-#[derive(Debug)]
-pub(crate) struct Budgets {
-    by_vertex: Box<[u64]>,
-    shortest_ns: u64,
-    seen: Box<[Seen]>,
-}
-
-impl Budgets {
-    /// Takes each subtask's budget, or so many of its WCETs; 0: then it has none.
-    pub(crate) fn new(state: &State, wcets: u64) -> Self {
-        let dags = state.engine.task_set.dags().iter();
-        let subtasks = dags.flat_map(|dag| dag.subtasks());
-        let by_vertex: Box<[u64]> = subtasks.map(|s| s.most_execution_ns(wcets)).collect();
-        Self {
-            shortest_ns: by_vertex.iter().copied().min().unwrap_or(u64::MAX),
-            seen: vec![Seen::default(); state.port.active.len()].into(),
-            by_vertex,
-        }
-    }
-
-    /// Looks at what runs. Returns a core whose instance has exceeded its budget, or when
-    /// to look again.
-    fn look(&mut self, team: &Team, state: &State, now_ns: u64) -> Result<u64, CoreId> {
-        if self.shortest_ns == u64::MAX {
-            return Ok(u64::MAX);
-        }
-        let mut next_ns = now_ns.saturating_add(self.shortest_ns);
-        for (core, seen) in (0..).map(CoreId).zip(&mut self.seen) {
-            let Some(vertex) = state.engine.placement.current(core.index()) else {
-                continue;
-            };
-            let budget_ns = self.by_vertex[vertex.index()];
-            let worker = &team.workers[state.port.active[core.index()]];
-            let processor_ns = worker.thread().and_then(sys::processor_time_ns);
-            let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
-                continue;
-            };
-            let job = state.engine.scheduler.instance_of(vertex).job;
-            let clock = team.turns.get(vertex.index());
-            let taken_ns = clock.map_or(0, |clock| clock.taken_ns.load(Ordering::Relaxed));
-            let what = Some((vertex, job, taken_ns));
-            if seen.what != what {
-                *seen = Seen { what, processor_ns };
-            }
-            let used_ns = taken_ns + processor_ns.saturating_sub(seen.processor_ns);
-            if used_ns > budget_ns {
-                *seen = Seen::default();
-                return Err(core);
-            }
-            next_ns = next_ns.min(now_ns.saturating_add(pause_ns(budget_ns - used_ns)));
-        }
-        Ok(next_ns)
-    }
-}
-
-/// Returns how long to sleep between two looks at an instance that has so much of its budget
-/// left: not before it can have used that up, and for a while in any case. This thread may stand
-/// on the instance's own core, and then that uses nothing up until we sleep.
-fn pause_ns(rest_ns: u64) -> u64 {
-    const LEAST_NS: u64 = 20_000;
-    rest_ns.saturating_add(1).max(LEAST_NS)
-}
-
 impl Team {
     /// Makes the scheduler's steps until all jobs have ended.
     pub(crate) fn release(&self, mut budgets: Budgets) {
@@ -792,7 +707,8 @@ mod tests {
 
     use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 
-    use super::{Budgets, IS_OF_RUN, may_call_app, pause_ns, strand};
+    use super::{IS_OF_RUN, may_call_app, strand};
+    use crate::budgets::Budgets;
     use crate::platform::HOST;
     use crate::state::tests::MACHINE;
     use crate::{Linux, Mechanism, clock};
@@ -854,12 +770,5 @@ mod tests {
         assert!(may_call_app());
         IS_OF_RUN.set(true);
         assert!(!may_call_app());
-    }
-
-    #[test]
-    fn an_instance_at_the_end_of_its_budget_gets_time_to_exceed_it() {
-        // Were it 1 ns, this thread would look without end, on the core that the instance needs.
-        assert!([0, 1, 100].map(pause_ns).iter().all(|ns| *ns >= 10_000));
-        assert_eq!(pause_ns(5_000_000), 5_000_001);
     }
 }

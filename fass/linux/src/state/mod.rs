@@ -83,8 +83,8 @@ pub(crate) struct State {
     pub(crate) seats: Box<[Option<CoreId>]>,
     /// By worker, the core to whose processor it is pinned.
     pinned: Box<[Option<CoreId>]>,
-    /// By worker, the time before which its instance does not end: when that has begun, or last gone
-    /// on, or another thread's step was written down as of the core.
+    /// By worker, the time before which its instance does not end: its latest start or resumption,
+    /// or a step of another thread that was written down as of the core.
     resumed_ns: Box<[u64]>,
     /// The core and vertex from which a worker that reports an end has just taken the processor.
     interrupted: Option<(CoreId, Vertex)>,
@@ -525,9 +525,9 @@ impl State {
 }
 
 impl State {
-    /// Returns when the instance of a worker has ended whose function returned at a time on the clock. If it
-    /// lost its core and got it back before it could say so, it ends there; or with a step that was
-    /// taken before.
+    /// Returns when the instance of a worker has ended whose function returned at a time on the
+    /// clock. If it lost its core and got it back before it could say so, it ends there; or with a
+    /// step that was taken before.
     pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
         self.since_epoch(returned_ns).max(self.resumed_ns[worker])
     }
