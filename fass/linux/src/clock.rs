@@ -146,9 +146,11 @@ impl Rates {
         },
     };
 
-    /// Takes an instant, and returns the rate up to it; `None` at first.
+    /// Takes an instant, and returns the rate up to it; `None` at first, and where another thread
+    /// has been here with a later instant.
     fn learn(&mut self, ticks: u64, ns: u64) -> Option<u64> {
         let Self { older, newer } = *self;
+        let since_newer = ticks.checked_sub(newer.ticks)?;
         let expected_ns =
             (u128::from(ticks.wrapping_sub(older.ticks)) * u128::from(newer.rate)) >> 32;
         let passed_ns = u128::from(ns.saturating_sub(older.ns));
@@ -163,7 +165,7 @@ impl Rates {
                 older: here,
                 newer: here,
             };
-        } else if ticks - newer.ticks > WINDOW {
+        } else if since_newer > WINDOW {
             *self = Self {
                 older: newer,
                 newer: here,
@@ -171,7 +173,7 @@ impl Rates {
         }
         let since = ticks - self.older.ticks;
         if since > 8 * FRESH {
-            let rate = (u128::from(ns - self.older.ns) << 32) / u128::from(since);
+            let rate = (u128::from(ns.saturating_sub(self.older.ns)) << 32) / u128::from(since);
             self.newer.rate = u64::try_from(rate).unwrap_or(0);
         }
         (self.newer.rate > 0).then_some(self.newer.rate)
@@ -268,6 +270,7 @@ mod tests {
         let mut rates = Rates::NONE;
         let (tick, ns) = (9 * FRESH, 9 * FRESH / 2);
         assert_eq!(rates.learn(tick, 0), None);
+        assert_eq!(rates.learn(tick - 1, 0), None, "another thread was quicker");
         assert_eq!(rates.learn(2 * tick, ns), Some(1 << 31));
         let later_ns = 2 * ns + 2 * JUMP_NS;
         assert_eq!(rates.learn(3 * tick, later_ns), Some(1 << 31));
