@@ -185,19 +185,13 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
     let team = |(engine, runners): (Engine<_, _>, _)| {
         let cores = task_set.cores_of(engine.cluster, options.cores);
         let processors = &threads.processors[cores.start as usize..cores.end as usize];
-        let state = State::new(engine, office, runners, processors.into());
-        Arc::new(Team::new(
-            state,
-            office,
-            (threads.polls, threads.skips_idle),
-            threads.terms.budget_factor,
-        ))
+        let wcets = threads.terms.budget_factor;
+        let state = State::new(engine, office, runners, processors.into(), wcets);
+        let idle = (threads.polls, threads.skips_idle);
+        Arc::new(Team::new(state, office, idle, wcets))
     };
     engines.zip(runners).map(team).collect()
 }
-
-/// The stack of each worker. All of it is locked in memory, if memory is.
-const STACK_BYTES: usize = 512 * 1024;
 
 /// Time between the start of a run and its first release.
 const LEAD_NS: u64 = 1_000_000;
@@ -260,8 +254,8 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
     section::make_room(teams.iter().map(|team| team.workers.len()).sum());
     let workers = teams.iter().map(|team| {
-        let numbers = 0..team.workers.len();
-        numbers.map(|number| worker(team, number)).collect()
+        let numbers = 0..team.lock().later.start;
+        numbers.map(|number| team.begin_worker(number)).collect()
     });
     let workers: Vec<Vec<_>> = workers.collect();
     for (team, workers) in teams.iter().zip(&workers) {
@@ -335,15 +329,6 @@ fn release(team: &Arc<Team>, budget_factor: u64) -> JoinHandle<()> {
         .name("fass-release".into())
         .spawn(move || team.release(budgets))
         .expect("the system has a thread to release jobs")
-}
-
-fn worker(team: &Arc<Team>, number: usize) -> JoinHandle<()> {
-    let team = Arc::clone(team);
-    thread::Builder::new()
-        .name(format!("fass-worker-{number}"))
-        .stack_size(STACK_BYTES)
-        .spawn(move || team.work(number))
-        .expect("the system has a thread for each core and each subtask")
 }
 
 fn join(thread: JoinHandle<()>) {

@@ -15,6 +15,7 @@
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::thread::JoinHandle;
 
 use fass::platform::SubtaskRunner;
 use sched_dag::engine::NextAction;
@@ -26,7 +27,7 @@ use crate::lock::{Guard, Lock};
 use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{FaultCause, Left, Number, RunTime, State};
-use crate::worker::{Lead, Worker};
+use crate::worker::{self, Lead, Worker};
 use crate::{clock, edge, panics, section, sys};
 
 thread_local! {
@@ -188,6 +189,12 @@ impl Team {
         drop(state);
         self.workers[..cores].iter().for_each(Worker::call);
         self.office.ring(self.cluster);
+    }
+
+    /// Begins the thread of a worker.
+    pub(crate) fn begin_worker(self: &Arc<Self>, me: Number) -> JoinHandle<()> {
+        let team = Arc::clone(self);
+        worker::begin(me, move || team.work(me))
     }
 
     /// Works until all jobs have ended.
@@ -640,12 +647,18 @@ impl Team {
         None
     }
 
-    /// Ends the instance of a worker whose thread goes on with nothing, and with it its DAG.
-    fn strand(&self, me: Number, instance: Instance, cause: &str) {
+    /// Ends the instance of a worker whose thread goes on with nothing, and with it its DAG. Another
+    /// thread begins if need be; were the system to have none, the program would end by this panic.
+    fn strand(self: &Arc<Self>, me: Number, instance: Instance, cause: &str) {
         let workers = &self.workers;
         workers[me].report(self.levels);
         let mut state = self.lock();
         if !state.abandoned.contains(&me) {
+            if let Some(number) = state.later.next() {
+                // Nobody joins the thread; the run's end ends it.
+                drop(self.begin_worker(number));
+                state.spare.push(number);
+            }
             let vertex = state.engine.task_set.vertex(instance);
             let cause = FaultCause::Panic(cause.to_owned());
             self.give_up(&mut state, me, vertex, cause);
@@ -733,11 +746,9 @@ mod tests {
             finish_create_dags(&dags).unwrap();
             let team = Arc::clone(&HOST.take_launched().unwrap().control.teams[0]);
             drop((machine, one));
-            for worker in 0..team.workers.len() {
-                let team = Arc::clone(&team);
-                thread::spawn(move || team.work(worker));
-            }
-            team.wait_until_ready(team.workers.len());
+            let workers = team.lock().later.start;
+            (0..workers).for_each(|worker| drop(team.begin_worker(worker)));
+            team.wait_until_ready(workers);
             team.begin(clock::now_ns());
             let (releasing, budgets) = (Arc::clone(&team), Budgets::new(&team.lock(), 0));
             thread::spawn(move || releasing.release(budgets));

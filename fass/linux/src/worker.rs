@@ -23,6 +23,7 @@
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
+use std::thread::{self, JoinHandle};
 
 use fass::platform::SubtaskRunner;
 use sched_dag::CoreId;
@@ -56,6 +57,18 @@ pub(crate) struct Worker {
     pub(crate) given: Slot<SubtaskRunner>,
     /// Whether it watches for that instead of sleeping.
     polls: bool,
+}
+
+/// The stack of each worker. All of it is locked in memory, if memory is.
+const STACK_BYTES: usize = 512 * 1024;
+
+/// Begins the thread of a worker.
+pub(crate) fn begin(number: usize, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
+    thread::Builder::new()
+        .name(format!("fass-worker-{number}"))
+        .stack_size(STACK_BYTES)
+        .spawn(work)
+        .expect("the system has a thread for each core and each instance that can be suspended")
 }
 
 /// How often a worker looks before it lets other threads have its processor, in case there are
@@ -167,7 +180,7 @@ impl Worker {
             }
             std::hint::spin_loop();
         }
-        std::thread::yield_now();
+        thread::yield_now();
         false
     }
 
@@ -297,8 +310,6 @@ impl Lead {
 
 #[cfg(test)]
 mod tests {
-    use std::thread;
-
     use super::*;
 
     #[test]

@@ -21,8 +21,28 @@
 //!   has ended, by the thread that reports that, or, if the scheduler gives the parked one a core
 //!   before, by its own thread, there. For the model it was suspended so long.
 //! - A fault takes an instance away wherever it is: no core is asked for.
+//!
+//! # How many workers there are
+//!
+//! At any instant each core has one, its active worker. A cluster has more for two reasons:
+//!
+//! - A suspended instance keeps its worker. [`most_suspended`](sched_dag::Dag::most_suspended) bounds
+//!   the instances of a DAG that have started, have not ended and may be suspended, those with a core
+//!   among them. So it holds here, too, where suspensions and resumptions come later than the
+//!   scheduler's decisions. The worker of a parked instance that reports its end is no spare one before
+//!   the step is over, in which others may be suspended; but no successor has started yet, so the
+//!   ended instance's place in the bound is free for so long.
+//! - An instance that is given up keeps its worker for ever. The first of a DAG ends the DAG, and with
+//!   it all instances that are ready or wait. So those that can follow have a core or are suspended: a
+//!   DAG loses no more workers than there are cores and suspended instances of it, nor more than it has
+//!   subtasks.
+//!
+//! An instance that waits between two turns has no worker. Without preemption nothing is suspended.
+//! Workers are lost by exceeded budgets, and by panics that cannot unwind. Where a DAG has no budget,
+//! the latter alone can be, in no run that goes well: the threads for them begin when one is needed.
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
@@ -31,7 +51,7 @@ use sched_dag::engine::{Engine, FaultCost, NextAction, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, Request};
 use sched_dag::placement::NextWork;
-use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Preemption, Vertex};
+use sched_dag::{ClusterId, CoreId, DriverNotice, Instance, Moment, Preemption, Subtask, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::office::Office;
@@ -92,6 +112,8 @@ pub(crate) struct State {
     pub(crate) left: Vec<Left>,
     /// Workers without a core and without an instance.
     pub(crate) spare: Vec<Number>,
+    /// Workers whose threads have not begun. One begins where a panic has taken another one away.
+    pub(crate) later: Range<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
     pub(crate) faults: Vec<Fault>,
@@ -211,9 +233,13 @@ impl State {
         office: &Arc<Office>,
         runners: Vec<SubtaskRunner>,
         processors: Box<[u32]>,
+        budget_factor: u64,
     ) -> Self {
-        let cores = processors.len();
-        let workers = cores + runners.len();
+        let (cores, subtasks) = (processors.len(), runners.len());
+        let later = workers(&engine, cores, budget_factor);
+        let workers = later.end;
+        let mut spare = Vec::with_capacity(workers);
+        spare.extend(cores..later.start);
         for runner in runners {
             engine.put(runner.vertex, Box::new(runner));
         }
@@ -227,7 +253,7 @@ impl State {
             active: (0..cores).collect(),
             time: RunTime::NOT_BEGUN,
             opened: 0,
-            rung: Vec::with_capacity(workers),
+            rung: Vec::with_capacity(subtasks),
             demotes: engine.scheduler.options().preemption == Preemption::Enabled,
         };
         Self {
@@ -238,10 +264,11 @@ impl State {
             resumed_ns: vec![0; workers].into_boxed_slice(),
             interrupted: None,
             left: Vec::with_capacity(workers),
-            spare: (cores..workers).collect(),
+            spare,
+            later,
             abandoned: Vec::with_capacity(workers),
             // Each subtask's, if no fault is survived.
-            faults: Vec::with_capacity(workers),
+            faults: Vec::with_capacity(subtasks),
             called: Vec::with_capacity(2 * cores),
             processors,
             levels: office.levels,
@@ -406,8 +433,8 @@ impl State {
     /// Gives a core a spare worker.
     pub(crate) fn replace(&mut self, core: CoreId, workers: &[Worker]) {
         let spare = self.spare.pop();
-        // Each subtask has at most one started instance, and so many there are.
-        self.seat(spare.expect("a worker for each subtask"), core, workers);
+        // There are as many as the module's head counts.
+        self.seat(spare.expect("a spare worker"), core, workers);
     }
 
     fn seat(&mut self, worker: Number, core: CoreId, workers: &[Worker]) {
@@ -522,6 +549,29 @@ impl State {
             NextWork::Nothing => None,
         }
     }
+}
+
+/// Counts the workers of a cluster: up to the start of the range those with which a run begins, in it
+/// those that begin later.
+fn workers(
+    engine: &Engine<Box<SubtaskRunner>, Number>,
+    cores: usize,
+    budget_factor: u64,
+) -> Range<Number> {
+    let is_preemptive = engine.scheduler.options().preemption == Preemption::Enabled;
+    let (mut first, mut later) = (cores, 0);
+    let dags = engine.task_set.dags().iter();
+    for dag in dags.filter(|dag| dag.cluster() == engine.cluster) {
+        let suspended = dag.most_suspended() * usize::from(is_preemptive);
+        let given_up = (cores + suspended).min(dag.subtasks().len());
+        let has_budget = |of: &Subtask| of.most_execution_ns(budget_factor) < u64::MAX;
+        first += suspended;
+        *match dag.subtasks().iter().any(has_budget) {
+            true => &mut first,
+            false => &mut later,
+        } += given_up;
+    }
+    first..first + later
 }
 
 impl State {
