@@ -74,6 +74,14 @@ pub static BOCHS: Need = Need {
     packages: "bochs bochs-sdl bochsbios vgabios",
 };
 
+/// The program that counts instructions on Linux.
+pub static VALGRIND: Need = Need {
+    name: "Valgrind",
+    what: "a program that counts the instructions of others",
+    parts: &["valgrind"],
+    packages: "valgrind",
+};
+
 /// The runtime in which tests run the page's engine without a browser.
 pub static NODE: Need = Need {
     name: "Node.js",

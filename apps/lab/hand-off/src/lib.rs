@@ -13,6 +13,7 @@
 
 extern crate alloc;
 
+mod empty;
 mod shape;
 
 use alloc::format;
@@ -26,6 +27,7 @@ use core::time::Duration;
 use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
 use fork_join::each_arity;
 
+pub use empty::{Tick, commit, empty};
 pub use shape::Shape;
 
 /// Which bodies stamp.

@@ -12,6 +12,7 @@
 //! - [`sizes`]: the size of each part of an image.
 
 mod acceptance;
+mod baseline;
 pub mod bounds;
 mod code;
 mod frame;
@@ -34,7 +35,7 @@ static BENCH: Menu = Menu {
         "hand-off": "from a completion to its successor's first instruction", hand_off::run;
         "join-latency": "the paper's evaluation: samples, figures, plots and a report",
             join_latency::run;
-        "native": "the scheduler on this host's own processors, in nanoseconds", native::run;
+        "native": "the scheduler on this host's own processors", native::run;
         "sizes": "what each part of an image takes of its room", sizes::run;
     },
     notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",

@@ -17,9 +17,10 @@ use super::{
     CheckFailure, SourceFile, Tally, TestPlan, apart, budgets, layers, none_of, packages, paths,
     words,
 };
-use crate::bench::hand_off;
+use crate::bench::{hand_off, native};
 use sched_dag::Policy;
 use tool::image;
+use tool::install;
 use tool::probe;
 use tool::progress::Lasting;
 use tool::qemu::Qemu;
@@ -93,8 +94,13 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     run("no crate has more lines than its budget", &|| {
         budgets::check(sources, blessed)
     });
-    // From here on the checks need programs of the host, build images and boot guests; what is
-    // missing is reported as skipped, not as a failure.
+    run_with_programs(plan, tally);
+}
+
+/// Runs the checks that need programs of the host, build images and boot guests; a missing program is
+/// reported as skipped, not as a failure.
+fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
+    let blessed = plan.blessed.as_deref();
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), CheckFailure>| {
         if plan.wants(name) {
             tally.run(name, check);
@@ -110,6 +116,13 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     }
     let hop = "the hand-off takes no more instructions than its baseline";
     run(hop, &|| Ok(hand_off::check(blessed)?));
+    run(
+        "a hop on Linux takes no more instructions than its baseline",
+        &|| {
+            install::ensure(&install::VALGRIND).map_err(CheckFailure::Skipped)?;
+            Ok(native::check(blessed)?)
+        },
+    );
     run("a guest runs under KVM", &|| {
         let image = image::build("fork-join");
         let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image));

@@ -5,10 +5,8 @@
 //! can be compared with those in the repository: `tests/baselines/hand-off.json`.
 //!
 //! - `boots`: the app and the number of cores of each boot, and the cost of cores and subtasks;
-//! - `baseline`: the earlier figures, and the tables;
 //! - `listing`: one hop, instruction by instruction.
 
-mod baseline;
 mod boots;
 mod listing;
 
@@ -16,6 +14,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use super::baseline::{self, Baseline};
 use super::frame::{Figure, by_plan};
 use tool::files;
 use tool::options::{Command, Name, Parsed, Takes, options};
@@ -48,6 +47,11 @@ options! {
     /// them to FILE. Needs objdump and addr2line (binutils).
     LISTING: Takes::File("FILE");
 }
+
+const BASELINE: Baseline = Baseline {
+    file: "tests/baselines/hand-off.json",
+    saved_by: "./scripts/bench hand-off --save-baseline",
+};
 
 /// The measurement to make.
 #[derive(Debug)]
@@ -94,7 +98,7 @@ impl HandOffPlan {
             }
             _ => files::check(&[], &options.named(&[name::LISTING])),
         }?;
-        let before = options.is_given(name::COMPARE).then(baseline::read);
+        let before = options.is_given(name::COMPARE).then(|| BASELINE.read());
         Ok(Self {
             mode,
             before: before.transpose()?,
@@ -110,24 +114,16 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&TABLE, words, HandOffPlan::new, measure)
 }
 
-/// Measures as `--compare` does, and prints the table. If figures have grown and there is a `list`
-/// of rewritten files, rewrites the baseline.
+/// Measures as `--compare` does, and [checks](Baseline::check) the figures.
 ///
 /// # Errors
 ///
-/// In words: a guest failed, there is no baseline, or the figures that have grown.
+/// In words: a guest failed, or the check.
 pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     install::ensure_qemu()?;
-    let before = baseline::read()?;
     let image = image::build("hand-off")?;
     let now = measure_mode(Mode::Deterministic, &image)?;
-    let (table, complaints) = baseline::comparison(&now, &before);
-    print!("{table}");
-    match (&complaints[..], list) {
-        ([], _) => Ok(()),
-        (_, None) => Err(complaints.join("; ")),
-        (_, Some(_)) => baseline::golden(&before, &now, list),
-    }
+    BASELINE.check(&now, list)
 }
 
 /// Measures and reports. Returns whether no figure has grown.
@@ -151,18 +147,7 @@ fn measure(plan: &HandOffPlan) -> Result<bool, String> {
     print!("{}", baseline::table(&measured));
     // Instructions come first, if they were counted at all.
     let (_, first) = &measured[0];
-    let mut is_good = true;
-    if let Some(before) = &plan.before {
-        let (table, complaints) = baseline::comparison(first, before);
-        print!("{table}");
-        is_good = complaints.is_empty();
-    }
-    if plan.saves {
-        let file = baseline::file();
-        files::write(&file, baseline::text(first))?;
-        println!("written: {}", file.display());
-    }
-    Ok(is_good)
+    BASELINE.judge(first, plan.before.as_deref(), plan.saves)
 }
 
 /// Chooses the modes: if none is named, counted instructions, and KVM or else threads for time.

@@ -14,12 +14,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Instant;
 
-use hand_off::{Pen, Stamps};
+use hand_off::{Pen, Stamps, Tick, commit, empty};
 use sched_dag::Policy;
 
-use super::{
-    Figure, MeasuredGraph, NativeRow, Rounds, Tick, commit, empty, machine, nanoseconds, run_jobs,
-};
+use super::{Figure, MeasuredGraph, NativeRow, PERIOD, Rounds, machine, nanoseconds, run_jobs};
 
 const WORKLOAD: &str = "join of 2 us";
 
@@ -31,7 +29,8 @@ pub(super) fn join(jobs: u64) -> Result<Vec<NativeRow>, String> {
     let mut stamps = Stamps::default();
     let functions = [0, WORK_NS, WORK_NS, 0].map(|work_ns| body(work_ns, stamps.pen(jobs)));
     let machine = machine(Policy::StaticPriority, 2)?;
-    commit(MeasuredGraph::JOIN, jobs, vec![vec![functions.into()]]);
+    let functions = vec![vec![functions.into()]];
+    commit(MeasuredGraph::JOIN.shape, jobs, PERIOD, functions);
     run_jobs(&machine, jobs).map_err(|why| format!("{WORKLOAD}: {why}"))?;
     let clock = clock();
     let reading_ns = clock.median / clock.per;
@@ -195,8 +194,9 @@ fn pass(graph: MeasuredGraph, windows: usize, clusters: u32) -> Result<Vec<u64>,
     if clusters > 1 {
         machine = machine.with(|terms| terms.divide(&vec![1; clusters as usize]));
     }
-    let functions = marks.iter().map(|marks| empty(graph, marks, jobs_a_round));
-    commit(graph, jobs, functions.collect());
+    let sources = marks.iter().map(|marks| marks.source(jobs_a_round));
+    let functions = sources.map(|source| empty(graph.shape, graph.dags, source));
+    commit(graph.shape, jobs, PERIOD, functions.collect());
     run_jobs(&machine, jobs).map_err(|why| format!("{}: {why}", graph.name))?;
     let times_ns: Vec<_> = marks.iter().map(Rounds::times_ns).collect();
     Ok(of_windows(&times_ns))

@@ -10,26 +10,31 @@
 //! cost of the code, the others include the host's disturbance.
 //!
 //! - here: rounds of jobs, back to back, and the time of one step;
+//! - `counted`: the instructions of one step, which other work does not affect;
 //! - `across_cores`: from the last return to the sink's start, and the throughput of two clusters.
 
 mod across_cores;
+mod counted;
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::{Policy, SubtaskAttributes, create_dag, finish_create_dags};
-use hand_off::Shape;
+use hand_off::{Shape, commit, empty};
 use linux::{Linux, Mechanism};
 use sched_dag::DagId;
 use text::quoted;
 
+use super::baseline;
 use super::frame::{Figure, by_plan};
+use tool::install;
 use tool::options::{Command, Parsed, Takes, options};
 use tool::output::Table;
 use tool::progress::Progress;
+use tool::qemu::Mode;
 use views::json::Object;
 
 static TABLE: Command = Command {
@@ -44,9 +49,10 @@ layered-1000 and dags-1000). `static` and `edf` are the policies.
 `clusters` runs a graph in each of two clusters of one core, next to one on one core alone.
 
 Prints a table and a JSON object for each figure. Times depend on the host and on what
-else it does; compare figures of one run.
+else it does; compare figures of one run. Instructions do not.
 
-Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is refused.
+Exit code: 0 measured, and nothing grew; 1 something grew, or a run did not complete its jobs;
+2 the command line is refused.
 ",
 };
 
@@ -58,6 +64,12 @@ options! {
     /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
     /// layered-1000, dags-1000, join, clusters; all.
     ONLY: Takes::Text("NAMES");
+    /// Instead, count the instructions of `closures, static` on one worker. Needs Valgrind.
+    INSTRUCTIONS: Takes::Nothing;
+    /// Count them, and compare with the baseline; one that grew is a failure.
+    COMPARE: Takes::Nothing;
+    /// Count them, and write them into the baseline, tests/baselines/native.json.
+    SAVE_BASELINE: Takes::Nothing;
 }
 
 /// The name of the workload of joins across cores.
@@ -78,6 +90,11 @@ struct NativePlan {
     graphs: Vec<MeasuredGraph>,
     with_join: bool,
     with_clusters: bool,
+    /// Whether instructions are counted instead.
+    counts: bool,
+    /// The figures of the baseline, if they are to be compared.
+    before: Option<Vec<Figure>>,
+    saves: bool,
 }
 
 /// The numbers of workers, each a thread with a processor of its own.
@@ -97,6 +114,13 @@ impl NativePlan {
                 "`--only`: no workload is called {name}; there are {known}"
             ));
         }
+        let of_baseline = [name::COMPARE, name::SAVE_BASELINE];
+        let counts = options.given_of(&of_baseline).is_some();
+        if counts {
+            options.check_without(&[name::ONLY], "leaves workloads of the baseline out")?;
+        }
+        let before = options.is_given(name::COMPARE);
+        let before = before.then(|| counted::BASELINE.read());
         let number = |name| options.number(name).unwrap_or(0);
         let is_wanted = |graph: &MeasuredGraph| wanted.contains(&graph.name);
         Ok(Self {
@@ -105,6 +129,9 @@ impl NativePlan {
             graphs: MeasuredGraph::ALL.into_iter().filter(is_wanted).collect(),
             with_join: wanted.contains(&JOIN),
             with_clusters: wanted.contains(&CLUSTERS),
+            counts: counts || options.is_given(name::INSTRUCTIONS),
+            before: before.transpose()?,
+            saves: options.is_given(name::SAVE_BASELINE),
         })
     }
 }
@@ -112,8 +139,30 @@ impl NativePlan {
 /// A figure in nanoseconds, and its runner and policy.
 type NativeRow = (Figure, &'static str);
 
-/// Measures and prints; true, as no figure has a limit.
+/// Counts as `--compare` does, and [checks](baseline::Baseline::check) the figures.
+///
+/// # Errors
+///
+/// In words: a program failed, or the check.
+pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
+    counted::BASELINE.check(&counted::count(&MeasuredGraph::ALL)?, list)
+}
+
+/// Measures and prints. Returns whether no figure has grown: a time has no limit.
 fn measure(plan: &NativePlan) -> Result<bool, String> {
+    if plan.counts {
+        install::ensure(&install::VALGRIND)?;
+        let figures = counted::count(&plan.graphs)?;
+        for figure in &figures {
+            let line = Object::new().text("kind", "bench").text("name", "native");
+            println!("{}", figure.json(line));
+        }
+        print!(
+            "{}",
+            baseline::table(&[(Mode::Deterministic, figures.clone())])
+        );
+        return counted::BASELINE.judge(&figures, plan.before.as_deref(), plan.saves);
+    }
     // Two workers that poll on one processor would only wait for each other.
     if linux::processors() < 2 {
         return Err("this host has one processor for us; two are needed".into());
@@ -277,7 +326,7 @@ fn pass(
     // One job more: the last round needs an end.
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
     let marks = Rounds::default();
-    let mut functions = empty(graph, &marks, jobs_a_round);
+    let mut functions = empty(graph.shape, graph.dags, marks.source(jobs_a_round));
     match runner {
         Runner::Floor => {
             for job in 0..jobs {
@@ -286,7 +335,7 @@ fn pass(
         }
         Runner::Closures(policy, _) => {
             let machine = machine(policy, workers)?;
-            commit(graph, jobs, vec![functions]);
+            commit(graph.shape, jobs, PERIOD, vec![functions]);
             run_jobs(&machine, jobs)?;
         }
         Runner::Typed => {
@@ -408,49 +457,8 @@ fn run_jobs(linux: &Linux, jobs: u64) -> Result<(), String> {
     }
 }
 
-/// A function without values.
-type Tick = Box<dyn FnMut(u64) + Send>;
-
-/// Makes empty functions for a graph's DAGs, subtask by subtask; the first source counts rounds.
-fn empty(graph: MeasuredGraph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
-    let of_dag = |_| (0..graph.shape.subtasks()).map(|_| Box::new(|_| ()) as Tick);
-    let mut all: Vec<Vec<Tick>> = (0..graph.dags).map(|dag| of_dag(dag).collect()).collect();
-    let mut source = rounds.source(jobs_a_round);
-    all[0][0] = Box::new(move |_| source());
-    all
-}
-
 fn named(number: usize) -> SubtaskAttributes {
     SubtaskAttributes::named(&format!("s{number}"))
-}
-
-/// Commits DAGs without values, of any shape; `clusters` has the functions of each cluster.
-fn commit(graph: MeasuredGraph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
-    let is_divided = clusters.len() > 1;
-    let mut dags = Vec::new();
-    for (cluster, of_dags) in (0..).zip(clusters) {
-        for (number, functions) in (0_u64..).zip(of_dags) {
-            let dag = create_dag();
-            dag.name(&format!("native{cluster}-{number}"));
-            dag.jobs(jobs).in_flight(1).period(PERIOD);
-            // Deadlines in a shuffled order, no two the same: 617 has no divisor in common with
-            // 1,000.
-            let earlier = number * 617 % u64::from(graph.dags);
-            dag.relative_deadline(PERIOD - Duration::from_micros(earlier));
-            if is_divided {
-                dag.cluster(cluster);
-            }
-            let functions = functions.into_iter().enumerate();
-            let subtasks: Vec<_> = functions
-                .map(|(number, tick)| dag.register_untyped_subtask(tick, named(number)))
-                .collect();
-            for (earlier, later) in graph.shape.edges() {
-                dag.precede(&subtasks[earlier], &subtasks[later]);
-            }
-            dags.push(dag);
-        }
-    }
-    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the graphs are right");
 }
 
 /// Commits a graph of one DAG with a value on each edge; its source also calls `tick`.
@@ -507,5 +515,12 @@ mod tests {
         assert!(!chosen.with_join && !chosen.with_clusters);
         let line = plan("--only chain-65").err().expect("refused");
         assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
+    }
+
+    #[test]
+    fn a_baseline_is_of_instructions_and_of_all_workloads() {
+        let why = plan("--compare --only join").err().expect("refused");
+        assert!(why.starts_with("`--only` leaves workloads of"), "{why}");
+        assert!(plan("--save-baseline").is_ok_and(|plan| plan.counts && plan.saves));
     }
 }

@@ -1,23 +1,29 @@
 //! The figures kept in the repository, the comparison with new ones, and the tables.
 //!
 //! A baseline holds counted instructions, which repeat exactly on one core: a difference comes from
-//! a change of the code, of the compiler or of QEMU. On several cores a rare interrupt may come
+//! a change of the code, of the compiler or of what counts. On several cores a rare interrupt may come
 //! some nanoseconds later, so there the margin is wider and the p99 does not count. [`MARGIN_RULE`]
 //! says when a figure has *grown*.
 
 use std::fs;
 use std::iter;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::bench::frame::Figure;
 use crate::golden::Golden;
+use tool::files;
 use tool::output::Table;
 use tool::qemu::Mode;
 use tool::system;
 use views::json::{self, Object};
 
-/// The path of the baseline, relative to the workspace's root.
-const BASELINE: &str = "tests/baselines/hand-off.json";
+/// Figures kept in the repository.
+pub(super) struct Baseline {
+    /// The path, relative to the workspace's root.
+    pub(super) file: &'static str,
+    /// The command that writes the file anew.
+    pub(super) saved_by: &'static str,
+}
 
 /// The rule for a figure that has grown, in words; [`margin`] implements it.
 const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
@@ -51,24 +57,63 @@ fn has_grown(now: &Figure, before: &Figure) -> bool {
     grows(now.median, before.median) || (now.cores == 1 && grows(now.p99, before.p99))
 }
 
-/// Returns the file of the baseline.
-pub(super) fn file() -> PathBuf {
-    system::workspace().join(BASELINE)
-}
+impl Baseline {
+    /// Reads the figures.
+    ///
+    /// # Errors
+    ///
+    /// In words: the file cannot be read, or holds something else.
+    pub(super) fn read(&self) -> Result<Vec<Figure>, String> {
+        let Self { file, saved_by } = self;
+        let text = fs::read_to_string(system::workspace().join(file));
+        let text = text.map_err(|error| error.to_string());
+        text.and_then(|text| figures(&text))
+            .map_err(|why| format!("the baseline `{file}`: {why}; `{saved_by}` writes it anew"))
+    }
 
-/// Reads the baseline.
-///
-/// # Errors
-///
-/// In words: the file cannot be read, or holds something else.
-pub(super) fn read() -> Result<Vec<Figure>, String> {
-    let text = fs::read_to_string(file()).map_err(|error| error.to_string());
-    text.and_then(|text| figures(&text)).map_err(|why| {
-        format!(
-            "the baseline `{BASELINE}`: {why}; `./scripts/bench hand-off --save-baseline` writes \
-             it anew"
-        )
-    })
+    /// Compares new figures with those before, if there are any, and keeps them if `saves` says so.
+    /// Prints a table, and reports whether no figure has grown.
+    ///
+    /// # Errors
+    ///
+    /// In words: the file cannot be written.
+    pub(super) fn judge(
+        &self,
+        now: &[Figure],
+        before: Option<&[Figure]>,
+        saves: bool,
+    ) -> Result<bool, String> {
+        let complaints = before.map_or_else(Vec::new, |before| self.comparison(now, before));
+        if saves {
+            let file = system::workspace().join(self.file);
+            files::write(&file, text(now))?;
+            println!("written: {}", file.display());
+        }
+        Ok(complaints.is_empty())
+    }
+
+    /// Compares new figures with the baseline, and prints a table. If figures have grown and there is
+    /// a `list` of rewritten files, rewrites the baseline.
+    ///
+    /// # Errors
+    ///
+    /// In words: there is no baseline, or the figures that have grown.
+    pub(super) fn check(&self, now: &[Figure], list: Option<&Path>) -> Result<(), String> {
+        let before = self.read()?;
+        match (&self.comparison(now, &before)[..], list) {
+            ([], _) => Ok(()),
+            (complaints, None) => Err(complaints.join("; ")),
+            (_, Some(_)) => {
+                let (file, below, before) = (self.file, "", text(&before));
+                let golden = Golden {
+                    file,
+                    below,
+                    text: &before,
+                };
+                golden.compare(&text(now), list)
+            }
+        }
+    }
 }
 
 fn figures(text: &str) -> Result<Vec<Figure>, String> {
@@ -79,24 +124,8 @@ fn figures(text: &str) -> Result<Vec<Figure>, String> {
     figures.ok_or_else(|| "it holds no figures".into())
 }
 
-/// Compares the baseline with new figures as text; rewrites it if there is a `list` of rewritten
-/// files.
-///
-/// # Errors
-///
-/// In words: they differ, and the baseline was not rewritten.
-pub(super) fn golden(before: &[Figure], now: &[Figure], list: Option<&Path>) -> Result<(), String> {
-    let (file, below, text_before) = (BASELINE, "", text(before));
-    let golden = Golden {
-        file,
-        below,
-        text: &text_before,
-    };
-    golden.compare(&text(now), list)
-}
-
 /// Returns a baseline's text, one line for each figure.
-pub(super) fn text(figures: &[Figure]) -> String {
+fn text(figures: &[Figure]) -> String {
     let lines = figures.iter().map(|figure| figure.json(Object::new()));
     let lines: Vec<String> = lines.collect();
     let lines = lines.join(",\n");
@@ -180,53 +209,62 @@ pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
     table.text()
 }
 
-/// Returns the table of baseline, present figures and ratios, and a line for each figure that has
-/// grown or is missing.
-pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> (String, Vec<String>) {
-    let columns = "instructions:<60|baseline:12|now:11|ratio:8|p99 was:12|p99 is:11|:0";
-    let mut table = Table::new("", columns);
-    let mut complaints = Vec::new();
-    add_rows(&mut table, now, |figure| {
-        let [is, p99_is] = [figure.median, figure.p99].map(|number| figure.one(number));
-        let Some(before) = baseline.iter().find(|before| before.is_same(figure)) else {
-            let (none, mark) = (String::new, "  new: save the baseline to keep it".into());
-            return vec![none(), is, none(), none(), p99_is, mark];
-        };
-        let [was, p99_was] = [before.median, before.p99].map(|number| before.one(number));
-        let ratio = match (figure.median, before.median) {
-            (0, 0) => 1.0,
-            (now, was) => figure.of_step(now) / before.of_step(was),
-        };
-        let mut mark = String::new();
-        if has_grown(figure, before) {
-            mark = "  GROWN".into();
-            let (place, name) = (heading(figure), name(figure));
-            complaints.push(format!(
-                "{place}, {name}: {is} (p99 {p99_is}) instead of {was} ({p99_was})"
-            ));
+impl Baseline {
+    /// Prints the table of baseline, present figures and ratios, and returns a line for each figure that
+    /// has grown or is missing.
+    fn comparison(&self, now: &[Figure], baseline: &[Figure]) -> Vec<String> {
+        let columns = "instructions:<60|baseline:12|now:11|ratio:8|p99 was:12|p99 is:11|:0";
+        let mut table = Table::new("", columns);
+        let mut complaints = Vec::new();
+        add_rows(&mut table, now, |figure| {
+            let [is, p99_is] = [figure.median, figure.p99].map(|number| figure.one(number));
+            let Some(before) = baseline.iter().find(|before| before.is_same(figure)) else {
+                let (none, mark) = (String::new, "  new: save the baseline to keep it".into());
+                return vec![none(), is, none(), none(), p99_is, mark];
+            };
+            let [was, p99_was] = [before.median, before.p99].map(|number| before.one(number));
+            let ratio = match (figure.median, before.median) {
+                (0, 0) => 1.0,
+                (now, was) => figure.of_step(now) / before.of_step(was),
+            };
+            let mut mark = String::new();
+            if has_grown(figure, before) {
+                mark = "  GROWN".into();
+                let (place, name) = (heading(figure), name(figure));
+                complaints.push(format!(
+                    "{place}, {name}: {is} (p99 {p99_is}) instead of {was} ({p99_was})"
+                ));
+            }
+            vec![was, is, format!("{ratio:.3}"), p99_was, p99_is, mark]
+        });
+        let is_gone = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
+        // A figure that vanished could hide growth, so it counts as a complaint.
+        for gone in baseline.iter().filter(is_gone) {
+            let line = format!("{}, {}: not measured any more", heading(gone), name(gone));
+            table.line(&line);
+            complaints.push(line);
         }
-        vec![was, is, format!("{ratio:.3}"), p99_was, p99_is, mark]
-    });
-    let is_gone = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
-    // A figure that vanished could hide growth, so it counts as a complaint.
-    for gone in baseline.iter().filter(is_gone) {
-        let line = format!("{}, {}: not measured any more", heading(gone), name(gone));
-        table.line(&line);
-        complaints.push(line);
+        let verdict = match complaints.len() {
+            0 => "nothing has grown".into(),
+            some => format!("{some} GROWN OR MISSING"),
+        };
+        table.line(&format!(
+            "{verdict} ({MARGIN_RULE}; `{}` accepts it)",
+            self.saved_by
+        ));
+        print!("{}", table.text());
+        complaints
     }
-    let verdict = match complaints.len() {
-        0 => "nothing has grown".into(),
-        some => format!("{some} GROWN OR MISSING"),
-    };
-    table.line(&format!(
-        "{verdict} ({MARGIN_RULE}; `./scripts/bench hand-off --save-baseline` accepts it)"
-    ));
-    (table.text(), complaints)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const BASELINE: Baseline = Baseline {
+        file: "figures.json",
+        saved_by: "a command",
+    };
 
     /// Makes a figure of median, p99 and steps.
     fn figure([median, p99, per]: [u64; 3]) -> Figure {
@@ -275,9 +313,8 @@ mod tests {
         let kept = [figure([1, 2, 3]), other];
         let before = figures(&text(&kept)).unwrap();
         assert_eq!(before, kept);
-        let complaints = |now: &[Figure]| comparison(now, &before).1.len();
+        let complaints = |now: &[Figure]| BASELINE.comparison(now, &before).len();
         assert_eq!([complaints(&[]), complaints(&kept)], [2, 0]);
-        assert!(comparison(&kept, &before).0.contains("nothing has grown"));
         assert!(figures("{}").unwrap_err().contains("holds no figures"));
     }
 }
