@@ -23,35 +23,26 @@ fn a_call_that_blocks_is_made_in_a_thread_of_its_own() {
         let alone = alone(1, mechanism);
         let dag = every(ms(20), "asks");
         dag.jobs(3);
-        let is_late = Arc::<AtomicBool>::default();
-        let (mut job, late) = (0, Arc::clone(&is_late));
+        let (mut job, give) = (0, send.clone());
         let ask = move |host: Asker<u64, Result<u64, RecvError>>| {
             job += 1;
-            let late = Arc::clone(&late);
+            let give = give.clone();
             async move {
                 let limit = if job == 2 { ms(1) } else { MINUTE };
                 let answer = host.ask(job).within(limit).await;
                 // The second call blocks for longer, and the third one comes after it.
                 let expected = [Ok(Ok(10)), Err(TimedOut), Ok(Ok(90))];
                 assert_eq!(answer, expected[usize::try_from(job).unwrap() - 1]);
-                late.store(job == 2, Relaxed);
+                // For the call that is too late, and for the one behind it.
+                (0..if job == 2 { 2 } else { 0 }).for_each(|_| give.send(30).expect("it waits"));
             }
         };
         let ask = dag.using(host.asking()).async_source(ask);
         ask.register(SubtaskAttributes::named("ask").wait(MINUTE));
-        // Another DAG, on the only core, which what waits has left, gives what the calls wait for.
+        // Another DAG, on the only core, which a waiting instance has left, gives the first number.
         let gives = every(ms(10), "gives");
-        gives.jobs(20);
-        let mut numbers = [10, 30, 30].into_iter();
-        let give = move || {
-            let count = match numbers.len() {
-                3 => 1,
-                _ if is_late.load(Relaxed) => 2,
-                _ => 0,
-            };
-            let given = numbers.by_ref().take(count);
-            given.for_each(|number| send.send(number).expect("somebody waits"));
-        };
+        gives.jobs(1);
+        let give = move || send.send(10).expect("the first call waits");
         gives
             .source(give)
             .register(SubtaskAttributes::named("give"));
