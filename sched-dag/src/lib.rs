@@ -140,7 +140,7 @@ pub use policy::{
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
-    SKIPS_A_STEP, SKIPS_EVERY_NS, Scheduler, SchedulerQuery, TurnEnd,
+    SKIPS_A_STEP, SKIPS_EVERY_NS, Scheduler, SchedulerQuery, TurnEnd, Unwritten,
 };
 pub use spec::{
     DagSpec, LatestSpec, LockUse, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,

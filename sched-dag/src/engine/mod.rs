@@ -33,7 +33,7 @@ use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, Parts, PendingRequests, Request, WaitLimit};
 use crate::placement::{NextWork, Placement};
 use crate::policies::SchedulerOptions;
-use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
+use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd, Unwritten};
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
@@ -221,13 +221,14 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             let limit_ns = None;
             return NextAction::Step(Some(TurnEnd { instance, limit_ns }));
         }
-        let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
+        let (done, unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
-            let hop = (vertex, next, decision.instance.job);
+            let (ended, hop) = ((core, finish_ns), (vertex, next, decision.instance.job));
             // Each way by itself: the frequent one asks nothing twice.
-            return match is_unwritten {
-                true => self.hop::<C, true>((core, finish_ns), hop, body, port),
-                false => self.hop::<C, false>((core, finish_ns), hop, body, port),
+            return match unwritten {
+                Unwritten::FinishAndReady => self.hop::<C, true, true>(ended, hop, body, port),
+                Unwritten::Finish => self.hop::<C, true, false>(ended, hop, body, port),
+                Unwritten::Nothing => self.hop::<C, false, false>(ended, hop, body, port),
             };
         }
         self.placement.finish(core.index(), vertex, body);
@@ -243,7 +244,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
 
     /// Has a core go on from one vertex to the next, with the next one's instance of a job.
     #[inline(always)]
-    fn hop<C: PlatformPort<B>, const IS_UNWRITTEN: bool>(
+    fn hop<C: PlatformPort<B>, const HAS_ENDED: bool, const IS_NEW: bool>(
         &mut self,
         (core, finish_ns): (CoreId, u64),
         (vertex, next, job): (Vertex, Vertex, u64),
@@ -251,29 +252,33 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         port: &mut C,
     ) -> NextAction<B> {
         // Before the body goes back to its place.
-        let from = body.subject();
+        let finish = (EventKind::Finish, finish_ns, body.subject());
         let exchanged = self.placement.exchange(core, vertex, body, next);
-        if !IS_UNWRITTEN {
+        if !HAS_ENDED {
             // Jobs may have been cut on this way, too, and their inputs are given up before
             // the next function begins.
             self.act(port);
         }
+        let log = &mut self.scheduler.log;
         let Some(mut body) = exchanged else {
             // It is suspended, so it has been ready before.
+            if HAS_ENDED {
+                log.journal.write_all(core, [finish]);
+            }
             return NextAction::Look {
                 is_rescheduled: false,
             };
         };
         body.set_job(job);
-        let log = &mut self.scheduler.log;
         let to = body.subject();
         let start_ns = port.start(core, &mut body, log.now_ns());
         let start = (EventKind::Start, start_ns, to);
-        // One entry instead of three: the times of finish and ready are the same.
-        if IS_UNWRITTEN {
-            let finish = (EventKind::Finish, finish_ns, from);
+        // One entry instead of several: the times of finish and ready are the same.
+        if IS_NEW {
             let ready = (EventKind::Ready, log.now_ns(), to);
             log.journal.write_all(core, [finish, ready, start]);
+        } else if HAS_ENDED {
+            log.journal.write_all(core, [finish, start]);
         } else {
             log.journal.write_all(core, [start]);
         }

@@ -111,7 +111,7 @@ impl Journal {
 
     /// Writes down several things that have happened on one core: room for all is looked
     /// at once.
-    #[inline]
+    #[inline(always)]
     pub fn write_all<const N: usize>(
         &mut self,
         core: CoreId,

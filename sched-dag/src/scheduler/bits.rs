@@ -15,25 +15,27 @@ use alloc::vec::Vec;
 pub(super) struct BitSet {
     /// The one word of the highest level.
     top: u64,
-    /// The levels below it, the highest first; the last one has the numbers
-    /// themselves, unless the top does.
-    levels: Box<[Box<[u64]>]>,
+    /// The numbers themselves.
+    words: Box<[u64]>,
+    /// The levels in between, the lowest first; mostly none.
+    between: Box<[Box<[u64]>]>,
 }
 
 impl BitSet {
     /// Makes an empty set for the numbers `0..limit`.
     #[inline]
     pub(super) fn new(limit: usize) -> Self {
-        let mut levels = Vec::new();
-        let mut words = limit.div_ceil(64);
-        while words > 1 {
-            levels.push(vec![0; words].into_boxed_slice());
-            words = words.div_ceil(64);
+        let mut between = Vec::new();
+        let count = limit.div_ceil(64);
+        let mut above = count.div_ceil(64);
+        while above > 1 {
+            between.push(vec![0; above].into_boxed_slice());
+            above = above.div_ceil(64);
         }
-        levels.reverse();
         Self {
             top: 0,
-            levels: levels.into_boxed_slice(),
+            words: vec![0; count].into_boxed_slice(),
+            between: between.into_boxed_slice(),
         }
     }
 
@@ -42,35 +44,37 @@ impl BitSet {
         self.top == 0
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn insert(&mut self, number: usize) {
-        // Mostly one level is below the top, or none.
-        if let [level] = &mut *self.levels {
-            level[number / 64] |= 1 << (number % 64);
-            self.top |= 1 << (number / 64);
-            return;
+        let mut place = number / 64;
+        self.words[place] |= 1 << (number % 64);
+        if !self.between.is_empty() {
+            place = self.insert_between(place);
         }
-        let mut place = number;
-        for level in self.levels.iter_mut().rev() {
-            let word = &mut level[place / 64];
-            let was_empty = *word == 0;
-            *word |= 1 << (place % 64);
+        self.top |= 1 << place;
+    }
+
+    #[cold]
+    fn insert_between(&mut self, mut place: usize) -> usize {
+        for level in &mut self.between {
+            level[place / 64] |= 1 << (place % 64);
             place /= 64;
-            // The levels above have the word's bit already.
-            if !was_empty {
-                return;
-            }
         }
-        self.top |= 1 << (place % 64);
+        place
     }
 
     #[inline]
     pub(super) fn remove(&mut self, number: usize) {
-        let mut place = number;
-        for level in self.levels.iter_mut().rev() {
+        let mut place = number / 64;
+        let word = &mut self.words[place];
+        *word &= !(1 << (number % 64));
+        // Others are left in the word, so the levels above keep its bit.
+        if *word != 0 {
+            return;
+        }
+        for level in &mut self.between {
             let word = &mut level[place / 64];
             *word &= !(1 << (place % 64));
-            // Others are left in the word, so the levels above keep its bit.
             if *word != 0 {
                 return;
             }
@@ -79,36 +83,37 @@ impl BitSet {
         self.top &= !(1 << (place % 64));
     }
 
-    /// Takes the least number out.
-    #[inline]
-    pub(super) fn pop(&mut self) -> Option<usize> {
-        if let [level] = &mut *self.levels {
-            if self.top == 0 {
-                return None;
+    /// Takes the least number out of a set that is not empty.
+    #[inline(always)]
+    pub(super) fn pop(&mut self) -> usize {
+        let number = self.first();
+        let word = &mut self.words[number / 64];
+        *word &= word.wrapping_sub(1);
+        if *word == 0 {
+            match self.between.is_empty() {
+                true => self.top &= self.top.wrapping_sub(1),
+                false => self.remove(number),
             }
-            let place = self.top.trailing_zeros() as usize;
-            let word = &mut level[place];
-            let number = place * 64 + word.trailing_zeros() as usize;
-            *word &= *word - 1;
-            if *word == 0 {
-                self.top &= self.top - 1;
-            }
-            return Some(number);
         }
-        self.first().inspect(|&number| self.remove(number))
+        number
     }
 
-    /// Returns the least number.
-    #[inline]
-    pub(super) fn first(&self) -> Option<usize> {
-        if self.is_empty() {
-            return None;
-        }
+    /// Returns the least number of a set that is not empty.
+    #[inline(always)]
+    pub(super) fn first(&self) -> usize {
         let mut place = self.top.trailing_zeros() as usize;
-        for level in &self.levels {
+        if !self.between.is_empty() {
+            place = self.first_between(place);
+        }
+        place * 64 + self.words[place].trailing_zeros() as usize
+    }
+
+    #[cold]
+    fn first_between(&self, mut place: usize) -> usize {
+        for level in self.between.iter().rev() {
             place = place * 64 + level[place].trailing_zeros() as usize;
         }
-        Some(place)
+        place
     }
 }
 
@@ -120,21 +125,21 @@ mod tests {
     fn gives_the_least_number_at_every_size() {
         for limit in [0, 1, 63, 64, 65, 4_096, 4_097, 300_000] {
             let mut set = BitSet::new(limit);
-            assert_eq!(set.first(), None, "limit {limit}");
+            assert!(set.is_empty(), "limit {limit}");
             let numbers: Vec<_> = (0..limit.min(1_000)).map(|n| limit - 1 - n).collect();
             for &number in &numbers {
                 set.insert(number);
                 set.insert(number);
-                assert_eq!(set.first(), Some(number), "limit {limit}");
+                assert_eq!(set.first(), number, "limit {limit}");
             }
             let mut popped = set.clone();
             for &number in numbers.iter().rev() {
-                assert_eq!(set.first(), Some(number), "limit {limit}");
+                assert_eq!(set.first(), number, "limit {limit}");
                 set.remove(number);
                 set.remove(number);
-                assert_eq!(popped.pop(), Some(number), "limit {limit}");
+                assert_eq!(popped.pop(), number, "limit {limit}");
             }
-            assert_eq!((set.first(), popped.pop()), (None, None), "limit {limit}");
+            assert!(set.is_empty() && popped.is_empty(), "limit {limit}");
         }
     }
 }

@@ -57,9 +57,9 @@ use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::instances::line_up;
+use super::instances::make_ready;
 use super::key::DispatchKey;
-use super::vertices::{InstancePhase, VertexTable};
+use super::vertices::{InstancePhase, Successors};
 use super::{OWED, Scheduler};
 use crate::ids::{CoreId, Instance, Vertex};
 use crate::journal::EventKind;
@@ -170,63 +170,55 @@ pub enum HandOff {
     Open,
 }
 
+/// The events of an end which its driver still has to write down, before the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unwritten {
+    /// None.
+    Nothing,
+    /// The finish.
+    Finish,
+    /// The finish, and that the instance which starts has become ready by that: with the start they
+    /// are one entry then.
+    FinishAndReady,
+}
+
 impl Scheduler {
     /// Takes note that the instance which `core` has been given last has
     /// finished at `now_ns`, and gives the core the first in line if that is all
-    /// there is to decide. A time earlier than one before counts as that one.
-    ///
-    /// Neither the finish nor that an instance has become ready is written down if that is the only
-    /// one and the core begins it, for finish, ready and start are one entry then. Reports whether
-    /// that is so.
+    /// there is to decide. A time earlier than one before counts as that one. Returns besides
+    /// which events are left to the caller to write down, before the start.
     ///
     /// # Panics
     ///
     /// If no instance of the vertex has started, or it has ended before.
     #[inline(always)]
-    pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, bool) {
-        let done = self.end_shortly(now_ns, core, vertex);
-        if let HandOff::Idle = done.0 {
-            // Idle only now: where the core goes on with another instance, it never enters the
-            // stack of idle ones.
-            self.cores.free(core);
-        }
-        done
-    }
-
-    /// Ends the instance on `core`, and gives the core the first in line if only one core is
-    /// concerned: if there is none, it is not idle yet. If more is to be decided, it is. Reports
-    /// whether it has still to be written down that the one has finished and the other is ready.
-    #[inline(always)]
-    fn end_shortly(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, bool) {
+    pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, Unwritten) {
         // Cores may tell their times in another order than they read them: time never goes back.
         self.log.now_ns = self.log.now_ns.max(now_ns);
         let ending = self.vertices.get(vertex.0);
-        // Otherwise a dispatch is owed from before, or the instance was to move.
-        if self.fresh != 0 || ending.phase != InstancePhase::Running(core) {
-            let instance = self.instance_of(vertex);
-            self.write_finish(core, vertex, now_ns);
-            self.finish(instance);
-            return (HandOff::Open, false);
-        }
+        let is_here = ending.phase == InstancePhase::Running(core);
         // A deadline or a release that is due has to come first, by the whole step.
         let is_quiet = self.log.now_ns < self.quiet_until_ns;
+        if self.fresh != 0 || !is_here {
+            return (self.end_later(now_ns, core, vertex), Unwritten::Nothing);
+        }
+        let mut unwritten = Unwritten::Nothing;
         if ending.only_passes_on && is_quiet {
-            let (fresh, next) = self.vertices.pass_on(vertex.0);
-            match fresh {
+            let (ready, others) = self.vertices.pass_on(vertex.0);
+            match ready {
                 // The end made nothing ready, so only what was in line before can take the core.
-                0 => {
-                    self.write_finish(core, vertex, now_ns);
-                    return (self.give_first(core), false);
-                }
+                None => unwritten = Unwritten::Finish,
                 // The most frequent case of a chain: the successor never enters the queue, and one
                 // entry of the journal tells finish, ready and start.
-                1 if (self.ready).is_next(|| self.vertices.get(next).line, core) => {
-                    return self.pass(next, core);
+                Some(next) if others.is_empty() && self.ready.is_one_empty_line() => {
+                    self.pass(next, core);
+                    let done = self.hand_off(core, (next, EventKind::Start));
+                    return (done, Unwritten::FinishAndReady);
                 }
                 // Several, or others in line: only their keys tell which is first.
-                _ => {
+                Some(next) => {
                     self.write_finish(core, vertex, now_ns);
-                    self.line_up_successors(vertex.0);
+                    self.line_up_all(next, others);
                 }
             }
         } else {
@@ -235,18 +227,43 @@ impl Scheduler {
         }
         // The core takes one of the new instances; a second one may concern another core. (The
         // module says why one cannot.)
-        let is_of_others = match self.fresh {
-            0 => false,
-            1 => self.ready.latest_concerns_others(core),
-            _ => true,
-        };
-        let concerns_others = is_of_others && self.cores.count() > 1;
+        let concerns_others = self.cores.count() > 1
+            && match self.fresh {
+                0 => false,
+                1 => self.ready.latest_concerns_others(core),
+                _ => true,
+            };
         if concerns_others || self.log.now_ns >= self.quiet_until_ns {
-            return (self.leave_open(core, vertex), false);
+            return (self.leave_open(core, vertex), Unwritten::Nothing);
         }
         // The dispatch is made here: what is in line preempts nobody.
         self.fresh = 0;
-        (self.give_first(core), false)
+        if let Some(first) = self.give_first(core) {
+            return (self.hand_off(core, first), unwritten);
+        }
+        if unwritten == Unwritten::Finish {
+            self.write_finish(core, vertex, now_ns);
+        }
+        // Idle only now: where the core goes on with another instance, it never enters the
+        // stack of idle ones.
+        self.cores.free(core);
+        (HandOff::Idle, Unwritten::Nothing)
+    }
+
+    /// Returns the decision that a core begins or continues the instance of a vertex.
+    #[inline(always)]
+    pub(super) fn hand_off(&self, core: CoreId, (next, what): (u32, EventKind)) -> HandOff {
+        let instance = self.vertices.get(next).present_instance();
+        HandOff::To(Vertex(next), Decision::new(what, core, instance))
+    }
+
+    /// Ends an instance while a dispatch is owed from before, or that was to move.
+    #[cold]
+    #[inline]
+    fn end_later(&mut self, finish_ns: u64, core: CoreId, vertex: Vertex) -> HandOff {
+        self.write_finish(core, vertex, finish_ns);
+        self.finish(self.instance_of(vertex));
+        HandOff::Open
     }
 
     /// Writes down that a core has finished the instance of a vertex.
@@ -259,6 +276,7 @@ impl Scheduler {
     }
 
     /// Leaves the instant to be begun again, and the core idle.
+    #[cold]
     #[inline]
     fn leave_open(&mut self, core: CoreId, ended: Vertex) -> HandOff {
         // The late sink has to be judged before another instance of its vertex hides how far it
@@ -273,43 +291,46 @@ impl Scheduler {
         HandOff::Open
     }
 
-    /// Gives a core the one instance that has just become ready, without putting it in
-    /// line, unless that has a more urgent one.
+    /// Gives a core the one instance that has just become ready, without putting it in line.
     #[inline(always)]
-    fn pass(&mut self, number: u32, core: CoreId) -> (HandOff, bool) {
+    fn pass(&mut self, number: u32, core: CoreId) {
         let next = self.vertices.get_mut(number);
-        let instance = next.present_instance();
         let key = (self.ready).key(number, next, || {
             self.dags[next.dag.index()].jobs.job(next.progress)
         });
         next.phase = InstancePhase::Running(core);
         (self.cores).run(core, key, next.yields_to_the_unpinned());
-        // Never a resumption: it has become ready by this very end, so it has not run before.
-        let decision = Decision::new(EventKind::Start, core, instance);
-        (HandOff::To(Vertex(number), decision), true)
     }
 
-    /// Puts all successors of a vertex in line that its end has made ready.
+    /// Puts an instance that has become ready in line, and all that are ready of the successors
+    /// which follow it.
     #[inline]
-    fn line_up_successors(&mut self, vertex: u32) {
-        // `pass_on` has counted them already. A counter that is 0 now waited for this end alone, so
-        // no instance is put in line twice.
-        for place in VertexTable::successors(self.vertices.get(vertex)) {
-            if let Some((number, next)) = self.vertices.ready_successor(place) {
-                let job = self.dags[next.dag.index()].jobs.job(next.progress);
-                line_up(number, next, job, &mut self.ready, &mut self.log);
-                self.fresh += 1;
+    fn line_up_all(&mut self, mut next: u32, mut others: Successors) {
+        let Self {
+            vertices,
+            dags,
+            ready,
+            log,
+            ..
+        } = self;
+        loop {
+            let vertex = vertices.get_mut(next);
+            let (dag, sequence) = (vertex.dag, vertex.progress);
+            let job = || dags[dag.index()].jobs.job(sequence);
+            make_ready(next, vertex, job, ready, log);
+            self.fresh += 1;
+            match vertices.next_ready(&mut others) {
+                Some(number) => next = number,
+                None => return,
             }
         }
     }
 
-    /// Gives a core the first in line.
-    #[inline]
-    pub(super) fn give_first(&mut self, core: CoreId) -> HandOff {
-        match self.ready.pop_for(core) {
-            Some(key) => HandOff::To(Vertex(key.vertex()), self.give(core, key)),
-            None => HandOff::Idle,
-        }
+    /// Gives a core the first in line: a vertex, and whether that starts or goes on.
+    #[inline(always)]
+    pub(super) fn give_first(&mut self, core: CoreId) -> Option<(u32, EventKind)> {
+        let key = self.ready.pop_for(core)?;
+        Some((key.vertex(), self.give(core, key).what))
     }
 }
 

@@ -255,7 +255,7 @@ impl Scheduler {
     }
 }
 
-/// Puts the next instance of a vertex, which is ready, in line.
+/// Puts the next instance of a vertex, which is ready and of a job, in line.
 #[inline(always)]
 pub(super) fn line_up(
     number: u32,
@@ -264,8 +264,21 @@ pub(super) fn line_up(
     ready: &mut ReadyLines,
     log: &mut EventLog,
 ) {
-    vertex.phase = InstancePhase::Ready;
     vertex.job = job.number;
-    ready.insert(vertex.line, ready.key(number, vertex, || job));
-    log.of_instance(EventKind::Ready, vertex.instance(job));
+    make_ready(number, vertex, || job, ready, log);
+}
+
+/// Puts the instance that a vertex is to do next in line. It is of the job that `job` finds.
+#[inline(always)]
+pub(super) fn make_ready<'j>(
+    number: u32,
+    vertex: &mut Vertex,
+    job: impl FnOnce() -> &'j Job,
+    ready: &mut ReadyLines,
+    log: &mut EventLog,
+) {
+    vertex.phase = InstancePhase::Ready;
+    ready.insert(vertex.line, ready.key(number, vertex, job));
+    // No driver hears of it: the short way leaves it to the driver to write it down.
+    log.on_this(EventKind::Ready, log.now_ns, vertex.present_instance());
 }

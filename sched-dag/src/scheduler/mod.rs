@@ -69,7 +69,7 @@ use crate::scheduler::vertices::VertexTable;
 use crate::scheduler::waits::WaitTable;
 use crate::task_set::{Dag, TaskSet};
 
-pub use crate::scheduler::dispatch::{Decision, HandOff};
+pub use crate::scheduler::dispatch::{Decision, HandOff, Unwritten};
 pub use crate::scheduler::log::{DriverNotice, EventLog};
 pub use crate::scheduler::moment::{Moment, TurnEnd};
 pub use crate::scheduler::phase::{

@@ -33,8 +33,7 @@
 //!
 //! A core that has finished an instance takes the first in its own line, or else in its group's. Only
 //! that core is concerned, unless the one instance that has become ready is in a line of other cores,
-//! or is not pinned and this core goes on with a pinned one. A chain that is pinned to one core is
-//! handed on as others are, and also past what waits in the group's line.
+//! or is not pinned and this core goes on with a pinned one.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -149,16 +148,23 @@ impl ReadyLines {
     /// Puts an instance in line.
     #[inline]
     pub(super) fn insert(&mut self, line: LineId, key: DispatchKey) {
+        match self.apart.is_empty() {
+            true => self.cluster.insert(key),
+            false => self.insert_in(line, key),
+        }
+    }
+
+    /// Not a part of its callers, as most sets have one line.
+    #[inline(never)]
+    fn insert_in(&mut self, line: LineId, key: DispatchKey) {
         self.latest = line;
-        // One insertion, which can be a part of its callers.
-        let queue = match line.is_cluster() {
-            true => &mut self.cluster,
-            false => {
+        match self.apart.get_mut(line.0 as usize) {
+            Some(apart) => {
                 self.count += 1;
-                &mut self.apart[line.0 as usize].ready
+                apart.ready.insert(key);
             }
-        };
-        queue.insert(key);
+            None => self.cluster.insert(key),
+        }
     }
 
     /// Takes an instance out, which waits.
@@ -250,34 +256,25 @@ impl ReadyLines {
         })
     }
 
-    /// Reports whether an instance, the only one that has become ready and of the line that is asked
-    /// for, comes next on a core that has finished its own, and concerns no other one.
+    /// Reports whether the cluster's line is the only one, and empty: then the one instance that has
+    /// become ready comes next on a core that has finished its own.
     #[inline]
-    pub(super) fn is_next(&self, line: impl FnOnce() -> LineId, core: CoreId) -> bool {
-        // Most sets have no other lines, so a hop asks for none.
-        match self.apart.is_empty() {
-            true => self.is_empty(),
-            false => self.is_next_apart(line(), core),
-        }
-    }
-
-    #[inline]
-    fn is_next_apart(&self, line: LineId, core: CoreId) -> bool {
-        let is_first_in_line = match line.is_cluster() {
-            true => self.is_empty(),
-            false => self.is_for(line, core) && self.peek_in(line).is_none(),
-        };
-        is_first_in_line && self.peek_own(core).is_none()
+    pub(super) fn is_one_empty_line(&self) -> bool {
+        self.is_empty() && self.apart.is_empty()
     }
 
     /// Reports whether the instance that has come in line last, the only new one, may concern
     /// another core than this one, which has finished its own.
     #[inline]
     pub(super) fn latest_concerns_others(&self, core: CoreId) -> bool {
+        !self.apart.is_empty() && self.latest_apart_concerns_others(core)
+    }
+
+    #[inline(never)]
+    fn latest_apart_concerns_others(&self, core: CoreId) -> bool {
         let line = self.latest;
-        let is_elsewhere = || !line.is_cluster() && !self.is_for(line, core);
-        let is_behind_own = || line.core().is_none() && self.peek_own(core).is_some();
-        !self.apart.is_empty() && (is_elsewhere() || is_behind_own())
+        let is_elsewhere = !line.is_cluster() && !self.is_for(line, core);
+        is_elsewhere || line.core().is_none() && self.peek_own(core).is_some()
     }
 }
 

@@ -1,23 +1,21 @@
 //! The instances that wait for a core, in the order of their keys (R5).
 //!
-//! # The front
-//!
-//! Often an instance that has just become ready is the only one in line and starts
-//! at once, on the core that its predecessor has left. So the queue keeps one
-//! instance, the *front*, outside of its ordered rest: such an instance passes
-//! through without being sorted in. The front, if there is one, has the
-//! smallest key of all.
-//!
-//! # The rest
+//! # Ranks, or a heap
 //!
 //! If the policy adds no release, the order of all instances that can ever wait together
-//! is mostly known at commit: then each subtask has a *rank*, and the rest is a
+//! is mostly known at commit: then each subtask has a *rank*, and the queue is a
 //! set of bits, which costs the same however many wait; up to 64 subtasks are bits of
 //! one word, which is at hand without any call. That holds unless two
 //! subtasks of one DAG share a number and jobs of that DAG overlap, because
-//! then the job comes before the subtask. In that case the rest is a heap. If the policy
+//! then the job comes before the subtask. In that case the queue is a heap. If the policy
 //! adds the release it is a heap of jobs or, where subtasks of one DAG have different numbers, of
 //! instances.
+//!
+//! # Alone
+//!
+//! Often a released instance is the only one in line and starts at once. So an instance that comes
+//! into an empty queue is kept outside of the order: it passes through without being sorted in, and
+//! joins the others when a second one comes.
 //!
 //! # The heap of items that are known by index
 //!
@@ -50,33 +48,31 @@ use crate::task_set::{Dag, TaskSet};
 /// The instances in line. At most one of a vertex waits at a time.
 #[derive(Clone, Debug, Hash)]
 pub(super) struct ReadyQueue {
-    /// The smallest key, or none.
-    front: DispatchKey,
-    /// How many are in the rest.
-    others: u32,
+    /// How many are in line.
+    count: u32,
+    /// The key of the only one, if it came into an empty queue, or none.
+    alone: DispatchKey,
     order: KeyOrder,
     /// Under `Sum` the policy's number of each vertex, else nothing.
     numbers_ns: Box<[u64]>,
-    rest: QueueStorage,
+    line: OrderedLine,
 }
 
 /// `repr(u8)`, so that testing for the first variant takes one comparison.
 #[derive(Clone, Debug, Hash)]
 #[repr(u8)]
-enum QueueStorage {
+enum OrderedLine {
     /// For keys that are ranks up to 63.
     Word {
         ranks: u64,
-        /// The vertex of each rank. Keys are made of both, not loaded: loaded by
-        /// halves or as one, the front would have to be loaded the same way, and a
-        /// processor cannot load as one what it has just stored by halves.
+        /// The vertex of each rank.
         vertices: Box<[u32]>,
     },
     /// For keys that are ranks.
     Ranked {
         ranks: BitSet,
-        /// The key of each rank.
-        keys: Box<[DispatchKey]>,
+        /// The vertex of each rank.
+        vertices: Box<[u32]>,
     },
     /// For keys that begin with what all of a job have.
     OfJobs(JobHeap),
@@ -88,17 +84,14 @@ impl ReadyQueue {
     /// Makes the queue for a set and a policy; gives vertices their ranks.
     #[inline]
     pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut VertexTable) -> Self {
-        let in_any_order = |count| QueueStorage::Keyed(IndexedHeap::new(count));
         let numbers = task_set.dags().iter().map(|dag| policy.numbers(dag));
         let numbers: Vec<Vec<u64>> = numbers.collect();
         let mut dags = task_set.dags().iter().zip(&numbers);
         let of_vertices = numbers.concat();
         if policy.adds_release() {
             if dags.all(|(_, numbers)| numbers.iter().all(|number| *number == numbers[0])) {
-                return Self::of(
-                    KeyOrder::Release,
-                    QueueStorage::OfJobs(JobHeap::new(task_set)),
-                );
+                let jobs = JobHeap::new(task_set);
+                return Self::of(KeyOrder::Release, OrderedLine::OfJobs(jobs));
             }
             // Of two jobs of a DAG with the same sum the older one has the larger number.
             let of_dag = |dag: DagId, number: u64| u128::from(dag.0) << 64 | u128::from(!number);
@@ -107,7 +100,7 @@ impl ReadyQueue {
             rank(&keys.collect::<Vec<_>>(), vertices, KeyOrder::Sum);
             return Self {
                 numbers_ns: of_vertices.into(),
-                ..Self::of(KeyOrder::Sum, in_any_order(vertices.len()))
+                ..Self::of(KeyOrder::Sum, keyed(vertices.len()))
             };
         }
         let keys: Vec<u128> = of_vertices.into_iter().map(u128::from).collect();
@@ -118,22 +111,22 @@ impl ReadyQueue {
         }
         // The rank stands for (number, DAG), so that the job's number can follow it in the key.
         rank(&keys, vertices, KeyOrder::Job);
-        Self::of(KeyOrder::Job, in_any_order(vertices.len()))
+        Self::of(KeyOrder::Job, keyed(vertices.len()))
     }
 
     /// Makes a queue that nothing comes into.
     pub(super) fn without_room() -> Self {
-        Self::of(KeyOrder::Job, QueueStorage::Keyed(IndexedHeap::new(0)))
+        Self::of(KeyOrder::Job, keyed(0))
     }
 
     #[inline]
-    fn of(order: KeyOrder, rest: QueueStorage) -> Self {
+    fn of(order: KeyOrder, line: OrderedLine) -> Self {
         Self {
-            front: DispatchKey::NONE,
-            others: 0,
+            count: 0,
+            alone: DispatchKey::NONE,
             order,
             numbers_ns: Box::default(),
-            rest,
+            line,
         }
     }
 
@@ -171,90 +164,74 @@ impl ReadyQueue {
     /// Reports whether none waits.
     #[inline]
     pub(super) const fn is_empty(&self) -> bool {
-        self.front.is_none() && self.others == 0
+        self.count == 0
     }
 
     /// Returns the smallest key.
     #[inline(always)]
     pub(super) fn peek(&self) -> Option<DispatchKey> {
-        if !self.front.is_none() {
-            return Some(self.front);
+        if !self.alone.is_none() {
+            return Some(self.alone);
         }
-        if self.others == 0 {
-            return None;
-        }
-        self.rest.peek()
+        (!self.is_empty()).then(|| self.line.peek())
     }
 
     /// Puts an instance in line.
-    #[inline]
+    #[inline(always)]
     pub(super) fn insert(&mut self, key: DispatchKey) {
-        // Only an empty queue fills the front: with others in line it would have to be compared
-        // with them.
-        if self.is_empty() {
-            self.front = key;
-        } else {
-            self.insert_among_others(key);
+        self.count += 1;
+        if self.count == 1 {
+            self.alone = key;
+            return;
         }
-    }
-
-    /// Compares with the front only: comparing with the rest costs as much as inserting.
-    #[inline]
-    fn insert_among_others(&mut self, key: DispatchKey) {
-        // Without a front the new one goes to the rest, though it may be the smallest: `pop` asks
-        // the rest then.
-        let precedes_front = !self.front.is_none() && key < self.front;
-        let behind = match precedes_front {
-            true => core::mem::replace(&mut self.front, key),
-            false => key,
-        };
-        self.others += 1;
-        self.rest.insert(behind);
+        if !self.alone.is_none() {
+            let first = core::mem::replace(&mut self.alone, DispatchKey::NONE);
+            self.line.insert(first);
+        }
+        self.line.insert(key);
     }
 
     /// Takes the instance with the smallest key out.
-    #[inline]
+    #[inline(always)]
     pub(super) fn pop(&mut self) -> Option<DispatchKey> {
-        if !self.front.is_none() {
-            return Some(core::mem::replace(&mut self.front, DispatchKey::NONE));
-        }
-        if self.others == 0 {
+        if self.is_empty() {
             return None;
         }
-        self.others -= 1;
-        Some(self.rest.pop())
+        self.count -= 1;
+        match self.alone.is_none() {
+            true => Some(self.line.pop()),
+            false => Some(core::mem::replace(&mut self.alone, DispatchKey::NONE)),
+        }
     }
 
     /// Takes an instance out, which waits.
     #[inline]
     pub(super) fn remove(&mut self, key: DispatchKey) {
-        // Keys are unique, so equality finds the instance.
-        if self.front == key {
-            self.front = DispatchKey::NONE;
-            return;
+        self.count -= 1;
+        match self.alone.is_none() {
+            true => self.line.remove(key),
+            false => self.alone = DispatchKey::NONE,
         }
-        self.others -= 1;
-        self.rest.remove(key);
     }
 }
 
-impl QueueStorage {
+impl OrderedLine {
+    /// Returns the smallest key, of which there is one.
+    #[cold]
     #[inline]
-    fn peek(&self) -> Option<DispatchKey> {
-        match self {
+    fn peek(&self) -> DispatchKey {
+        let first = match self {
             Self::Word { ranks, vertices } => {
-                let rank = ranks.trailing_zeros();
-                // An empty word has 64 zeros, and no rank is 64.
-                let vertex = vertices.get(rank as usize)?;
-                Some(DispatchKey::of_rank(rank, *vertex))
+                return of_rank(ranks.trailing_zeros() as usize, vertices);
             }
-            Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
+            Self::Ranked { ranks, vertices } => return of_rank(ranks.first(), vertices),
             Self::OfJobs(jobs) => jobs.peek(),
             Self::Keyed(heap) => heap.peek().map(|(key, _)| key),
-        }
+        };
+        first.expect("as many are in line as were counted")
     }
 
-    #[inline]
+    #[inline(always)]
     fn insert(&mut self, key: DispatchKey) {
         match self {
             Self::Word { ranks, .. } => *ranks |= 1 << key.rank(),
@@ -267,25 +244,23 @@ impl QueueStorage {
     #[inline]
     fn insert_beyond_a_word(&mut self, key: DispatchKey) {
         match self {
-            Self::Word { .. } => {}
             Self::Ranked { ranks, .. } => ranks.insert(key.rank()),
+            _ => self.insert_in_heap(key),
+        }
+    }
+
+    #[cold]
+    #[inline]
+    fn insert_in_heap(&mut self, key: DispatchKey) {
+        match self {
+            Self::Word { .. } | Self::Ranked { .. } => {}
             Self::OfJobs(jobs) => jobs.insert(key),
             Self::Keyed(heap) => heap.set(key.vertex() as usize, key),
         }
     }
 
-    #[inline]
-    fn remove(&mut self, key: DispatchKey) {
-        match self {
-            Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
-            Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
-            Self::OfJobs(jobs) => jobs.remove(key),
-            Self::Keyed(heap) => heap.remove(key.vertex() as usize),
-        }
-    }
-
     /// Takes the instance with the smallest key out, of which there is one.
-    #[inline]
+    #[inline(always)]
     fn pop(&mut self) -> DispatchKey {
         match self {
             Self::Word { ranks, vertices } => {
@@ -301,33 +276,57 @@ impl QueueStorage {
     #[cold]
     #[inline]
     fn pop_beyond_a_word(&mut self) -> DispatchKey {
+        match self {
+            Self::Ranked { ranks, vertices } => of_rank(ranks.pop(), vertices),
+            _ => self.pop_from_heap(),
+        }
+    }
+
+    #[cold]
+    #[inline]
+    fn pop_from_heap(&mut self) -> DispatchKey {
         let first = match self {
-            Self::Word { .. } => None,
-            Self::Ranked { ranks, keys } => ranks.pop().map(|rank| keys[rank]),
+            Self::Word { .. } | Self::Ranked { .. } => None,
             Self::OfJobs(jobs) => jobs.pop(),
             Self::Keyed(heap) => heap.pop().map(|(key, _)| key),
         };
         first.expect("as many are in line as were counted")
     }
+
+    #[inline]
+    fn remove(&mut self, key: DispatchKey) {
+        match self {
+            Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
+            Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
+            Self::OfJobs(jobs) => jobs.remove(key),
+            Self::Keyed(heap) => heap.remove(key.vertex() as usize),
+        }
+    }
 }
 
-/// Makes the rest for vertices in the order of their ranks.
+/// Returns the key of a rank.
 #[inline]
-fn ranked(order: &[u32]) -> QueueStorage {
-    let keys = (0u32..).zip(order);
+fn of_rank(rank: usize, vertices: &[u32]) -> DispatchKey {
+    DispatchKey::of_rank(to_u32(rank), vertices[rank])
+}
+
+/// Makes the line of vertices in the order of their ranks.
+#[inline]
+fn ranked(order: &[u32]) -> OrderedLine {
+    let vertices = order.into();
     match order.len() {
         // Ranks 0 to 63 are the bits of one word.
-        0..=64 => QueueStorage::Word {
-            ranks: 0,
-            vertices: order.into(),
-        },
-        count => QueueStorage::Ranked {
+        0..=64 => OrderedLine::Word { ranks: 0, vertices },
+        count => OrderedLine::Ranked {
             ranks: BitSet::new(count),
-            keys: keys
-                .map(|(rank, &vertex)| DispatchKey::of_rank(rank, vertex))
-                .collect(),
+            vertices,
         },
     }
+}
+
+/// Makes a line for so many vertices with any keys.
+fn keyed(vertices: usize) -> OrderedLine {
+    OrderedLine::Keyed(IndexedHeap::new(vertices))
 }
 
 /// Reports whether the subtasks of a DAG, as far as they wait together, are in
@@ -570,7 +569,7 @@ impl JobHeap {
     pub(super) fn peek(&self) -> Option<DispatchKey> {
         let (job, slot) = self.jobs.peek()?;
         let line = &self.lines[slot];
-        let vertex = line.first + to_u32(line.subtasks.first()?);
+        let vertex = line.first + to_u32(line.subtasks.first());
         Some(DispatchKey::of_job(job, vertex))
     }
 
@@ -579,7 +578,7 @@ impl JobHeap {
     pub(super) fn pop(&mut self) -> Option<DispatchKey> {
         let (job, slot) = self.jobs.peek()?;
         let line = &mut self.lines[slot];
-        let vertex = line.first + to_u32(line.subtasks.pop()?);
+        let vertex = line.first + to_u32(line.subtasks.pop());
         // With its last ready instance the job leaves the heap: `peek` relies on no line being
         // empty.
         if line.subtasks.is_empty() {
@@ -610,8 +609,7 @@ mod tests {
     /// One of each kind that needs no task set, with room for so many.
     fn queues() -> [(ReadyQueue, u32); 4] {
         let ranked = |count| (ReadyQueue::of(KeyOrder::Rank, ranked(&order(count))), count);
-        let keyed = QueueStorage::Keyed(IndexedHeap::new(100));
-        let keyed = (ReadyQueue::of(KeyOrder::Job, keyed), 100);
+        let keyed = (ReadyQueue::of(KeyOrder::Job, keyed(100)), 100);
         [ranked(63), ranked(64), ranked(100), keyed]
     }
 

@@ -110,6 +110,21 @@ pub(super) struct Vertex {
     successors: [u32; 2],
 }
 
+/// The successors that an end in a job is still to be told to.
+#[derive(Clone, Debug)]
+pub(super) struct Successors {
+    job: u64,
+    next: u32,
+    end: u32,
+}
+
+impl Successors {
+    #[inline]
+    pub(super) const fn is_empty(&self) -> bool {
+        self.next >= self.end
+    }
+}
+
 const _: () = assert!(size_of::<Vertex>() == 64, "one cache line");
 
 /// All subtasks.
@@ -213,42 +228,35 @@ impl VertexTable {
     }
 
     /// Ends the instance of a vertex that [only passes on](Vertex::only_passes_on), and tells its
-    /// successors. Returns how many of them are ready by that, and one of these.
+    /// successors up to the first that is ready by that. The others are still to be told.
     #[inline(always)]
-    pub(super) fn pass_on(&mut self, vertex: u32) -> (u32, u32) {
+    pub(super) fn pass_on(&mut self, vertex: u32) -> (Option<u32>, Successors) {
         let own = &mut self.vertices[vertex as usize];
-        let (job, [mut place, end]) = (own.job, own.successors);
+        let (job, [next, end]) = (own.job, own.successors);
         own.phase = InstancePhase::Absent;
         own.progress += 1;
         own.counter = own.initial;
-        let (mut count, mut last) = (0, vertex);
-        // It has some, so the end need not be looked at before the first.
-        loop {
-            let number = self.successors[place as usize];
+        let mut successors = Successors { job, next, end };
+        (self.next_ready(&mut successors), successors)
+    }
+
+    /// Tells successors, of one slot each, up to the first that is ready by that.
+    #[inline(always)]
+    pub(super) fn next_ready(&mut self, successors: &mut Successors) -> Option<u32> {
+        while successors.next < successors.end {
+            let number = self.successors[successors.next as usize];
+            successors.next += 1;
             let next = &mut self.vertices[number as usize];
             // The successor's progress need not be asked: with one slot no older job is in flight
             // that it could still have to do.
             next.counter -= 1;
             if next.counter == 0 {
                 // The vertex now does this job; its key is made of it.
-                next.job = job;
-                count += 1;
-                last = number;
-            }
-            place += 1;
-            if place >= end {
-                return (count, last);
+                next.job = successors.job;
+                return Some(number);
             }
         }
-    }
-
-    /// Returns the vertex that is the successor at a place, if it waits for nothing
-    /// else. All have one slot.
-    #[inline]
-    pub(super) fn ready_successor(&mut self, place: usize) -> Option<(u32, &mut Vertex)> {
-        let number = self.successors[place];
-        let vertex = &mut self.vertices[number as usize];
-        (vertex.counter == 0).then_some((number, vertex))
+        None
     }
 
     /// Returns where the successors of a vertex stand, for [`successor`](Self::successor).

@@ -168,11 +168,11 @@ impl Scheduler {
             self.log.of_instance(EventKind::Wake, instance);
             self.ready.insert(waiting.line, key);
         }
-        let done = self.give_first(core);
-        if done == HandOff::Idle {
+        let Some(first) = self.give_first(core) else {
             self.cores.free(core);
-        }
-        Some(done)
+            return Some(HandOff::Idle);
+        };
+        Some(self.hand_off(core, first))
     }
 
     /// Reports whether subtasks state waits, as those of most sets do not.

@@ -22,7 +22,7 @@ use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
     Activation, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, FaultLimit, HandOff,
     Instance, JobOutcome, OnFault, OverrunPolicy, Policy, Preemption, Priority, Scheduler,
-    SchedulerOptions, SubtaskId, SubtaskSpec, TaskSet, Vertex, verify,
+    SchedulerOptions, SubtaskId, SubtaskSpec, TaskSet, Unwritten, Vertex, verify,
 };
 pub(crate) use script::{Run, Script};
 
@@ -167,13 +167,15 @@ pub(crate) fn pass_on(
     vertex: Vertex,
 ) -> HandOff {
     let finished = scheduler.instance_of(vertex);
-    let (done, is_unwritten) = scheduler.pass_on(now_ns, core, vertex);
-    if let HandOff::To(_, decision) = done
-        && is_unwritten
-    {
+    let (done, unwritten) = scheduler.pass_on(now_ns, core, vertex);
+    if let HandOff::To(_, decision) = done {
         let log = &mut scheduler.log;
-        log.on_core(core, EventKind::Finish, now_ns, finished);
-        log.on_core(core, EventKind::Ready, log.now_ns(), decision.instance);
+        if unwritten != Unwritten::Nothing {
+            log.on_core(core, EventKind::Finish, now_ns, finished);
+        }
+        if unwritten == Unwritten::FinishAndReady {
+            log.on_core(core, EventKind::Ready, log.now_ns(), decision.instance);
+        }
     }
     done
 }
