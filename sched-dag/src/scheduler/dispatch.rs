@@ -207,7 +207,10 @@ impl Scheduler {
             let (ready, others) = self.vertices.pass_on(vertex.0);
             match ready {
                 // The end made nothing ready, so only what was in line before can take the core.
-                None => unwritten = Unwritten::Finish,
+                None => {
+                    self.log.here = core;
+                    unwritten = Unwritten::Finish;
+                }
                 // The most frequent case of a chain: the successor never enters the queue, and one
                 // entry of the journal tells finish, ready and start.
                 Some(next) if others.is_empty() && self.ready.is_one_empty_line() => {
@@ -216,10 +219,7 @@ impl Scheduler {
                     return (done, Unwritten::FinishAndReady);
                 }
                 // Several, or others in line: only their keys tell which is first.
-                Some(next) => {
-                    self.write_finish(core, vertex, now_ns);
-                    self.line_up_all(next, others);
-                }
+                Some(next) => self.line_up_all((core, vertex, now_ns), next, others),
             }
         } else {
             self.write_finish(core, vertex, now_ns);
@@ -302,10 +302,18 @@ impl Scheduler {
         (self.cores).run(core, key, next.yields_to_the_unpinned());
     }
 
-    /// Puts an instance that has become ready in line, and all that are ready of the successors
-    /// which follow it.
+    /// Writes down that a core has finished the instance of a vertex, and puts an instance in line
+    /// that has become ready by that, and all that are ready of the successors which follow it.
     #[inline]
-    fn line_up_all(&mut self, mut next: u32, mut others: Successors) {
+    fn line_up_all(
+        &mut self,
+        (core, ended, finish_ns): (CoreId, Vertex, u64),
+        mut next: u32,
+        mut others: Successors,
+    ) {
+        let before = self.log.here;
+        let is_next = (self.ready).is_next(|| self.vertices.get(next).line, core);
+        self.write_finish(core, ended, finish_ns);
         let Self {
             vertices,
             dags,
@@ -321,8 +329,12 @@ impl Scheduler {
             self.fresh += 1;
             match vertices.next_ready(&mut others) {
                 Some(number) => next = number,
-                None => return,
+                None => break,
             }
+        }
+        // A sole one leaves no trace of the core, in line or not: so no record depends on the way.
+        if is_next && self.fresh == 1 {
+            self.log.here = before;
         }
     }
 

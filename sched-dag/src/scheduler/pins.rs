@@ -263,6 +263,25 @@ impl ReadyLines {
         self.is_empty() && self.apart.is_empty()
     }
 
+    /// Reports whether an instance, the only one that has become ready and of the line that is asked
+    /// for, comes next on a core that has finished its own, and concerns no other one.
+    #[inline]
+    pub(super) fn is_next(&self, line: impl FnOnce() -> LineId, core: CoreId) -> bool {
+        match self.apart.is_empty() {
+            true => self.is_empty(),
+            false => self.is_next_apart(line(), core),
+        }
+    }
+
+    #[inline(never)]
+    fn is_next_apart(&self, line: LineId, core: CoreId) -> bool {
+        let is_first_in_line = match line.is_cluster() {
+            true => self.is_empty(),
+            false => self.is_for(line, core) && self.peek_in(line).is_none(),
+        };
+        is_first_in_line && self.peek_own(core).is_none()
+    }
+
     /// Reports whether the instance that has come in line last, the only new one, may concern
     /// another core than this one, which has finished its own.
     #[inline]
