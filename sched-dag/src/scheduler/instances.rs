@@ -7,8 +7,9 @@
 
 use super::jobs::Job;
 use super::pins::ReadyLines;
+use super::timers::TimerKind;
 use super::vertices::{InstancePhase, Vertex, VertexTable};
-use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
+use super::{DagPhase, EventLog, OWED, Scheduler};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
 
@@ -244,14 +245,15 @@ impl Scheduler {
     #[inline]
     pub(super) fn set_timer(&mut self, dag: DagId) {
         let model = self.task_set.dag(dag);
-        match self.dags[dag.index()]
-            .jobs
-            .next_event_ns(model, self.log.now_ns)
-        {
-            Some(event_ns) => self.timers.set(dag.index(), event_ns),
-            None => self.timers.remove(dag.index()),
-        }
-        self.quiet_until_ns = earliest_ns(&self.timers);
+        let jobs = &self.dags[dag.index()].jobs;
+        self.set_timer_to(dag, jobs.next_event(model, self.log.now_ns));
+    }
+
+    /// Notes the next event of a DAG without a completion.
+    #[inline(always)]
+    pub(super) fn set_timer_to(&mut self, dag: DagId, event: Option<(u64, TimerKind)>) {
+        self.timers.set_dag(dag.index(), event);
+        self.quiet_until_ns = self.timers.earliest_ns();
     }
 }
 

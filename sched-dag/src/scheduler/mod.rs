@@ -48,6 +48,7 @@ mod phase;
 mod pins;
 mod ready_queue;
 mod signals;
+mod timers;
 mod vertices;
 mod waits;
 
@@ -64,7 +65,7 @@ use crate::scheduler::dispatch::CoreTable;
 use crate::scheduler::jobs::JobTable;
 use crate::scheduler::phase::SurvivedFaults;
 use crate::scheduler::pins::ReadyLines;
-use crate::scheduler::ready_queue::IndexedHeap;
+use crate::scheduler::timers::Timers;
 use crate::scheduler::vertices::VertexTable;
 use crate::scheduler::waits::WaitTable;
 use crate::task_set::{Dag, TaskSet};
@@ -95,7 +96,7 @@ pub struct Scheduler {
     cores: CoreTable,
     /// When something happens to each DAG without a completion, and behind the DAGs, when each
     /// wait ends at the latest, and when skips are told of.
-    timers: IndexedHeap<u64>,
+    timers: Timers,
     waits: WaitTable,
     /// The least of these times, at hand for each completion; `u64::MAX` also if there
     /// is none.
@@ -179,11 +180,9 @@ impl Scheduler {
             })
             .collect();
         let waits = WaitTable::new(&task_set);
-        let mut timers = IndexedHeap::new(dags.len() + waits.len() + 1);
+        let mut timers = Timers::new(&task_set, cluster, waits.len() + 1);
         for (index, (dag, state)) in dags.iter().zip(&states).enumerate() {
-            if let Some(event_ns) = state.jobs.next_event_ns(dag, 0) {
-                timers.set(index, event_ns);
-            }
+            timers.set_dag(index, state.jobs.next_event(dag, 0));
         }
         let mut vertices = VertexTable::new(&task_set, options.preemption);
         Self {
@@ -194,7 +193,7 @@ impl Scheduler {
             fresh: 0,
             vertices,
             cores: CoreTable::new(options.cores),
-            quiet_until_ns: earliest_ns(&timers),
+            quiet_until_ns: timers.earliest_ns(),
             timers,
             waits,
             told: (0, 0),
@@ -261,7 +260,7 @@ impl Scheduler {
     pub fn is_finished(&self) -> bool {
         let dags = self.task_set.dags().iter().zip(&self.dags);
         let are_over = (dags.into_iter()).all(|(dag, state)| state.jobs.are_over(dag));
-        are_over && self.timers.key_of(self.skips_timer()).is_none()
+        are_over && self.timers.time_of(self.skips_timer()).is_none()
     }
 
     /// Reports whether nothing of a DAG is left to be done: no job is in flight,
@@ -376,12 +375,6 @@ impl Hash for Scheduler {
         )
             .hash(state);
     }
-}
-
-/// Returns the least time, `u64::MAX` if there is none.
-#[inline]
-fn earliest_ns(timers: &IndexedHeap<u64>) -> u64 {
-    timers.peek().map_or(u64::MAX, |(event_ns, _)| event_ns)
 }
 
 /// Counts over the jobs of one DAG since the scheduler was made.

@@ -41,6 +41,7 @@
 //! has started and not finished, then at once.
 
 use super::Scheduler;
+use super::jobs::Job;
 use crate::ids::DagId;
 use crate::journal::EventKind;
 use crate::policy::{JobOutcome, OverrunPolicy};
@@ -56,12 +57,18 @@ impl Scheduler {
                 false => self.tell_skips(),
             };
         }
-        // Mostly what is due is a release, and the job before it has ended.
-        if !self.dags[dag.index()].jobs.are_at_rest() {
-            // Deadlines before releases: a late job may be the one that blocks the next.
-            self.judge(dag, None);
-            self.release_waiting(dag);
+        // Mostly what is due is one release, and the job before has ended.
+        let (model, state) = (self.task_set.dag(dag), &mut self.dags[dag.index()]);
+        let now_ns = self.log.now_ns;
+        if let Some((sequence, event)) = (state.jobs).release_alone(model, state.resumed_ns, now_ns)
+        {
+            self.begin_job(dag, sequence);
+            self.set_timer_to(dag, Some(event));
+            return;
         }
+        // Deadlines before releases: a late job may be the one that blocks the next.
+        self.judge(dag, None);
+        self.release_waiting(dag);
         while let Some((job, release_ns)) = self.take_due(dag) {
             self.release_or_overrun(dag, job, release_ns);
             let jobs = &mut self.dags[dag.index()].jobs;
@@ -122,20 +129,27 @@ impl Scheduler {
     /// Releases waiting jobs as long as none is blocked.
     #[inline]
     fn release_waiting(&mut self, dag: DagId) {
-        while let Some(job) = self.dags[dag.index()].jobs.releasable() {
+        while self.dags[dag.index()].jobs.are_releasable() {
             let model = self.task_set.dag(dag);
-            let is_sporadic = model.is_sporadic();
-            let state = &mut self.dags[dag.index()];
-            let sequence = state.jobs.release_waiting(model);
-            state.statistics.released += 1;
-            let release_ns = state.jobs.job(sequence).release_ns;
-            // The grid does not tell a judge when a sporadic job was due; this event does.
-            if is_sporadic {
-                self.log.due(dag, job, release_ns);
-            }
-            (self.log).of_job(EventKind::Released, dag, job, Some(release_ns));
-            self.release_sources(dag, sequence);
+            let sequence = self.dags[dag.index()].jobs.release_waiting(model);
+            self.begin_job(dag, sequence);
         }
+    }
+
+    /// Tells of a job that is released, and releases its sources.
+    #[inline]
+    fn begin_job(&mut self, dag: DagId, sequence: u64) {
+        let state = &mut self.dags[dag.index()];
+        state.statistics.released += 1;
+        let &Job {
+            number, release_ns, ..
+        } = state.jobs.job(sequence);
+        // The grid does not tell a judge when a sporadic job was due; this event does.
+        if self.task_set.dag(dag).is_sporadic() {
+            self.log.due(dag, number, release_ns);
+        }
+        (self.log).of_job(EventKind::Released, dag, number, Some(release_ns));
+        self.release_sources(dag, sequence);
     }
 
     #[inline]

@@ -111,7 +111,7 @@
 use alloc::boxed::Box;
 use alloc::vec;
 
-use super::{DagStatistics, Scheduler, earliest_ns};
+use super::{DagStatistics, Scheduler};
 use crate::ids::{DagId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{JobOutcome, OnFault};
@@ -354,7 +354,7 @@ impl Scheduler {
                 .timers
                 .set(timer, now_ns.saturating_add(SKIPS_EVERY_NS)),
         }
-        self.quiet_until_ns = earliest_ns(&self.timers);
+        self.quiet_until_ns = self.timers.earliest_ns();
     }
 
     /// Tells of the oldest skip of a DAG that is not told of; reports whether there is one.

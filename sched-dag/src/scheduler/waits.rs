@@ -25,7 +25,7 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::vertices::InstancePhase;
-use super::{Decision, HandOff, Scheduler, earliest_ns};
+use super::{Decision, HandOff, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, Vertex};
 use crate::journal::EventKind;
 use crate::request::WaitId;
@@ -236,7 +236,7 @@ impl Scheduler {
     /// Ends all waits whose limit has come, before a release of this instant cuts a job (W4).
     pub(super) fn time_out_due(&mut self) {
         for place in 0..self.waits.len() {
-            let limit_ns = self.timers.key_of(self.dags.len() + place);
+            let limit_ns = self.timers.time_of(self.dags.len() + place);
             if limit_ns.is_some_and(|limit_ns| limit_ns <= self.log.now_ns) {
                 self.end_wait(place, true);
             }
@@ -249,7 +249,7 @@ impl Scheduler {
         let number = self.waits.vertices[place];
         self.waits.latest[place].has_timed_out = has_timed_out;
         self.timers.remove(self.dags.len() + place);
-        self.quiet_until_ns = earliest_ns(&self.timers);
+        self.quiet_until_ns = self.timers.earliest_ns();
         let vertex = self.vertices.get_mut(number);
         // As one that was preempted, it has started and is in line for a core.
         vertex.phase = InstancePhase::Preempted;
@@ -277,7 +277,7 @@ impl Scheduler {
     fn cancel_wait(&mut self, number: u32) {
         let place = self.waits.place(number);
         self.timers.remove(self.dags.len() + place);
-        self.quiet_until_ns = earliest_ns(&self.timers);
+        self.quiet_until_ns = self.timers.earliest_ns();
         let vertex = self.vertices.get_mut(number);
         vertex.phase = InstancePhase::Absent;
         let instance = vertex.present_instance();

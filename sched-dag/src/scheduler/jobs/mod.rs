@@ -25,6 +25,7 @@ use alloc::boxed::Box;
 use core::ops::Range;
 
 use super::phase::DagPhase;
+use super::timers::TimerKind;
 use crate::ids::to_u32;
 use crate::policies::Policy;
 use crate::policy::JobOutcome;
@@ -199,19 +200,14 @@ impl JobTable {
         self.oldest == self.next && self.first_waiting == self.next_due
     }
 
-    /// Returns the first waiting job, if there is one and it is not blocked.
+    /// Reports whether a job waits, and the first of these is not blocked.
     #[inline]
-    pub(super) fn releasable(&self) -> Option<u64> {
+    pub(super) fn are_releasable(&self) -> bool {
         let number = self.first_waiting;
-        // Mostly none waits, so that is asked first.
-        if number == self.next_due {
-            return None;
-        }
-        let blocked =
-            // By numbers, not by how many are in flight: skipped jobs have used no slot, but their
-            // numbers count.
-            self.oldest < self.next && number - self.job(self.oldest).number >= self.limit;
-        (!blocked).then_some(number)
+        // By numbers, not by how many are in flight: skipped jobs have used no slot, but their
+        // numbers count. Mostly none waits, so that is asked first.
+        number < self.next_due
+            && (self.oldest == self.next || number - self.job(self.oldest).number < self.limit)
     }
 
     /// Lets the next job that is due at `now_ns` wait, and returns it with its
@@ -236,19 +232,52 @@ impl JobTable {
         self.announced = self.next_due;
     }
 
+    /// Releases the next job, due between `resumed_ns` and `now_ns`, if nothing else is to be done:
+    /// no job is in flight, waits or is due next, and no deadline has passed. Returns the job's
+    /// sequence number and the next event.
+    #[inline]
+    pub(super) fn release_alone(
+        &mut self,
+        dag: &Dag,
+        resumed_ns: u64,
+        now_ns: u64,
+    ) -> Option<(u64, (u64, TimerKind))> {
+        let release_ns = self.next_due_ns?;
+        let is_due = resumed_ns <= release_ns && release_ns <= now_ns;
+        let late_ns = self.first_deadline_ns(release_ns) + 1;
+        let next_due_ns = due_ns(dag, self.next_due + 1);
+        let kind = release_kind(self.next_due + 1);
+        let event = sooner(next_due_ns.map(|due_ns| (due_ns, kind)), late_ns);
+        let is_alone = is_due && self.phase == DagPhase::Running && self.are_at_rest();
+        if !is_alone || event.0 <= now_ns {
+            return None;
+        }
+        (self.last_due_ns, self.next_due_ns) = (release_ns, next_due_ns);
+        let number = self.next_due;
+        self.next_due += 1;
+        (self.first_waiting, self.announced) = (self.next_due, self.next_due);
+        Some((self.put_in_flight(number, release_ns, false), event))
+    }
+
     /// Releases the first waiting job and returns its sequence number.
     #[inline]
     pub(super) fn release_waiting(&mut self, dag: &Dag) -> u64 {
-        let sequence = self.next;
         let number = self.first_waiting;
         let release_ns = self.waiting_release_ns(dag, number);
         self.first_waiting += 1;
-        self.next += 1;
         // A job that waited beyond its deadline is a miss already, and must not be counted twice.
         let missed = self.deadlines[0].has_judged_waiting(number);
         for deadline in &mut self.deadlines {
-            deadline.release(number, sequence);
+            deadline.release(number, self.next);
         }
+        self.put_in_flight(number, release_ns, missed)
+    }
+
+    /// Takes a job into flight, and returns the sequence number.
+    #[inline]
+    fn put_in_flight(&mut self, number: u64, release_ns: u64, missed: bool) -> u64 {
+        let sequence = self.next;
+        self.next += 1;
         // The job is complete when as many sinks have ended (R4).
         let (unfinished, number_ns) = (self.ends, self.number_ns);
         let job = self.job_mut(sequence);
@@ -350,16 +379,38 @@ impl JobTable {
     /// release becomes due, or a deadline has passed. A release that no longer
     /// is blocked is due at `now_ns`.
     #[inline]
-    pub(super) fn next_event_ns(&self, dag: &Dag, now_ns: u64) -> Option<u64> {
+    pub(super) fn next_event(&self, dag: &Dag, now_ns: u64) -> Option<(u64, TimerKind)> {
+        let release = self
+            .next_due_ns
+            .map(|due_ns| (due_ns, release_kind(self.next_due)));
+        // Mostly a job has just ended, and it was the only one.
+        if self.are_at_rest() {
+            return release;
+        }
         // Not at its nominal time, which is past: it was blocked then.
-        if self.releasable().is_some() {
-            return Some(now_ns);
+        if self.are_releasable() {
+            return Some((now_ns, TimerKind::Other));
         }
-        let late_ns = self.late_ns(dag);
-        match (self.next_due_ns, late_ns) {
-            (Some(due_ns), Some(late_ns)) => Some(due_ns.min(late_ns)),
-            (due_ns, late_ns) => due_ns.or(late_ns),
+        match self.late_ns(dag) {
+            Some(late_ns) => Some(sooner(release, late_ns)),
+            None => release,
         }
+    }
+}
+
+/// Returns the next one of a release and the instant after a deadline.
+#[inline]
+fn sooner(release: Option<(u64, TimerKind)>, late_ns: u64) -> (u64, TimerKind) {
+    let release = release.filter(|&(due_ns, _)| due_ns <= late_ns);
+    release.unwrap_or((late_ns, TimerKind::Deadline))
+}
+
+/// Returns the kind of a job's release.
+#[inline]
+fn release_kind(number: u64) -> TimerKind {
+    match number % 2 {
+        0 => TimerKind::EvenRelease,
+        _ => TimerKind::OddRelease,
     }
 }
 

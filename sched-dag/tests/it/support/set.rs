@@ -67,8 +67,30 @@ pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
     set
 }
 
-/// Draws a set with sporadic DAGs, too, and every other one with waits, or pins, or both.
+/// Draws a set most of whose DAGs are of one release class.
+fn draw_in_phase(random: &mut Random) -> Set {
+    let limits = Limits {
+        subtasks: 2,
+        jobs: 3,
+        ..USUAL
+    };
+    let mut set = draw_within(random, &limits, Overruns::Often);
+    let (period_ns, offset_ns) = (set.specs[0].period_ns, set.specs[0].offset_ns);
+    let draw = |_| DagSpec {
+        period_ns,
+        offset_ns,
+        ..draw_dag(random, &limits, Overruns::Often)
+    };
+    set.specs.extend((0..16).map(draw));
+    set
+}
+
+/// Draws a set with sporadic DAGs, too, and every other one with waits, or pins, or both; some are
+/// of many DAGs in phase.
 pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
+    if random.chance(4) {
+        return draw_in_phase(random);
+    }
     let overruns = match random.chance(40) {
         true => Overruns::Never,
         false => Overruns::Often,
