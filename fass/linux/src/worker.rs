@@ -259,13 +259,15 @@ impl Worker {
     pub(crate) fn hold(&self, mut left_ns: u64) {
         self.holds.store(true, Ordering::SeqCst);
         while left_ns > 0 {
-            if self.mode.load(Ordering::SeqCst) == DEMOTED {
+            // Where nothing is ever demoted, nobody keeps a mode.
+            let mode = self.mode.load(Ordering::SeqCst);
+            if mode == DEMOTED {
                 sys::wait(&self.mode, DEMOTED, None);
                 continue;
             }
             let from_ns = clock::now_ns();
-            sys::wait(&self.mode, RUNS, Some(from_ns.saturating_add(left_ns)));
-            left_ns = left_ns.saturating_sub(clock::now_ns() - from_ns);
+            sys::wait(&self.mode, mode, Some(from_ns.saturating_add(left_ns)));
+            left_ns = left_ns.saturating_sub(clock::now_ns().saturating_sub(from_ns));
         }
         self.holds.store(false, Ordering::Relaxed);
     }
@@ -383,6 +385,14 @@ mod tests {
                 worker.promote(None);
             });
         }
+    }
+
+    /// Counted in processor time, which no other program adds to.
+    #[test]
+    fn one_that_holds_takes_no_processor_time_where_none_is_demoted() {
+        let (from_ns, hold_ns) = (sys::own_processor_time_ns(), 50_000_000);
+        Worker::default().hold(hold_ns);
+        assert!(sys::own_processor_time_ns() - from_ns < hold_ns / 10);
     }
 
     #[test]
