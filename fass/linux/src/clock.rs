@@ -99,15 +99,19 @@ pub(crate) fn now_ns() -> u64 {
     let (base, since) = BASES.latest();
     match since < FRESH {
         true => base.after(since),
-        false => renew(base),
+        false => renew(base, since),
     }
 }
 
 /// Asks the system's clock, and makes a base of that if it can.
 #[cold]
 #[inline(never)]
-fn renew(latest: Base) -> u64 {
+fn renew(latest: Base, since: u64) -> u64 {
     static RATES: Mutex<Rates> = Mutex::new(Rates::NONE);
+    // The counter was read ahead of the load that has found a base made just then.
+    if since > FRESH.wrapping_neg() && latest.rate > 0 {
+        return latest.ns;
+    }
     let ticks = counter();
     let system_ns = sys::monotonic_ns();
     let is_prompt = counter().wrapping_sub(ticks) < PROMPT;
@@ -263,6 +267,15 @@ mod tests {
                 });
             }
         });
+    }
+
+    #[test]
+    fn a_counter_that_was_read_before_the_base_is_not_taken_for_a_stale_base() {
+        let (ticks, ns) = (counter(), sys::monotonic_ns() + 1_000_000);
+        let rate = 1 << 32;
+        let base = Base { ticks, ns, rate };
+        assert_eq!(renew(base, 100_u64.wrapping_neg()), ns);
+        assert!(renew(base, 2 * FRESH) >= base.after(FRESH));
     }
 
     #[test]
