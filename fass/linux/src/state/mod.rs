@@ -383,6 +383,8 @@ impl State {
         let now_ns = self.now_ns();
         let (engine, mut port) = self.parts(workers);
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
+        // What the core has may have returned already, as this one may have lost the core.
+        self.resumed_ns[self.port.active[core.index()]] = self.engine.scheduler.now_ns();
         self.faults.push(Fault {
             instance,
             core,

@@ -107,16 +107,16 @@ impl Stage {
                 assert_eq!(next.is_err(), what == "end-in-vain", "{step}");
                 self.go_on(worker, next.ok().flatten());
             }
-            // Its worker reports that, behind another thread that has had the lock, for a signal.
-            "end-behind" => {
+            // Its worker reports that, behind another thread that has had the lock.
+            "end-behind-signal" | "end-behind-fault" => {
                 let (worker, runner) = self.running.remove(name).unwrap();
                 let finish_ns = clock::now_ns();
                 team.workers[worker].report(None);
-                let mut state = team.lock();
-                state.step(&team.workers, |moment| {
-                    moment.serve(Request::Signal(DagId(1)));
+                self.play(match what {
+                    "end-behind-signal" => "signal urgent",
+                    _ => "fail low",
                 });
-                let next = team.report(worker, state, runner, Ok(()), finish_ns);
+                let next = team.report(worker, team.lock(), runner, Ok(()), finish_ns);
                 self.go_on(worker, next);
             }
             // Its worker looks whether it reports what it has left, which it does with a core.
@@ -184,7 +184,7 @@ impl Stage {
 /// Cores; whether `urgent` keeps its core, or both; the steps; the story.
 type Case = (u32, &'static [bool], &'static str, &'static str);
 
-const CASES: [Case; 8] = [
+const CASES: [Case; 9] = [
     // One that has returned, and waits for the scheduler's lock, ends before the parked one.
     (
         1,
@@ -228,7 +228,7 @@ const CASES: [Case; 8] = [
     (
         2,
         &[false, true],
-        "begin low, end-behind low, end low",
+        "begin low, end-behind-signal low, end low",
         "start low 0, finish low 0, start low 1, finish low 1",
     ),
     // A parked one that fails takes no core from any.
@@ -236,6 +236,13 @@ const CASES: [Case; 8] = [
         1,
         &[false, true],
         "begin low, begin urgent, fail low, end urgent",
+        "start low 0, suspend low 0, start urgent 0, ended low 0, finish urgent 0",
+    ),
+    // Nor is that fault behind the end of what has returned before.
+    (
+        1,
+        &[false, true],
+        "begin low, begin urgent, end-behind-fault urgent",
         "start low 0, suspend low 0, start urgent 0, ended low 0, finish urgent 0",
     ),
     // What was left to one that is abandoned is reported.
