@@ -70,6 +70,8 @@ pub(crate) fn strand(cause: &str) -> bool {
     let own = OWN.with_borrow(Clone::clone);
     let instance = edge::running();
     own.zip(instance).is_some_and(|((team, me), instance)| {
+        // It takes the lock, so it may call nothing of the app's.
+        edge::note_running(None);
         team.strand(me, instance, cause);
         true
     })
@@ -715,6 +717,7 @@ impl Team {
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use std::thread;
     use std::time::Duration;
 
@@ -768,12 +771,15 @@ mod tests {
 
     #[test]
     fn who_takes_the_place_of_one_that_is_given_up_looks_out() {
+        static MAY_CALL: AtomicBool = AtomicBool::new(false);
         run(Duration::ZERO, || {
             assert!(strand("meant"));
+            MAY_CALL.fetch_or(may_call_app(), Ordering::Relaxed);
             loop {
                 thread::park();
             }
         });
+        assert!(!MAY_CALL.load(Ordering::Relaxed));
     }
 
     #[test]
