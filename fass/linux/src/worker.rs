@@ -350,9 +350,9 @@ mod tests {
                     }
                 }
             });
-            // A lost call makes itself felt by the time, far beyond any delay.
-            let end_ns = clock::now_ns() + 60_000_000_000;
             for round in 1..=rounds {
+                // A lost call makes itself felt by the time, far beyond any delay.
+                let end_ns = clock::now_ns() + 60_000_000_000;
                 worker.sit(Some(CoreId(0)));
                 if leaves {
                     worker.sit(None);
@@ -387,7 +387,7 @@ mod tests {
         }
     }
 
-    /// Counted in processor time, which no other program adds to.
+    /// Counted in processor time, so other programs add nothing.
     #[test]
     fn one_that_holds_takes_no_processor_time_where_none_is_demoted() {
         let (from_ns, hold_ns) = (sys::own_processor_time_ns(), 50_000_000);
