@@ -29,14 +29,11 @@ const FRESH: u64 = 1 << 18;
 /// How many ticks the call of the system's clock may take, for a base to be made of it.
 const PROMPT: u64 = 1 << 13;
 
-/// How far the rate is measured back, in ticks: once to twice that.
-const WINDOW: u64 = 1 << 31;
-
 /// From this much on, the system's clock has jumped, or the counter has.
 const JUMP_NS: u64 = 1_000_000;
 
 /// The counter and the time at an instant.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy)]
 struct Base {
     ticks: u64,
     ns: u64,
@@ -45,6 +42,12 @@ struct Base {
 }
 
 impl Base {
+    const NONE: Self = Self {
+        ticks: 0,
+        ns: 0,
+        rate: 0,
+    };
+
     /// Returns the time so many ticks later.
     const fn after(self, ticks: u64) -> u64 {
         self.ns + ((ticks * self.rate) >> 32)
@@ -107,7 +110,7 @@ pub(crate) fn now_ns() -> u64 {
 #[cold]
 #[inline(never)]
 fn renew(latest: Base, since: u64) -> u64 {
-    static RATES: Mutex<Rates> = Mutex::new(Rates::NONE);
+    static RATE: Mutex<Rate> = Mutex::new(Rate(Base::NONE));
     // The counter was read ahead of the load that has found a base made just then.
     if since > FRESH.wrapping_neg() && latest.rate > 0 {
         return latest.ns;
@@ -119,9 +122,9 @@ fn renew(latest: Base, since: u64) -> u64 {
     let ns = system_ns.max(latest.after(FRESH));
     if is_prompt
         && has_counter()
-        && let Ok(mut rates) = RATES.try_lock()
+        && let Ok(mut rate) = RATE.try_lock()
         && BASES.latest().0.ticks == latest.ticks
-        && let Some(rate) = rates.learn(ticks, system_ns)
+        && let Some(rate) = rate.learn(ticks, system_ns)
     {
         let slower = ((ns - system_ns).min(1 << 20) << 32) / FRESH;
         let rate = rate - slower.min(rate / 2);
@@ -130,57 +133,24 @@ fn renew(latest: Base, since: u64) -> u64 {
     ns
 }
 
-/// The instants between which the rate is measured.
-struct Rates {
-    older: Base,
-    newer: Base,
-}
+/// The rate of the counter, and the instant from which it is measured.
+struct Rate(Base);
 
-impl Rates {
-    const NONE: Self = Self {
-        older: Base {
-            ticks: 0,
-            ns: 0,
-            rate: 0,
-        },
-        newer: Base {
-            ticks: 0,
-            ns: 0,
-            rate: 0,
-        },
-    };
-
+impl Rate {
     /// Takes an instant, and returns the rate up to it; `None` at first, and where another thread
     /// has been here with a later instant.
     fn learn(&mut self, ticks: u64, ns: u64) -> Option<u64> {
-        let Self { older, newer } = *self;
-        let since_newer = ticks.checked_sub(newer.ticks)?;
-        let expected_ns =
-            (u128::from(ticks.wrapping_sub(older.ticks)) * u128::from(newer.rate)) >> 32;
-        let passed_ns = u128::from(ns.saturating_sub(older.ns));
+        let Self(from) = self;
+        let since = ticks.checked_sub(from.ticks)?;
+        let passed_ns = u128::from(ns.saturating_sub(from.ns));
+        let expected_ns = (u128::from(since) * u128::from(from.rate)) >> 32;
         let has_jumped = passed_ns.abs_diff(expected_ns) > u128::from(JUMP_NS);
-        let here = Base {
-            ticks,
-            ns,
-            rate: newer.rate,
-        };
-        if older.ticks == 0 || newer.rate > 0 && has_jumped {
-            *self = Self {
-                older: here,
-                newer: here,
-            };
-        } else if since_newer > WINDOW {
-            *self = Self {
-                older: newer,
-                newer: here,
-            };
+        if from.ticks == 0 || from.rate > 0 && has_jumped {
+            (from.ticks, from.ns) = (ticks, ns);
+        } else if since > 8 * FRESH {
+            from.rate = u64::try_from((passed_ns << 32) / u128::from(since)).unwrap_or(0);
         }
-        let since = ticks - self.older.ticks;
-        if since > 8 * FRESH {
-            let rate = (u128::from(ns.saturating_sub(self.older.ns)) << 32) / u128::from(since);
-            self.newer.rate = u64::try_from(rate).unwrap_or(0);
-        }
-        (self.newer.rate > 0).then_some(self.newer.rate)
+        (from.rate > 0).then_some(from.rate)
     }
 }
 
@@ -280,13 +250,13 @@ mod tests {
 
     #[test]
     fn a_jump_leaves_the_rate() {
-        let mut rates = Rates::NONE;
+        let mut rate = Rate(Base::NONE);
         let (tick, ns) = (9 * FRESH, 9 * FRESH / 2);
-        assert_eq!(rates.learn(tick, 0), None);
-        assert_eq!(rates.learn(tick - 1, 0), None, "another thread was quicker");
-        assert_eq!(rates.learn(2 * tick, ns), Some(1 << 31));
+        assert_eq!(rate.learn(tick, 0), None);
+        assert_eq!(rate.learn(tick - 1, 0), None, "another thread was quicker");
+        assert_eq!(rate.learn(2 * tick, ns), Some(1 << 31));
         let later_ns = 2 * ns + 2 * JUMP_NS;
-        assert_eq!(rates.learn(3 * tick, later_ns), Some(1 << 31));
-        assert_eq!(rates.learn(4 * tick, later_ns + ns), Some(1 << 31));
+        assert_eq!(rate.learn(3 * tick, later_ns), Some(1 << 31));
+        assert_eq!(rate.learn(4 * tick, later_ns + ns), Some(1 << 31));
     }
 }
