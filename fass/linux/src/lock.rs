@@ -1,4 +1,4 @@
-//! The lock around a cluster's state, and a place in which a thread leaves a value for another.
+//! The lock around a cluster's state.
 //!
 //! # The owner
 //!
@@ -10,7 +10,7 @@
 //! the owner looks after its barrier, sees that the lock is wanted, and takes the word, too.
 //!
 //! Where threads have levels there is no owner: a thread would wait for an owner from whom it has
-//! the processor.
+//! the processor. An owner that is lost to a panic only leaves the others the cost of the barrier.
 //!
 //! # Waiting
 //!
@@ -21,8 +21,7 @@
 
 use std::cell::UnsafeCell;
 use std::ops::{Deref, DerefMut};
-use std::ptr;
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering, compiler_fence};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
 use std::thread;
 use std::time::Duration;
 
@@ -50,8 +49,8 @@ pub(crate) struct Lock<T> {
     is_inside: AtomicBool,
     /// Whether the owner has to take the word. Written by the thread that has the word.
     is_wanted: AtomicBool,
-    /// Whether there is an owner. Written, and read by all but the owner, with the word.
-    is_owned: AtomicBool,
+    /// Whether there is an owner. If not, the lock is always wanted.
+    is_owned: bool,
     polls: bool,
     value: UnsafeCell<T>,
 }
@@ -64,18 +63,8 @@ unsafe impl<T: Send> Sync for Lock<T> {}
 /// The right to the value, until it is dropped.
 pub(crate) struct Guard<'l, T> {
     lock: &'l Lock<T>,
-    entered: Entry,
-}
-
-/// How a thread has entered.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Entry {
-    /// As the owner, without the word.
-    Inside,
-    /// As the owner, with the word.
-    InTurn,
-    /// As any other thread.
-    Other,
+    /// Whether the thread has the word. The owner may be inside without.
+    has_word: bool,
 }
 
 impl<T> Lock<T> {
@@ -86,7 +75,7 @@ impl<T> Lock<T> {
             word: AtomicU32::new(FREE),
             is_inside: AtomicBool::new(false),
             is_wanted: AtomicBool::new(!is_owned),
-            is_owned: AtomicBool::new(is_owned),
+            is_owned,
             polls,
             value: UnsafeCell::new(value),
         }
@@ -100,33 +89,26 @@ impl<T> Lock<T> {
         compiler_fence(Ordering::SeqCst);
         // Acquires what a thread that wanted the lock has written.
         if !self.is_wanted.load(Ordering::Acquire) {
-            let entered = Entry::Inside;
-            return Guard {
-                lock: self,
-                entered,
-            };
+            return self.guard(false);
         }
         self.is_inside.store(false, Ordering::Release);
         self.take_word();
-        let entered = Entry::InTurn;
-        Guard {
-            lock: self,
-            entered,
-        }
+        self.guard(true)
     }
 
     /// Waits for the value.
     #[inline]
     pub(crate) fn enter(&self) -> Guard<'_, T> {
         self.take_word();
-        if self.is_owned.load(Ordering::Relaxed) {
+        if self.is_owned {
             self.keep_owner_out();
         }
-        let entered = Entry::Other;
-        Guard {
-            lock: self,
-            entered,
-        }
+        self.guard(true)
+    }
+
+    const fn guard(&self, has_word: bool) -> Guard<'_, T> {
+        let lock = self;
+        Guard { lock, has_word }
     }
 
     /// Sees to it that the owner is not inside, nor will be. With the word.
@@ -186,26 +168,15 @@ impl<T> Lock<T> {
     }
 }
 
-impl<T> Guard<'_, T> {
-    /// Lets the lock have no owner any more, if another thread than the owner has it.
-    pub(crate) fn disown(&self) {
-        if self.entered == Entry::Other {
-            // It stays wanted, so that the owner takes the word from now on.
-            self.lock.is_owned.store(false, Ordering::Relaxed);
-        }
-    }
-}
-
 impl<T> Drop for Guard<'_, T> {
     #[inline]
     fn drop(&mut self) {
         let lock = self.lock;
-        match self.entered {
-            Entry::Inside => return lock.is_inside.store(false, Ordering::Release),
-            Entry::Other if lock.is_owned.load(Ordering::Relaxed) => {
-                lock.is_wanted.store(false, Ordering::Release);
-            }
-            _ => {}
+        if !self.has_word {
+            return lock.is_inside.store(false, Ordering::Release);
+        }
+        if lock.is_owned {
+            lock.is_wanted.store(false, Ordering::Release);
         }
         if lock.polls {
             lock.word.store(FREE, Ordering::Release);
@@ -233,55 +204,8 @@ impl<T> DerefMut for Guard<'_, T> {
     }
 }
 
-/// A place in which one thread leaves a value for another.
-#[derive(Debug)]
-pub(crate) struct Slot<T: Send>(AtomicPtr<T>);
-
-impl<T: Send> Default for Slot<T> {
-    fn default() -> Self {
-        Self(AtomicPtr::default())
-    }
-}
-
-impl<T: Send> Slot<T> {
-    /// Leaves a value in place of what is there.
-    #[inline]
-    pub(crate) fn put(&self, value: Box<T>) {
-        let before = self.0.swap(Box::into_raw(value), Ordering::AcqRel);
-        drop(Self::owned(before));
-    }
-
-    /// Reports whether there is a value. Reading leaves the line with all who read it.
-    #[inline]
-    pub(crate) fn is_full(&self) -> bool {
-        !self.0.load(Ordering::Relaxed).is_null()
-    }
-
-    /// Takes the value, if there is one.
-    #[inline]
-    pub(crate) fn take(&self) -> Option<Box<T>> {
-        if !self.is_full() {
-            return None;
-        }
-        Self::owned(self.0.swap(ptr::null_mut(), Ordering::Acquire))
-    }
-
-    fn owned(value: *mut T) -> Option<Box<T>> {
-        // SAFETY: each pointer comes from a box, and only the thread that swaps it out gets it.
-        (!value.is_null()).then(|| unsafe { Box::from_raw(value) })
-    }
-}
-
-impl<T: Send> Drop for Slot<T> {
-    fn drop(&mut self) {
-        drop(self.take());
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
 
     /// The owner and two other threads add to two numbers, which differ if two are ever inside.
@@ -298,24 +222,10 @@ mod tests {
             thread::scope(|scope| {
                 scope.spawn(|| (0..40 * rounds).for_each(|_| add(lock.enter_as_owner())));
                 for _ in 0..2 {
-                    scope.spawn(|| {
-                        (0..rounds).for_each(|_| add(lock.enter()));
-                        lock.enter().disown();
-                        (0..rounds).for_each(|_| add(lock.enter()));
-                    });
+                    scope.spawn(|| (0..2 * rounds).for_each(|_| add(lock.enter())));
                 }
             });
             assert_eq!(*lock.enter(), [44 * rounds; 2]);
         }
-    }
-
-    #[test]
-    fn a_value_is_taken_once_or_dropped_with_its_place() {
-        let (slot, value) = (Slot::default(), Arc::new(()));
-        slot.put(Box::new(Arc::clone(&value)));
-        assert!(slot.take().is_some() && slot.take().is_none());
-        slot.put(Box::new(Arc::clone(&value)));
-        drop(slot);
-        assert_eq!(Arc::strong_count(&value), 1);
     }
 }

@@ -258,7 +258,7 @@ impl Team {
                 self.look_out.of_worker(core, next_ns)
             });
             let was_called = worker.wait_for_call(next_ns, lead);
-            if let Some(runner) = worker.given.take() {
+            if was_called && let Some(runner) = worker.take_given() {
                 break Woken::WithWork(runner);
             }
             if self.office.is_over() {
@@ -696,9 +696,6 @@ impl Team {
     ) {
         let (workers, seat) = (&self.workers, state.seats[number].take());
         let core = seat.unwrap_or_else(|| state.core_of(number));
-        if number == OWNER {
-            state.disown();
-        }
         state.abandoned.push(number);
         workers[number].give_up_sections();
         match seat {

@@ -21,15 +21,14 @@
 //! has nothing else to do can have it pass before the instant: it wakes up a little early, and
 //! watches the clock for the rest.
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use fass::platform::SubtaskRunner;
 use sched_dag::CoreId;
 
 use crate::level::{Levels, Role};
-use crate::lock::Slot;
 use crate::sys::ThreadId;
 use crate::{clock, section, sys};
 
@@ -54,7 +53,7 @@ pub(crate) struct Worker {
     /// 1 if it is to look for work.
     call: AtomicU32,
     /// The runner of an instance that another thread has started for it, if it watches.
-    pub(crate) given: Slot<SubtaskRunner>,
+    given: Mutex<Option<Box<SubtaskRunner>>>,
     /// Whether it watches for that instead of sleeping.
     polls: bool,
 }
@@ -136,6 +135,18 @@ impl Worker {
         }
     }
 
+    /// Leaves it, while it watches, the runner of an instance that was started for it.
+    pub(crate) fn give(&self, runner: Box<SubtaskRunner>) {
+        *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(runner);
+        self.call.store(1, Ordering::Release);
+    }
+
+    /// Takes the runner, if there is one. By itself.
+    pub(crate) fn take_given(&self) -> Option<Box<SubtaskRunner>> {
+        let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
+        given.take()
+    }
+
     /// Sleeps until it is called, or until an instant, for which it wakes up a little early. By
     /// itself. Reports whether it was called.
     pub(crate) fn wait_for_call(&self, until_ns: u64, lead: &mut Lead) -> bool {
@@ -165,13 +176,10 @@ impl Worker {
         self.polls && self.seat().is_some()
     }
 
-    /// Watches for a call or a runner, and for an instant. Reports whether there is either;
-    /// it may also return for nothing, so that its caller sees what has changed else.
+    /// Watches for a call, and for an instant. Reports whether there is a call; it may also return
+    /// for nothing, so that its caller sees what has changed else.
     fn poll(&self, until_ns: u64) -> bool {
         for _ in 0..PATIENCE {
-            if self.given.is_full() {
-                return true;
-            }
             if self.call.load(Ordering::Relaxed) != 0 {
                 return self.call.swap(0, Ordering::Acquire) != 0;
             }

@@ -477,7 +477,7 @@ impl State {
             }
             if let Some(runner) = self.find_work(number, workers, now_ns) {
                 self.calls += 1;
-                workers[number].given.put(runner);
+                workers[number].give(runner);
             }
             false
         });
