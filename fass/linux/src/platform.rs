@@ -223,7 +223,7 @@ pub(crate) struct Launched {
 pub struct Counts {
     /// Completions that handed their core the next instance: same thread, no wake.
     pub hand_offs: u64,
-    /// Calls of workers that sleep or are about to: one wake of the kernel's each.
+    /// Calls of workers, and instances left to them: where workers sleep, a wake of the kernel's each.
     pub calls: u64,
     /// Instances that lost their core to a more urgent one.
     pub preemptions: u64,

@@ -149,7 +149,7 @@ impl Team {
         }
     }
 
-    /// Takes the scheduler's lock. A panic under it would be ours, and was reported.
+    /// Takes the scheduler's lock.
     pub(crate) fn lock(&self) -> Guard<'_, State> {
         self.state.enter()
     }

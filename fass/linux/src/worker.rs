@@ -32,7 +32,8 @@ use crate::level::{Levels, Role};
 use crate::sys::ThreadId;
 use crate::{clock, section, sys};
 
-/// It runs no instance: it waits, or has the scheduler's lock, or is about to take it.
+/// It runs no instance: it waits, or has the scheduler's lock, or is about to take it. Where none is
+/// ever demoted, always.
 const REPORTS: u32 = 0;
 /// It runs an instance as its core should.
 const RUNS: u32 = 1;
@@ -52,7 +53,8 @@ pub(crate) struct Worker {
     holds: AtomicBool,
     /// 1 if it is to look for work.
     call: AtomicU32,
-    /// The runner of an instance that another thread has started for it, if it watches.
+    /// The runner of an instance that another thread has started for it, if it watches. Its own
+    /// thread takes no other lock meanwhile, so the giver waits for a moment at most.
     given: Mutex<Option<Box<SubtaskRunner>>>,
     /// Whether it watches for that instead of sleeping.
     polls: bool,
@@ -67,7 +69,7 @@ pub(crate) fn begin(number: usize, work: impl FnOnce() + Send + 'static) -> Join
         .name(format!("fass-worker-{number}"))
         .stack_size(STACK_BYTES)
         .spawn(work)
-        .expect("the system has a thread for each core and each instance that can be suspended")
+        .expect("the system has a thread for each worker of a run")
 }
 
 /// How often a worker looks before it lets other threads have its processor, in case there are

@@ -234,6 +234,7 @@ impl Scheduler {
                 _ => true,
             };
         if concerns_others || self.log.now_ns >= self.quiet_until_ns {
+            debug_assert!(unwritten == Unwritten::Nothing, "a finish is all there is");
             return (self.leave_open(core, vertex), Unwritten::Nothing);
         }
         // The dispatch is made here: what is in line preempts nobody.

@@ -39,7 +39,7 @@
 //!
 //! An instance that waits between two turns has no worker. Without preemption nothing is suspended.
 //! Workers are lost by exceeded budgets, and by panics that cannot unwind. Where a DAG has no budget,
-//! the latter alone can be, in no run that goes well: the threads for them begin when one is needed.
+//! the latter alone can be: so many threads begin only when a panic takes one away.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -114,7 +114,7 @@ pub(crate) struct State {
     pub(crate) spare: Vec<Number>,
     /// Workers whose threads have not begun. One begins where a panic has taken another one away.
     pub(crate) later: Range<Number>,
-    /// Workers whose instance has exceeded its budget. They are never used again.
+    /// Workers whose instance has exceeded its budget, or cannot unwind. They are never used again.
     pub(crate) abandoned: Vec<Number>,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
@@ -124,7 +124,8 @@ pub(crate) struct State {
     pub(crate) preemptions: u64,
     /// How often a completion gave its own core the next instance.
     pub(crate) hand_offs: u64,
-    /// How often a worker was called, which is a wake of the kernel's.
+    /// How often a worker was called, or left an instance. Where workers sleep, a wake of the
+    /// kernel's each.
     pub(crate) calls: u64,
 }
 
@@ -283,8 +284,8 @@ impl State {
         self.port.time.of_run(time_ns)
     }
 
-    /// Begins the instant at which the clock is, and returns that: another thread may have read the
-    /// clock later, and what it has written down is never behind what is written now.
+    /// Begins the instant at which the clock is, and returns that, or the latest instant that was
+    /// written down: another thread may have read the clock later.
     pub(crate) fn now_ns(&mut self) -> u64 {
         let now_ns = self.since_epoch(clock::now_ns());
         self.begin(now_ns)

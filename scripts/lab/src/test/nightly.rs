@@ -20,7 +20,11 @@ const MIRI: [(&str, &str, u32); 7] = [
         "-p fass --lib -- cell::tests latest log wire tape",
         16,
     ),
-    ("threads", "-p linux --lib -- worker office look_out", 64),
+    (
+        "threads",
+        "-p linux --lib -- worker office look_out lock::tests::one",
+        64,
+    ),
     ("spin lock", "-p executive --lib -- spinlock", 16),
     (
         "outbox and others",
