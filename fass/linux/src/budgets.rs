@@ -11,13 +11,11 @@
 //! its clock at both ends of a turn, and adds up what the instance has taken; at the end of a turn
 //! it sees for itself whether that is too much.
 
-use std::sync::atomic::Ordering;
-
 use sched_dag::{CoreId, Vertex};
 
 use crate::state::State;
 use crate::sys;
-use crate::team::Team;
+use crate::worker::Worker;
 
 /// The latest look at an instance that has a budget.
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,8 +48,13 @@ impl Budgets {
     }
 
     /// Looks at what runs. Returns a core whose instance has exceeded its budget, or when
-    /// to look again.
-    pub(crate) fn look(&mut self, team: &Team, state: &State, now_ns: u64) -> Result<u64, CoreId> {
+    /// to look again. `taken_ns` tells of a vertex how much earlier turns have taken.
+    pub(crate) fn look(
+        &mut self,
+        (state, workers): (&State, &[Worker]),
+        taken_ns: impl Fn(Vertex) -> u64,
+        now_ns: u64,
+    ) -> Result<u64, CoreId> {
         if self.shortest_ns == u64::MAX {
             return Ok(u64::MAX);
         }
@@ -61,14 +64,13 @@ impl Budgets {
                 continue;
             };
             let budget_ns = self.by_vertex[vertex.index()];
-            let worker = &team.workers[state.port.active[core.index()]];
+            let worker = &workers[state.port.active[core.index()]];
             let processor_ns = worker.thread().and_then(sys::processor_time_ns);
             let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
                 continue;
             };
             let job = state.engine.scheduler.instance_of(vertex).job;
-            let clock = team.turns.get(vertex.index());
-            let taken_ns = clock.map_or(0, |clock| clock.taken_ns.load(Ordering::Relaxed));
+            let taken_ns = taken_ns(vertex);
             let what = Some((vertex, job, taken_ns));
             if seen.what != what {
                 *seen = Seen { what, processor_ns };

@@ -629,8 +629,12 @@ impl Team {
             return Some(state.port.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
+        let taken_ns = |vertex: Vertex| {
+            let clock = self.turns.get(vertex.index());
+            clock.map_or(0, |clock| clock.taken_ns.load(Ordering::Relaxed))
+        };
         let look_ns = loop {
-            match budgets.look(self, state, clock::now_ns()) {
+            match budgets.look((state, &self.workers), taken_ns, clock::now_ns()) {
                 Ok(look_ns) => break look_ns,
                 Err(core) => self.abandon(state, core),
             }

@@ -6,8 +6,8 @@
 //! any other, only without running.
 
 use super::jobs::Job;
+use super::jobs::TimerKind;
 use super::pins::ReadyLines;
-use super::timers::TimerKind;
 use super::vertices::{InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler};
 use crate::ids::{DagId, Instance};

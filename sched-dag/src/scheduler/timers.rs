@@ -21,6 +21,7 @@ use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
 
 use super::bits::BitSet;
+use super::jobs::TimerKind;
 use super::ready_queue::IndexedHeap;
 use crate::ids::{ClusterId, to_u32};
 use crate::order::sorted_by_key;
@@ -34,19 +35,6 @@ pub(super) struct Timers {
     members: Box<[ClassMember]>,
     /// Class by class.
     lanes: Box<[ReleaseLane]>,
-}
-
-/// The kind of a DAG's next event, and the lane of the class for such events.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum TimerKind {
-    /// The release of an even job.
-    EvenRelease,
-    /// The release of an odd job.
-    OddRelease,
-    /// A deadline.
-    Deadline,
-    /// The release of a blocked job.
-    Other,
 }
 
 /// How many lanes a class has: a lane for each kind but the last.

@@ -25,12 +25,24 @@ use alloc::boxed::Box;
 use core::ops::Range;
 
 use super::phase::DagPhase;
-use super::timers::TimerKind;
 use crate::ids::to_u32;
 use crate::policies::Policy;
 use crate::policy::JobOutcome;
 use crate::task_set::Dag;
 use judging::Deadline;
+
+/// The kind of a DAG's next event, and the lane of the class for such events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TimerKind {
+    /// The release of an even job.
+    EvenRelease,
+    /// The release of an odd job.
+    OddRelease,
+    /// A deadline.
+    Deadline,
+    /// The release of a blocked job.
+    Other,
+}
 
 /// The jobs of one DAG.
 #[derive(Clone, Debug, Hash)]
