@@ -3,9 +3,10 @@
 //! # The owner
 //!
 //! Where a cluster has one core, nothing has a level, and nothing is preempted or has a budget, one
-//! thread takes nearly every step. As the lock's *owner* that thread enters by plain stores: it says "inside",
-//! and looks whether the lock is wanted. Any other thread takes the *word* of the lock, says that
-//! the lock is wanted, and has Linux make each running thread pass a barrier (`membarrier`).
+//! thread takes nearly every step. As the lock's *owner* that thread enters by plain stores: it says
+//! "inside", and looks whether the lock is wanted. Any other thread takes the *word* of the lock,
+//! says that the lock is wanted, and has Linux make each running thread pass a barrier
+//! (`membarrier`).
 //! Either the owner was inside before its barrier: then the other thread sees that, and waits. Or
 //! the owner looks after its barrier, sees that the lock is wanted, and takes the word, too.
 //!
