@@ -121,6 +121,7 @@ mod policy;
 mod request;
 mod scheduler;
 mod spec;
+mod table;
 mod task_set;
 mod topic;
 mod verify;
@@ -146,6 +147,7 @@ pub use spec::{
     DagSpec, LatestSpec, LockUse, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,
     TopicPort, Wait,
 };
+pub use table::{CoreList, Table, TableEntry};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{

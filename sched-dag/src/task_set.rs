@@ -25,6 +25,7 @@ use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 use crate::spec::{LockUse, Wait};
+use crate::table::Table;
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -38,6 +39,7 @@ pub struct TaskSet {
     first_vertices: Box<[u32]>,
     /// The number of vertices.
     vertices: usize,
+    tables: Box<[Table]>,
 }
 
 /// A verified DAG task.
@@ -148,7 +150,33 @@ impl TaskSet {
             vertices,
             dags,
             clusters: clusters.into(),
+            tables: Box::default(),
         }
+    }
+
+    /// Has these tables enforced, which are of whole DAGs and in the cores' range.
+    pub(crate) fn set_tables(&mut self, tables: Vec<Table>) {
+        self.tables = tables.into();
+    }
+
+    /// Returns the tables.
+    pub fn tables(&self) -> &[Table] {
+        &self.tables
+    }
+
+    /// Returns the table of a DAG, which is in one or in none.
+    pub fn table_of(&self, dag: DagId) -> Option<&Table> {
+        let mut tables = self.tables.iter();
+        tables.find(|table| table.dags().contains(&dag))
+    }
+
+    /// Returns the number of jobs of a DAG in one lap of its table.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    pub fn jobs_in_lap(&self, table: &Table, dag: DagId) -> u64 {
+        table.lap_ns / self.dag(dag).period_ns()
     }
 
     /// Returns the DAGs in the order of the commit.
