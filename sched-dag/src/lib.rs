@@ -44,9 +44,9 @@
 //!   idles while an instance is ready. At one instant all completions come
 //!   first, then all releases, then one dispatch.
 //!
-//! A core may have a list of a *table*: an order of subtasks over a common period of their DAGs, which
-//! the core keeps to. All other instances share what is left, as R5 says. The rules T1 to T4 stand in
-//! `table.rs`, their scenarios in `tests/scenarios/tables.txt`.
+//! A subtask may be *pinned* to a core of its cluster. On that core the pinned instance with the
+//! smallest key runs before all others, and these share the other cores as R5 says. The rules P1 to P4
+//! stand in `scheduler/pins.rs`, their scenarios in `tests/scenarios/pins.txt`.
 //!
 //! A subtask may *wait*, between *segments* of its function: then its instance holds no core, and is
 //! not eligible until an answer or the wait's limit comes. The rules W1 to W7 stand in
@@ -122,7 +122,6 @@ mod request;
 mod scheduler;
 mod spec;
 mod table;
-mod table_times;
 mod task_set;
 mod topic;
 mod verify;
@@ -130,7 +129,7 @@ pub mod virtual_time;
 pub mod wcets;
 mod worded;
 
-pub use crate::policy::{AssignmentReason, AttemptFailure, CoreDivision, LendingAttempt};
+pub use crate::policy::{AssignmentReason, CoreDivision, LendingAttempt};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use key::{DagKey, SubtaskKey};
@@ -138,7 +137,7 @@ pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
 pub use policies::{Policy, SchedulerOptions};
 pub use policy::{
-    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Preemption, Priority,
+    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Preemption, Priority, SubtaskOrder,
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
@@ -152,7 +151,7 @@ pub use table::{CoreList, Table, TableEntry};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{
-    CommitOptions, ConstructionPolicy, CountLimit, DagFault, DagLabel, ListFault, MAX_ARITY,
-    MOST_FAULTS, OverflowingTime, RejectedDags, SubtaskLabel, TopicSide, VerifiedDags, Warning,
-    verify, write_faults,
+    CommitOptions, ConstructionPolicy, CountLimit, DagFault, DagLabel, MAX_ARITY, MOST_FAULTS,
+    OverflowingTime, RejectedDags, SubtaskLabel, TopicSide, VerifiedDags, Warning, verify,
+    write_faults,
 };

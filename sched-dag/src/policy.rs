@@ -102,6 +102,18 @@ impl FaultLimit {
     }
 }
 
+/// Whether the commit may fix an order in which a DAG's subtasks use the cores.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum SubtaskOrder {
+    /// It may not: the policy decides at every instant.
+    #[default]
+    Free,
+    /// It may: [`fix_orders`](crate::analysis::fix_orders) adds precedence edges, those of a
+    /// schedule of the WCETs on the DAG's cores, if these prove a shorter response time and none
+    /// of another DAG a longer one. All subtasks need a WCET, and no sink a deadline of its own.
+    Fixed,
+}
+
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum JobOutcome {
@@ -152,31 +164,6 @@ texts! {
         SqueezedByDensity = "attempt 3, squeezed, by density";
         /// As [`ByDeadline`](Self::ByDeadline), with squeezed lists.
         SqueezedByDeadline = "attempt 4, squeezed, by deadline";
-        /// One table for as many DAGs as can have one, whose entries preempt less urgent ones.
-        Nest = "attempt 5, one table";
-        /// As [`Nest`](Self::Nest), with fewer preemptions.
-        Lazy = "attempt 6, one table, lazy";
-    }
-}
-
-texts! {
-    /// Why an attempt to divide cores has failed, of a DAG or in general.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum AttemptFailure {
-        /// The DAG has no place.
-        Lent = "no place";
-        /// Some DAG can execute in a table only.
-        Excluded = "some dag needs a table";
-        /// No DAG can have a table with others.
-        Nothing =
-            "no table, as none is proven next to a lock, a card or measured overheads, or the \
-             periods have no short common multiple";
-        /// The DAG neither fits into the table nor may execute in what that leaves.
-        Member = "no room in the table";
-        /// The DAG is late in the table, or no table closes.
-        Late = "no table in time";
-        /// The DAG has no place in what the table leaves.
-        Place = "no place next to the table";
     }
 }
 
@@ -191,15 +178,12 @@ texts! {
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
         /// All DAGs share all cores.
         Whole { left_percent: u32 } = "all, with {left_percent} % of them left (attempt 0)";
-        /// It is heavy and has a table of its own.
+        /// It is heavy and owns cores, on each of which its subtasks have a fixed order.
         Owner { attempt: LendingAttempt, volume_ns: u64, within_ns: u64, left_percent: u32 } =
-            "its own by a table, as a job is {:?} of work within {:?}, with {left_percent} % of \
+            "its own in a fixed order, as a job is {:?} of work within {:?}, with {left_percent} % of \
              them left ({attempt})",
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
-        /// It has a table with others: each of the cores runs a list of entries.
-        Table { attempt: LendingAttempt, left_percent: u32 } =
-            "those of its table, with {left_percent} % of them left ({attempt})";
-        /// It shares what the tables of some cores leave.
+        /// It shares what the owners of some cores leave.
         Member { attempt: LendingAttempt, left_percent: u32 } =
             "the first with room for it, with {left_percent} % of them left \
              ({attempt})";

@@ -9,7 +9,7 @@ use core::any::TypeId;
 use core::ops::RangeInclusive;
 
 use crate::ids::ClusterId;
-use crate::policy::{Activation, OnFault, OverrunPolicy, Priority};
+use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
@@ -32,10 +32,12 @@ pub struct DagSpec {
     pub overrun: OverrunPolicy,
     /// The cost of a fault of an instance.
     pub on_fault: OnFault,
+    /// Whether the commit may fix an order of the subtasks.
+    pub order: SubtaskOrder,
     /// The cluster whose cores run it; `None` where they are not divided.
     pub cluster: Option<ClusterId>,
-    /// The cores of its cluster that execute it, counted from 0; empty: all. DAGs of a cluster
-    /// have the same ones, or none in common. A DAG with a list of a core has none.
+    /// The cores of its cluster that execute those of its subtasks that state none, counted from
+    /// 0; empty: all. DAGs of a cluster have the same ones, or none in common.
     pub affinity: Vec<u32>,
     /// The number of jobs to release; `None`: without end.
     pub jobs: Option<u64>,
@@ -164,6 +166,8 @@ pub struct SubtaskSpec {
     pub budget_ns: Option<u64>,
     /// The stack that it needs, in bytes, of [`STACK_BYTES`]; `None`: the driver's choice.
     pub stack_bytes: Option<u64>,
+    /// The core of its cluster that alone executes it, counted from 0; `None`: any.
+    pub core: Option<u32>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.

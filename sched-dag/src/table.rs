@@ -77,21 +77,10 @@ pub struct TableEntry {
 impl Table {
     /// Returns the DAGs, ascending.
     pub fn dags(&self) -> Vec<DagId> {
-        let mut dags = sorted(&self.entries().map(|entry| entry.dag).collect::<Vec<_>>());
+        let entries = self.lists.iter().flat_map(|list| &list.entries);
+        let mut dags = sorted(&entries.map(|entry| entry.dag).collect::<Vec<_>>());
         dags.dedup();
         dags
-    }
-
-    /// Returns the entries of all lists.
-    pub fn entries(&self) -> impl Iterator<Item = &TableEntry> {
-        self.lists.iter().flat_map(|list| &list.entries)
-    }
-
-    /// Reports whether there is only one DAG.
-    pub fn is_of_one_dag(&self) -> bool {
-        let mut entries = self.entries();
-        let first = entries.next().map(|entry| entry.dag);
-        entries.all(|entry| Some(entry.dag) == first)
     }
 
     /// Returns the list of a core of the cluster.

@@ -179,6 +179,5 @@ impl Scheduler {
         state.statistics.skips += 1;
         self.log
             .of_job(EventKind::Skipped, dag, job, Some(release_ns));
-        self.touch_lists();
     }
 }

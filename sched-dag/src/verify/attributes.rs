@@ -16,12 +16,8 @@ use crate::order::sorted;
 use crate::policy::{OnFault, Priority};
 use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
-/// Checks the attributes of the whole commit; `tables` has the table of each DAG.
-pub(super) fn check(
-    options: &CommitOptions,
-    tables: &[Option<usize>],
-    findings: &mut VerifyFindings<'_>,
-) {
+/// Checks the attributes of the whole commit.
+pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     let count = findings.specs.len();
     if count == 0 {
         findings.fault(DagFault::NoDags);
@@ -46,7 +42,7 @@ pub(super) fn check(
         warn_of_equal_priorities(findings);
     }
     check_clusters(options, findings);
-    check_affinities(options, tables, findings);
+    check_affinities(options, findings);
     check_names(findings);
 }
 
@@ -331,14 +327,25 @@ fn cores_of(options: &CommitOptions, spec: &DagSpec) -> u32 {
     }
 }
 
-/// Checks the cores that a DAG states.
+/// Checks the cores that a DAG and its subtasks state.
 fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     let cores = cores_of(options, page.spec);
-    // The scheduler has a line for each, and two more, in 16 bits.
-    let most = cores.min(0xfffe);
+    // The scheduler has two lines for each, and one more, in 16 bits.
+    let most = cores.min(0x7fff);
     let largest = page.spec.affinity.iter().copied().max();
     if let Some(core) = largest.filter(|&core| core >= most) {
         page.fault(|dag| DagFault::AffinityOutOfRange { dag, core, cores });
+    }
+    for (index, stated) in page.spec.subtasks.iter().enumerate() {
+        if let Some(core) = stated.core.filter(|&core| core >= most) {
+            let subtask = page.subtask(index);
+            page.fault(|dag| DagFault::CoreOutOfRange {
+                dag,
+                subtask,
+                core,
+                cores,
+            });
+        }
     }
 }
 
@@ -353,12 +360,8 @@ pub(super) fn affinity(options: &CommitOptions, spec: &DagSpec) -> Vec<u32> {
     cores
 }
 
-/// Checks that DAGs of a cluster without a table execute on the same cores, or on others.
-fn check_affinities(
-    options: &CommitOptions,
-    tables: &[Option<usize>],
-    findings: &mut VerifyFindings<'_>,
-) {
+/// Checks that DAGs of a cluster execute what they do not pin on the same cores, or on others.
+fn check_affinities(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     let specs = findings.specs;
     if specs.iter().all(|spec| spec.affinity.is_empty()) {
         return;
@@ -366,7 +369,7 @@ fn check_affinities(
     // Each affinity of a cluster, and the first DAG that has it.
     let mut groups: Vec<(ClusterId, Vec<u32>, usize)> = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
-        if tables[dag].is_some() {
+        if spec.subtasks.iter().all(|subtask| subtask.core.is_some()) {
             continue;
         }
         let (cluster, own) = (spec.cluster.unwrap_or_default(), affinity(options, spec));

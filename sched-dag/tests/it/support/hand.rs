@@ -39,10 +39,7 @@ pub(crate) struct Hand {
 
 impl Hand {
     pub(crate) fn new(specs: &[DagSpec], options: SchedulerOptions) -> Self {
-        Self::of(scheduler(specs, options))
-    }
-
-    pub(crate) fn of(mut scheduler: Scheduler) -> Self {
+        let mut scheduler = scheduler(specs, options);
         scheduler.log.journal = Journal::growing();
         Self {
             scheduler,

@@ -200,7 +200,7 @@ pub type Slack = [Option<u64>; PARTS.len()];
 pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let task_set =
-            record::task_set(settings.scheduler(), CoreDivision::Undivided, &[], dags).ok()?;
+            record::task_set(settings.scheduler(), CoreDivision::Undivided, dags).ok()?;
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };
@@ -231,12 +231,7 @@ pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     // With a core for each subtask nothing delays the longest path.
     settings.cores = u32::try_from(own.subtasks.len()).unwrap_or(u32::MAX).max(1);
     let length = bound(&[own], &settings, 0);
-    // What a table gives its DAGs, and leaves to others, is of no such parts.
-    let has_table = task_set.tables().iter().any(|of| of.cluster == cluster);
-    let part = |whole: Option<u64>, rest: Option<u64>| match has_table {
-        true => None,
-        false => Some(whole?.saturating_sub(rest?)),
-    };
+    let part = |whole: Option<u64>, rest: Option<u64>| Some(whole?.saturating_sub(rest?));
     [
         length,
         part(alone, length),

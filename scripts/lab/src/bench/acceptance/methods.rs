@@ -6,8 +6,7 @@
 //! - *V-Fed*: virtually-federated scheduling (X. Jiang, N. Guan, H. Liang, Y. Tang, L. Qiao, W. Yi,
 //!   RTSS 2021; with light DAGs: X. Jiang, H. Liang, N. Guan, Y. Tang, L. Qiao, Y. Wang, IEEE TPDS
 //!   34(1), 2023);
-//! - *lent*: the analysis of tables in `docs/bounds.md`, with tables of one DAG only;
-//! - *table*: the same with all tables, where the DAGs are periodic;
+//! - *lent*: the analysis of lent cores in `docs/bounds.md`;
 //! - *fluid*: the density test of DAG-Fluid (F. Guan, L. Peng, J. Qiao, IEEE TC 71(8), 2022).
 //!
 //! V-Fed and fluid stand here for comparison only: no scheduler of this project does what they
@@ -18,8 +17,7 @@
 //! Assumes `D <= T`; `V` is the volume, `L` the length.
 
 use sched_dag::analysis::{
-    ENTRY_LIMIT, InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path,
-    multi_path_fp,
+    InterferenceBound, ListSchedule, Task, federated, lend, multi_path, multi_path_fp,
 };
 
 /// A test of whether DAGs with `D <= T` can be executed on a number of cores.
@@ -33,7 +31,7 @@ pub(super) struct Method {
 }
 
 /// The methods, in the order of columns, curves and legend.
-pub(super) const METHODS: [Method; 6] = [
+pub(super) const METHODS: [Method; 5] = [
     Method {
         name: "graham",
         title: "federated, Graham's bound",
@@ -52,12 +50,7 @@ pub(super) const METHODS: [Method; 6] = [
     Method {
         name: "lent",
         title: "lent cores (here)",
-        accepts: |tasks, cores| lend(tasks, cores, 0).is_some_and(|answer| answer.plan.is_some()),
-    },
-    Method {
-        name: "table",
-        title: "tables (here)",
-        accepts: by_tables,
+        accepts: |tasks, cores| lend(tasks, cores).is_some_and(|answer| answer.plan.is_some()),
     },
     Method {
         name: "fluid",
@@ -68,18 +61,6 @@ pub(super) const METHODS: [Method; 6] = [
 
 const fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.relative_deadline_ns()
-}
-
-/// Divides the cores as a commit does, of DAGs with all offsets 0.
-fn by_tables(tasks: &[&Task], cores: u32) -> bool {
-    let terms = TableTerms {
-        offset_ns: Some(0),
-        ..TableTerms::default()
-    };
-    let periodic = |task: &&Task| (*task).clone().with_table_terms(terms.clone());
-    let periodic: Vec<Task> = tasks.iter().map(periodic).collect();
-    let answer = lend(&periodic.iter().collect::<Vec<_>>(), cores, ENTRY_LIMIT);
-    answer.is_some_and(|answer| answer.plan.is_some())
 }
 
 /// Gives each heavy DAG the least number of cores by the multi-path bound, and partitions the light
@@ -395,29 +376,21 @@ mod tests {
             // On two cores the lists of 4, 3 and 4 leave what the light DAG needs if they are
             // squeezed, and a budget of 10 and 1 leaves it, too. With three cores the heavy one gets
             // two, the light one the third.
-            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0, 0]),
-            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1, 1]),
-            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1, 1]),
+            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0]),
+            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1]),
+            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1]),
             // Two paths of 9 leave a core for the 3: Graham's bound counts one path, and needs
             // ceil(12 / 3) cores.
-            (vec![free(20, 12, vec![9, 9, 3])], 2, [0, 1, 0, 1, 1, 1]),
-            (vec![free(20, 12, vec![9, 9, 3])], 4, [1, 1, 1, 1, 1, 1]),
+            (vec![free(20, 12, vec![9, 9, 3])], 2, [0, 1, 0, 1, 1]),
+            (vec![free(20, 12, vec![9, 9, 3])], 4, [1, 1, 1, 1, 1]),
             // Only an order of the subtasks is done by 7: 3, 2 and 2 next to 3 and 2.
-            (
-                vec![free(20, 7, vec![3, 3, 2, 2, 2])],
-                2,
-                [0, 0, 0, 1, 1, 1],
-            ),
-            (
-                vec![free(20, 7, vec![3, 3, 2, 2, 2])],
-                3,
-                [1, 1, 1, 1, 1, 1],
-            ),
+            (vec![free(20, 7, vec![3, 3, 2, 2, 2])], 2, [0, 0, 0, 1, 1]),
+            (vec![free(20, 7, vec![3, 3, 2, 2, 2])], 3, [1, 1, 1, 1, 1]),
             // Two of three light ones would be on one core, with 12 in 10; side by side on both the
             // third has 1 + ceil((5 + 12) / 2) = 10.
-            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 1, 1, 1]),
+            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 1, 1]),
             // The volume of four is 24 in 10, more than two cores do.
-            (vec![wide(), wide(), wide(), wide()], 2, [0, 0, 0, 0, 0, 0]),
+            (vec![wide(), wide(), wide(), wide()], 2, [0, 0, 0, 0, 0]),
         ] {
             let of: Vec<&Task> = tasks.iter().collect();
             let accepted = METHODS.map(|method| u8::from((method.accepts)(&of, cores)));
