@@ -5,7 +5,7 @@
 //!
 //! - [`violations`]: every breach of the model's rules R1 to R4, and of what every
 //!   machine must keep: one life of each instance, one instance on each core;
-//! - [`dispatch_violations`]: every breach of R5; [`sweep`] is its core;
+//! - [`dispatch_violations`]: every breach of R5 and of T1 to T4; [`sweep`] is its core;
 //! - [`MeasuredCosts`]: what the platform's own work has taken;
 //! - [`RunRecord::of_events`]: the times of every job and instance, of the latest whole
 //!   jobs if the oldest events are lost;
@@ -27,6 +27,7 @@ mod distribution;
 mod facts;
 mod replay;
 pub mod sweep;
+mod tables;
 mod tally;
 mod violation;
 

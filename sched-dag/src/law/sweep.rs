@@ -1,9 +1,8 @@
 //! R5: did the right instances run?
 //!
 //! At every instant the rule says which instances *should* run: with m cores, those
-//! that have started and keep their core; on each other core for which pinned ones are
-//! eligible, of these the one with the smallest key; and of all others that are eligible
-//! those with the smallest keys, until m are reached. Where DAGs have affinities, the last
+//! that have started and keep their core; on each other core the entry of its table that is due
+//! (T1, T3); and of all others that are eligible those with the smallest keys, until m are reached. Where DAGs have affinities, the last
 //! holds for each group of cores by itself, and for the instances of its DAGs. An eligible instance that should run
 //! and does not is *owed* a core. In virtual time that never lasts. On a machine it is
 //! never 0: the scheduler is told, decides, and interrupts a core. So it is a breach
@@ -12,7 +11,7 @@
 //!
 //! Besides, at the start of an instance that will keep its core: those of higher
 //! priority that have been waiting for longer than the bound must have idle cores to
-//! go to, and none of them may be pinned to its core. Without that, a wrong choice would show no longer than it takes to make. Where times
+//! go to, and no entry may be due on its core. Without that, a wrong choice would show no longer than it takes to make. Where times
 //! are exact, so must those that wait since an earlier event, be it of the same instant.
 //!
 //! A sweep takes changes one after the other and keeps only what waits and what
@@ -25,7 +24,10 @@ use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::tables::{CoreLists, TableReplay};
+use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance};
+use crate::journal::Event;
 use crate::policies::SchedulerOptions;
 use crate::policy::Preemption;
 use crate::task_set::TaskSet;
@@ -42,6 +44,7 @@ pub(super) struct DispatchModel<'a> {
     pub(super) cores: Range<u32>,
     /// The affinities of its DAGs, each once.
     pub(super) groups: Vec<&'a [u32]>,
+    pub(super) lists: CoreLists<'a>,
     /// When sporadic jobs were due.
     pub(super) due_ns: BTreeMap<(DagId, u64), u64>,
 }
@@ -49,7 +52,7 @@ pub(super) struct DispatchModel<'a> {
 /// The cores that may execute an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place<'a> {
-    /// The one that it is pinned to.
+    /// The core of its entry in a table.
     Core(CoreId),
     /// Those of its DAG's affinity.
     Group(&'a [u32]),
@@ -73,10 +76,9 @@ impl<'a> DispatchModel<'a> {
 
     /// Returns the cores that may execute an instance.
     pub(super) fn place(&self, instance: Instance) -> Place<'a> {
-        let dag = self.task_set.dag(instance.dag);
-        match dag.subtask(instance.subtask).core() {
-            Some(core) => Place::Core(CoreId(self.cores.start + core)),
-            None => Place::Group(dag.affinity()),
+        match self.lists.place(instance) {
+            Some(((core, _), _)) => Place::Core(core),
+            None => Place::Group(self.task_set.dag(instance.dag).affinity()),
         }
     }
 
@@ -190,19 +192,20 @@ pub(super) struct DispatchSweep<'m> {
     unstarted: BTreeSet<Key>,
     wrong: Vec<DispatchBreach>,
     waits: &'m mut WaitCounts,
+    tables: TableReplay<'m>,
 }
 
 impl<'m> DispatchSweep<'m> {
     /// Begins at an instant; what is found of waits is added to the ones given.
     pub(super) fn new(
         model: &'m DispatchModel<'m>,
-        bound_ns: u64,
+        terms: JudgeOptions,
         now_ns: u64,
         waits: &'m mut WaitCounts,
     ) -> Self {
         Self {
             model,
-            bound_ns,
+            bound_ns: terms.tolerance_ns,
             now_ns,
             known_cores: BTreeSet::new(),
             events: 0,
@@ -215,6 +218,7 @@ impl<'m> DispatchSweep<'m> {
             unstarted: BTreeSet::new(),
             wrong: Vec::new(),
             waits,
+            tables: TableReplay::new(model.task_set, &model.lists, terms.is_whole),
         }
     }
 
@@ -243,6 +247,7 @@ impl<'m> DispatchSweep<'m> {
         // E3: what has not started never will; what has started may go on.
         self.waiting.retain(|(_, instance), _| instance.dag != dag);
         self.ended_dags.insert(dag);
+        self.tables.end_dag(dag);
     }
 
     /// An instance enters a stage.
@@ -331,18 +336,21 @@ impl<'m> DispatchSweep<'m> {
         (self.count(group, self.known_cores.iter())).saturating_sub(taken)
     }
 
-    /// Returns the pinned instance that should run on each core for which one is eligible, and that
-    /// no instance keeps.
+    /// Holds an event against the tables, before its instance enters a stage.
+    pub(super) fn take_entry(&mut self, event: &Event) -> Option<Violation> {
+        let Self {
+            tables,
+            waiting,
+            model,
+            ..
+        } = self;
+        tables.take(event, |of| waiting.contains_key(&model.key(of)))
+    }
+
+    /// Returns the entry that should run on each core for which one is due and ready, and that no
+    /// instance keeps.
     fn claims(&self) -> BTreeMap<CoreId, Key> {
-        let mut claims = BTreeMap::new();
-        for key in self.waiting.keys().chain(self.running.keys()) {
-            if let Place::Core(core) = self.model.place(key.1)
-                && self.known_cores.contains(&core)
-            {
-                let first = claims.entry(core).or_insert(*key);
-                *first = (*first).min(*key);
-            }
-        }
+        let mut claims = self.due();
         let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
         for (_, core) in kept {
             claims.remove(core);
@@ -350,8 +358,18 @@ impl<'m> DispatchSweep<'m> {
         claims
     }
 
+    fn due(&self) -> BTreeMap<CoreId, Key> {
+        let is_ready = |of| self.waiting.contains_key(&self.model.key(of));
+        let due = self.known_cores.iter().filter_map(|core| {
+            let key = self.model.key(self.tables.due(*core, is_ready)?);
+            let is_there = self.waiting.contains_key(&key) || self.running.contains_key(&key);
+            is_there.then_some((*core, key))
+        });
+        due.collect()
+    }
+
     /// Returns the waiting instances that should run, and whether a core is idle for each: the
-    /// pinned ones, and then, group by group in the order of keys, the others.
+    /// entries, and then, group by group in the order of keys, the others.
     fn should_run(&self, claims: &BTreeMap<CoreId, Key>) -> Vec<(Key, bool)> {
         let claimed = claims.iter();
         let claimed = claimed.filter(|(_, key)| self.waiting.contains_key(key));
@@ -398,7 +416,7 @@ impl<'m> DispatchSweep<'m> {
         let place = self.model.place(owed.1);
         let mut running = self.running.iter().rev();
         let movable = running.find(|(key, core)| match place {
-            Place::Core(pin) => **core == pin,
+            Place::Core(own) => **core == own,
             Place::Group(_) => {
                 !self.model.keeps_its_core(key.1) && self.model.place(key.1) == place
             }
@@ -411,7 +429,7 @@ impl<'m> DispatchSweep<'m> {
                 let cores = self.model.cores.start..;
                 let mut cores = cores.take(self.known_cores.len()).map(CoreId);
                 DispatchFault::Idle(match place {
-                    Place::Core(pin) => Some(pin),
+                    Place::Core(own) => Some(own),
                     Place::Group(group) => {
                         cores.find(|core| self.model.is_of(group, *core) && is_left(core))
                     }
@@ -460,11 +478,14 @@ impl<'m> DispatchSweep<'m> {
                 .filter(move |(_, since)| is_before(since));
             before.filter(move |(other, _)| self.model.place(other.1) == place)
         };
-        // On its core what is pinned goes first, and what is not goes after all of that.
-        let mut pinned = of_place(Place::Core(core));
+        // An entry that is due goes first; the order of entries is judged by their places.
+        let due = || {
+            let due = *self.due().get(&core)?;
+            of_place(Place::Core(core)).find(|(other, _)| **other == due)
+        };
         let found = match self.model.place(key.1) {
-            Place::Core(_) => pinned.find(|(other, _)| **other < key),
-            place @ Place::Group(group) => pinned.next().or_else(|| {
+            Place::Core(_) => None,
+            place @ Place::Group(group) => due().or_else(|| {
                 let mut others = of_place(place).take_while(|(other, _)| **other < key);
                 others.nth(self.idle(group, claims))
             }),

@@ -10,7 +10,7 @@ use core::fmt::{self, Display};
 
 use DetectionTime::{At, By};
 use Rule::{
-    AndJoin, CompletionBoundary, Dispatch, JobCompletion, OneCore, OneLife, Release, Waiting,
+    AndJoin, CompletionBoundary, Dispatch, JobCompletion, OneCore, OneLife, Release, Table, Waiting,
 };
 
 use super::sweep::{DispatchBreach, DispatchFault, DispatchState};
@@ -35,6 +35,8 @@ texts! {
         JobCompletion = "R4 completion";
         /// R5: the instances with the smallest keys run.
         Dispatch = "R5 dispatch";
+        /// T1 to T4: a core runs the entries of its table, and members on what these leave.
+        Table = "T1 table";
         /// W1 and W2: an instance takes the waits that its subtask states, each within its limit.
         Waiting = "W1 waiting";
         /// An instance becomes ready, starts and finishes once, is suspended and resumed in
@@ -186,11 +188,14 @@ worded! {
         /// R5: an instance was on a core that is not its cluster's.
         OutsideItsCluster { event: Event } = "outside_its_cluster", (Dispatch, By(event)),
             ", outside its cluster";
-        /// R5: an instance was on another core than the one that it is pinned to.
-        OffItsCore { event: Event, core: CoreId } = "off_its_core", (Dispatch, By(event)),
-            ", and is pinned to core {}", core.0;
-        /// R5: an instance that is not pinned was on a core to which its DAG has no affinity.
-        OutsideItsAffinity { event: Event } = "outside_its_affinity", (Dispatch, By(event)),
+        /// T1: an entry was on another core than the table's.
+        OffItsCore { event: Event, core: CoreId } = "off_its_core", (Table, By(event)),
+            ", and its table has it on core {}", core.0;
+        /// T1, T3, T4: an instance ran on the core of a table before an entry that goes first.
+        OutOfPlace { event: Event, first: Instance } = "out_of_place", (Table, By(event)),
+            " and is out of the order that its table has for {}", names.instance(*first);
+        /// T4: an instance without a table was on a core to which its DAG has no affinity.
+        OutsideItsAffinity { event: Event } = "outside_its_affinity", (Table, By(event)),
             ", to which its DAG has no affinity";
         /// R5: an instance that keeps its core lost it.
         LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),

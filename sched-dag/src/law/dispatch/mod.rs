@@ -1,4 +1,4 @@
-//! R5 for a journal: the changes that its events are. Each cluster is judged for itself.
+//! R5, and T1 to T4, for a journal: the changes that its events are. Each cluster is judged for itself.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
@@ -6,6 +6,7 @@ use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
 use super::sweep::{DispatchModel, DispatchState, DispatchSweep, Place, WaitCounts};
+use super::tables::CoreLists;
 use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
@@ -47,14 +48,16 @@ pub fn judge_dispatch(
             .iter()
             .filter(|dag| dag.cluster() == cluster);
         let groups: BTreeSet<&[u32]> = own.map(Dag::affinity).collect();
+        let cores = task_set.cores_of(cluster, options.cores);
         let mut model = DispatchModel {
             task_set,
             options,
             numbers: (task_set.dags().iter())
                 .map(|dag| options.policy.numbers(dag))
                 .collect(),
-            cores: task_set.cores_of(cluster, options.cores),
             groups: groups.into_iter().collect(),
+            lists: CoreLists::new(task_set, &cores, options.cores),
+            cores,
             due_ns: BTreeMap::new(),
         };
         for event in due {
@@ -78,7 +81,7 @@ fn of_cluster(
         true => (cores.map(CoreId).collect(), BTreeMap::new()),
         false => before(cores, events.clone()),
     };
-    let mut sweep = DispatchSweep::new(model, terms.tolerance_ns, first_ns, waits);
+    let mut sweep = DispatchSweep::new(model, terms, first_ns, waits);
     // A core that no event has named yet may have run anything, so nothing is held against it.
     sweep.known_cores = known;
     for (instance, stage) in before {
@@ -89,6 +92,7 @@ fn of_cluster(
         if event.what.is_of_machine() {
             sweep.known_cores.insert(event.core);
         }
+        violations.extend(sweep.take_entry(&event));
         // An instance's end is the DAG's too, unless the DAG survives faults.
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
         if event.what == EventKind::DagEnded || event.what == EventKind::Ended && ends_its_dag {
@@ -140,7 +144,7 @@ fn before(
     (busy.collect(), first_of_instance)
 }
 
-/// Returns the instances on a core that is not theirs, by cluster, pin or affinity, or that lost a
+/// Returns the instances on a core that is not theirs, by cluster, table or affinity, or that lost a
 /// core that they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let mut suspended = BTreeSet::new();

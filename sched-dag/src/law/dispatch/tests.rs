@@ -5,16 +5,19 @@ use super::*;
 use crate::ids::{ClusterId, DagId, SubtaskId};
 use crate::policies::Policy;
 use crate::policy::Preemption;
-use crate::{CommitOptions, CoreDivision, DagSpec, Priority, SubtaskSpec, verify};
+use crate::{
+    CommitOptions, CoreDivision, CoreList, DagSpec, Priority, SubtaskSpec, Table, TableEntry,
+    verify,
+};
 
 /// DAGs of one subtask each in these clusters, DAG 0 the most urgent; the last one's subtask
 /// cannot be preempted if `keeps`.
 pub(in crate::law) fn dags(clusters: &[u32], keeps: bool) -> TaskSet {
-    pinned(clusters, keeps, &[])
+    listed(clusters, keeps, &[])
 }
 
-/// The same, the subtasks of the first DAGs pinned to these cores of their clusters.
-fn pinned(clusters: &[u32], keeps: bool, pins: &[Option<u32>]) -> TaskSet {
+/// The same, the first DAGs in tables: each core has those in a row that name it.
+fn listed(clusters: &[u32], keeps: bool, pins: &[Option<u32>]) -> TaskSet {
     placed(clusters, keeps, pins, &[])
 }
 
@@ -24,12 +27,8 @@ fn placed(clusters: &[u32], keeps: bool, pins: &[Option<u32>], affinities: &[&[u
         period_ns: Some(100),
         relative_deadline_ns: Some(50 + u64::from(dag)),
         cluster: Some(ClusterId(cluster)),
-        affinity: affinities
-            .get(dag as usize)
-            .map_or(vec![], |of| of.to_vec()),
         subtasks: vec![SubtaskSpec {
             priority: Some(Priority(dag)),
-            core: pins.get(dag as usize).copied().flatten(),
             non_preemptive: keeps && dag as usize + 1 == clusters.len(),
             ..SubtaskSpec::default()
         }],
@@ -42,7 +41,39 @@ fn placed(clusters: &[u32], keeps: bool, pins: &[Option<u32>], affinities: &[&[u
         true => options.with_clusters(CoreDivision::Of(vec![1, 1])),
         false => options,
     };
-    verify(&specs, &options).unwrap().task_set
+    let mut task_set = verify(&specs, &options).unwrap().task_set;
+    let place = |(cluster, core): (&u32, &Option<u32>)| Some((*cluster, (*core)?));
+    let places: Vec<_> = clusters.iter().zip(pins).map(place).collect();
+    let tables = places.iter().flatten().copied().collect::<BTreeSet<_>>();
+    let table = |(cluster, core)| {
+        let is_there = |(_, place): &(u32, &Option<_>)| **place == Some((cluster, core));
+        let own = (0..).zip(&places).filter(is_there);
+        let own: Vec<(u32, u32)> = own.map(|(dag, _)| (dag, 0)).collect();
+        table_of(cluster, core, &own)
+    };
+    task_set.set_tables(tables.into_iter().map(table).collect());
+    for (dag, cores) in (0..).map(DagId).zip(affinities) {
+        task_set.confine(dag, cores.to_vec());
+    }
+    task_set
+}
+
+/// A table of one core, by DAGs and depths.
+fn table_of(cluster: u32, core: u32, entries: &[(u32, u32)]) -> Table {
+    let entry = |&(dag, depth): &(u32, u32)| TableEntry {
+        dag: DagId(dag),
+        subtask: SubtaskId(0),
+        job: 0,
+        depth,
+        start_ns: 0,
+        length_ns: 0,
+    };
+    let entries = entries.iter().map(entry).collect();
+    Table {
+        cluster: ClusterId(cluster),
+        lap_ns: 100,
+        lists: Box::new([CoreList { core, entries }]),
+    }
 }
 
 fn events(schedule: &str) -> Vec<Event> {
@@ -110,11 +141,19 @@ fn passed_over(at_ns: u64, waiting: u32, length_ns: u64, why: &str) -> String {
 }
 
 /// Returns the complaint about a DAG's subtask that executes from 0 on where it must not.
-fn misplaced(dag: u32, end_ns: u64, why: &str) -> String {
+fn misplaced(rule: &str, dag: u32, end_ns: u64, why: &str) -> String {
     let does = |at_ns, what| {
-        format!("at {at_ns} ns, R5 dispatch: subtask 0 of dag {dag} job 0 {what} on core {why}")
+        format!("at {at_ns} ns, {rule}: subtask 0 of dag {dag} job 0 {what} on core {why}")
     };
     does(0, "starts") + "\n" + &does(end_ns, "finishes")
+}
+
+/// Returns the complaint about an entry, or a member, that is not in the order of the table.
+fn out_of_order(does: &str, at_ns: u64, other: &str) -> String {
+    format!(
+        "at {at_ns} ns, T1 table: subtask 0 of dag {does} and is out of the order that its table \
+         has for subtask 0 of dag {other}"
+    )
 }
 
 /// The last DAG's subtask keeps core 0 from 0 on.
@@ -175,14 +214,14 @@ fn r5_holds_within_each_cluster() {
     must(&three, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", "");
     let idle = passed_over(2, 2, 3, "core 1 is idle");
     must(&three, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 5-7", &idle);
-    let outside = misplaced(1, 5, "1, outside its cluster");
+    let outside = misplaced("R5 dispatch", 1, 5, "1, outside its cluster");
     must(&three, 2, "0 0 5: 0@0 0-4, 1@1 0-5, 2@1 5-7", &outside);
 }
 
 #[test]
-fn r5_lets_pinned_instances_go_first_on_their_core() {
+fn t1_lets_entries_go_first_on_their_core() {
     // DAG 2, the least urgent, takes core 0 from DAG 0, which takes core 1 from DAG 1.
-    let last = pinned(&[0, 0, 0], false, &[None, None, Some(0)]);
+    let last = listed(&[0, 0, 0], false, &[None, None, Some(0)]);
     let right = "0 0 4: 0@0 0-4, 1@1 0-4, 2@0 4-6, 0@1 4-9, 1@0 6-9";
     must(&last, 2, right, "");
     let waits = passed_over(4, 2, 5, "core 0 runs subtask 0 of dag 0 job 0");
@@ -191,32 +230,32 @@ fn r5_lets_pinned_instances_go_first_on_their_core() {
     let wrong_one = passed_over(4, 0, 2, "core 1 runs subtask 0 of dag 1 job 0");
     let ran = "0 0 4: 0@0 0-4, 1@1 0-9, 2@0 4-6, 0@0 6-9";
     must(&last, 2, ran, &wrong_one);
-    // An idle core is not idle for one that is pinned to another.
+    // An idle core is not idle for an entry of another core.
     must(&last, 2, "0 9 0: 2@0 0-4, 0@1 0-4, 1@0 9-12", "");
-    let both = pinned(&[0, 0], false, &[Some(1), Some(1)]);
+    let both = listed(&[0, 0], false, &[Some(1), Some(1)]);
     must(&both, 2, "0 0: 0@1 0-4, 1@1 4-9", "");
-    let order = passed_over(0, 0, 4, "core 1 runs subtask 0 of dag 1 job 0");
+    let order = out_of_order("0 job 0 starts on core 1", 4, "1 job 0");
     must(&both, 2, "0 0: 1@1 0-4, 0@1 4-9", &order);
     let idle = passed_over(0, 0, 2, "core 1 is idle");
     must(&both, 2, "0 0: 0@1 2-4, 1@1 4-9", &idle);
-    // While core 1 waits for that, core 0 is idle for what is not pinned.
-    let one = pinned(&[0, 0], false, &[Some(1)]);
+    // While core 1 waits for that, core 0 is idle for what is in no table.
+    let one = listed(&[0, 0], false, &[Some(1)]);
     let of_other = passed_over(0, 1, 4, "core 0 is idle");
     must(&one, 2, "0 0: 0@1 0-4, 1@0 4-9", &of_other);
 }
 
 #[test]
-fn r5_judges_cores_and_starts_of_pinned_instances() {
-    let one = pinned(&[0, 0], false, &[Some(1)]);
-    let off = misplaced(0, 4, "0, and is pinned to core 1");
+fn t1_and_t4_judge_cores_and_starts() {
+    let one = listed(&[0, 0], false, &[Some(1)]);
+    let off = misplaced("T1 table", 0, 4, "0, and its table has it on core 1");
     must(&one, 2, "0 4: 0@0 0-4, 1@1 4-9", &off);
     // A core of its cluster is meant.
-    let second = pinned(&[0, 0, 1], false, &[None, None, Some(0)]);
+    let second = listed(&[0, 0, 1], false, &[None, None, Some(0)]);
     must(&second, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", "");
-    // What keeps its core keeps it from pinned ones, but starts after them.
-    let keeps = pinned(&[0, 0], true, &[Some(0)]);
+    // What keeps its core keeps it from entries, but starts after them.
+    let keeps = listed(&[0, 0], true, &[Some(0)]);
     must(&keeps, 1, "2 0: 1@0 0-4, 0@0 4-9", "");
-    let least = pinned(&[0, 0], true, &[None, Some(0)]);
+    let least = listed(&[0, 0], true, &[None, Some(0)]);
     must(&least, 1, "0 0: 1@0 0-4, 0@0 4-9", "");
     must(&keeps, 1, "0 0: 1@0 0-4, 0@0 4-9", &chosen(1));
 }
@@ -225,7 +264,7 @@ fn r5_judges_cores_and_starts_of_pinned_instances() {
 fn r5_judges_each_group_of_cores_by_itself() {
     // DAGs 0 and 1 on cores 0 and 2, DAG 2 on core 1, DAG 3 the owner of core 0.
     let pins = [None, None, None, Some(0)];
-    let lent = placed(&[0; 4], false, &pins, &[&[2, 0], &[0, 2], &[1], &[]]);
+    let lent = placed(&[0; 4], false, &pins, &[&[0, 2], &[0, 2], &[1], &[]]);
     // DAG 0 gives way to the owner, and DAG 1 to it, though it is more urgent than DAG 2.
     let right = "0 0 0 4: 0@0 0-4, 1@2 0-4, 2@1 0-9, 3@0 4-6, 0@2 4-7, 1@0 6-9";
     must(&lent, 3, right, "");
@@ -240,7 +279,7 @@ fn r5_judges_each_group_of_cores_by_itself() {
     let idle = passed_over(0, 2, 2, "core 1 is idle");
     let ran = "0 0 0 9: 0@0 0-9, 1@2 0-9, 2@1 2-4, 3@0 9-12";
     must(&lent, 3, ran, &idle);
-    let away = misplaced(1, 4, "3, to which its DAG has no affinity");
+    let away = misplaced("T1 table", 1, 4, "3, to which its DAG has no affinity");
     let ran = "0 0 0 4: 0@0 0-4, 1@3 0-4, 2@1 0-4, 3@0 4-9";
     must(&lent, 4, ran, &away);
     // What keeps its core starts after the more urgent of its group, though another core is idle.
@@ -250,4 +289,29 @@ fn r5_judges_each_group_of_cores_by_itself() {
     // Cores of its cluster are meant.
     let second = placed(&[0, 1, 1], false, &[None, None, Some(0)], &[&[], &[], &[]]);
     must(&second, 2, "0 0 2: 0@0 0-4, 1@1 0-2, 2@1 2-5, 1@1 5-6", "");
+}
+
+#[test]
+fn t3_judges_what_is_nested() {
+    let mut three = dags(&[0; 3], false);
+    three.set_tables(vec![table_of(0, 0, &[(0, 0), (1, 1)])]);
+    // DAG 1 is nested in DAG 0, and DAG 2 is a member.
+    must(&three, 1, "0 2 0: 0@0 0-2, 1@0 2-4, 0@0 4-6, 2@0 6-9", "");
+    // An inner entry whose outer one is over, or has only given way, is in its place.
+    must(&three, 1, "0 6 0: 0@0 0-4, 2@0 4-6, 1@0 6-9, 2@0 9-12", "");
+    must(&three, 1, "0 0 0: 1@0 0-4, 0@0 4-6, 2@0 6-9", "");
+    // Not before the outer one is ready.
+    let early = out_of_order("0 job 0 starts on core 0", 4, "1 job 0");
+    must(&three, 1, "4 0 9: 1@0 0-4, 0@0 4-6, 2@0 9-12", &early);
+    // It goes on at once, and nothing goes on before it has finished.
+    let passed = passed_over(2, 1, 2, "core 0 runs subtask 0 of dag 0 job 0");
+    must(&three, 1, "0 2 9: 0@0 0-4, 1@0 4-6, 2@0 9-12", &passed);
+    let inner = out_of_order("0 job 0 is resumed on core 0", 4, "1 job 0");
+    let owed = passed_over(4, 1, 2, "core 0 runs subtask 0 of dag 0 job 0");
+    let ran = "0 2 9: 0@0 0-2, 1@0 2-4, 0@0 4-6, 1@0 6-8, 2@0 9-12";
+    must(&three, 1, ran, &format!("{inner}\n{owed}"));
+    let member = out_of_order("2 job 0 starts on core 0", 2, "0 job 0");
+    let owed = passed_over(2, 0, 2, "core 0 runs subtask 0 of dag 2 job 0");
+    let ran = "0 6 0: 0@0 0-2, 2@0 2-4, 0@0 4-6, 1@0 6-9";
+    must(&three, 1, ran, &format!("{member}\n{owed}"));
 }
