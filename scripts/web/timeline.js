@@ -44,6 +44,7 @@ function prepare() {
   // How long the cores had been busy before each slice, so that the load of a pixel is a difference.
   shown.busy = new Float64Array(from.length + 1);
   for (let n = 0; n < from.length; n++) shown.busy[n + 1] = shown.busy[n] + to[n] - from[n];
+  shown.plan_reach = shown.plan_from.reduce((most, from, n) => Math.max(most, shown.plan_to[n] - from), 0);
   dags.forEach((dag, of) => {
     const first = search(0, job_dag.length, n => job_dag[n] >= of);
     const last = search(first, job_dag.length, n => job_dag[n] > of);
@@ -113,6 +114,7 @@ function draw() {
   drawAxis();
   c.save(); c.beginPath(); c.rect(left, 0, width - left, height); c.clip();
   for (let core = 0; core < state.shown.cores; core++) drawCore(core);
+  drawTables();
   drawn.forEach(drawJobs);
   drawHops();
   if (state.picked?.slices) drawPicked(state.picked);
@@ -156,6 +158,16 @@ function drawCore(core) {
     const tall = Math.max(2, HIGH * Math.min(1, (busy[next] - busy[n]) * view.scale / 2));
     if (next > n + 1) c.fillStyle = view.colour("load");
     c.fillRect(Math.floor(left), top + HIGH - tall, 2, tall);
+  }
+}
+
+// The entries of tables, in thin bars above what their cores executed; the first late one is red.
+function drawTables() {
+  const { plan_from, plan_to, plan_subtask, plan_core, plan_late, plan_reach, colours } = state.shown;
+  for (const n of inView(0, plan_from.length, n => plan_from[n], plan_reach)) {
+    c.fillStyle = plan_late[n] ? view.colour("miss") : colours[plan_subtask[n] % colours.length];
+    const width = Math.max(1, (plan_to[n] - plan_from[n]) * view.scale);
+    c.fillRect(xOf(plan_from[n]), AXIS + plan_core[n] * ROW - 2, width, plan_late[n] ? 5 : 4);
   }
 }
 

@@ -6,7 +6,7 @@
 //! - [`view`](mod@view): a run in the order of time; [`marks`]: its faults, modes and pauses;
 //! - [`findings`]: its breaches of the model's rules, and its figures; [`chains`]: its latencies
 //!   from DAG to DAG;
-//! - [`picture`]: a run drawn as [`svg`]; [`units`]: times as text.
+//! - [`picture`]: a run drawn as [`svg`], below its tables ([`planned`]); [`units`]: times as text.
 //!
 //! The crate has no I/O: the commands of `scripts/` and the page share it.
 
@@ -19,6 +19,7 @@ pub mod links;
 pub mod marks;
 pub mod notes;
 pub mod picture;
+pub mod planned;
 pub mod protocol;
 pub mod record;
 pub mod svg;

@@ -2,8 +2,8 @@
 //!
 //! At the top stands each graph: a box for each subtask with its WCET, and an arrow for each
 //! edge. Below are the first jobs on a common axis of time: a row for each core with what it
-//! executed, in the colour of its subtask, with arrows of messages between machines, and a thin bar
-//! below for each wait after that; then a row for each DAG with the response time of each job, its
+//! executed, in the colour of its subtask, above that the core's table in thin bars with the first
+//! late entry in red, arrows of messages between machines, and a thin bar below for each wait; then a row for each DAG with the response time of each job, its
 //! proven bound and its deadline.
 //!
 //! A [`Window`] says which jobs of which DAGs are drawn. Coordinates are whole pixels, so that a run
@@ -16,6 +16,7 @@ use fass_dag_file::time::parse_ns;
 use sched_dag::{CoreId, Dag, DagId, SubtaskId, nearest};
 
 use crate::links;
+use crate::planned;
 use crate::svg::Svg;
 use crate::view::View;
 
@@ -292,6 +293,7 @@ impl<'v> Picture<'v> {
                 }
             }
         }
+        self.table(y);
         for (writer, reader) in links::messages(self.view.run, true) {
             let slices = [(writer, true), (reader, false)].map(|(of, is_last)| {
                 let slices = &self.view.histories.get(&of)?.slices;
@@ -313,6 +315,25 @@ impl<'v> Picture<'v> {
             }
         }
         y + cores * ROW
+    }
+
+    /// Draws the entries of tables above the rows of cores, which begin at `y`.
+    fn table(&mut self, y: u64) {
+        let late = planned::first_late(self.view).map(|late| late.instance);
+        for of in planned::entries(self.view) {
+            let is_drawn = self.window.dags.contains(&of.instance.dag);
+            let is_after = of.to_ns < self.window.released_ns.start;
+            if !is_drawn || is_after || of.from_ns >= self.end_ns {
+                continue;
+            }
+            let (from, to) = (self.x(of.from_ns), self.x(of.to_ns.min(self.end_ns)));
+            let top = y + u64::from(of.core.0) * ROW - 2;
+            let colour = match late == Some(of.instance) {
+                true => "#c1121f",
+                false => self.colour(of.instance.dag, of.instance.subtask),
+            };
+            self.svg.rect((from, top), ((to - from).max(1), 4), colour);
+        }
     }
 
     /// Draws the response time of each job of a DAG, from `y` on, with bound and deadline.

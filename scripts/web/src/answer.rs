@@ -13,7 +13,7 @@ use views::chains::{self, MeasuredChain};
 use views::json::{Object, quoted};
 use views::record::Committed;
 use views::view::{Slice, View};
-use views::{links, marks, notes, picture};
+use views::{links, marks, notes, picture, planned};
 
 use crate::opened::Opened;
 use crate::request::{Faults, Request};
@@ -32,6 +32,7 @@ pub(crate) fn picture(opened: &Opened<'_>, request: &Request<'_>) -> Result<Vec<
     let mut columns = Columns::default();
     let firsts = slices(&view, &mut columns);
     jobs(&view, opened, &mut columns);
+    plan(&view, &mut columns);
     let is_preemptive = options.preemption == Preemption::Enabled;
     let commits = opened.commits(run);
     let clusters = commits.flat_map(|(_, commit, _)| &commit.told.clusters);
@@ -200,12 +201,35 @@ fn marks(view: &View<'_>, warnings: &mut Vec<String>) -> Vec<String> {
     told
 }
 
-/// Adds the slices; returns where those of each core begin, and where the last ones end.
-fn slices(view: &View<'_>, columns: &mut Columns) -> Vec<usize> {
+/// Adds the entries of tables.
+fn plan(view: &View<'_>, columns: &mut Columns) {
+    let all = planned::entries(view);
+    let late = planned::first_late(view).map(|late| late.instance);
+    let before = first_subtasks(view);
+    let each = || all.iter();
+    columns.times("plan_from", each().map(|of| Some(of.from_ns)));
+    columns.times("plan_to", each().map(|of| Some(of.to_ns)));
+    let subtask = |of: Instance| before[of.dag.index()] + u64::from(of.subtask.0);
+    columns.numbers("plan_subtask", each().map(|of| subtask(of.instance)));
+    columns.numbers("plan_core", each().map(|of| of.core.0.into()));
+    columns.bytes(
+        "plan_late",
+        each().map(|of| u8::from(late == Some(of.instance))),
+    );
+}
+
+/// Returns the number of the subtasks of the DAGs before each one.
+fn first_subtasks(view: &View<'_>) -> Vec<u64> {
     let mut before = vec![0];
     for dag in view.run.task_set.dags() {
         before.push(before[before.len() - 1] + dag.subtasks().len() as u64);
     }
+    before
+}
+
+/// Adds the slices; returns where those of each core begin, and where the last ones end.
+fn slices(view: &View<'_>, columns: &mut Columns) -> Vec<usize> {
+    let before = first_subtasks(view);
     let mut all = Vec::new();
     for (&instance, history) in &view.histories {
         let slices = history.slices.iter().enumerate();
