@@ -77,10 +77,14 @@ pub struct TableEntry {
 impl Table {
     /// Returns the DAGs, ascending.
     pub fn dags(&self) -> Vec<DagId> {
-        let entries = self.lists.iter().flat_map(|list| &list.entries);
-        let mut dags = sorted(&entries.map(|entry| entry.dag).collect::<Vec<_>>());
+        let mut dags = sorted(&self.entries().map(|entry| entry.dag).collect::<Vec<_>>());
         dags.dedup();
         dags
+    }
+
+    /// Returns the entries of all lists.
+    pub fn entries(&self) -> impl Iterator<Item = &TableEntry> {
+        self.lists.iter().flat_map(|list| &list.entries)
     }
 
     /// Returns the list of a core of the cluster.

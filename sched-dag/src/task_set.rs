@@ -155,7 +155,8 @@ impl TaskSet {
     }
 
     /// Has these tables enforced, which are of whole DAGs and in the cores' range.
-    pub(crate) fn set_tables(&mut self, tables: Vec<Table>) {
+    #[doc(hidden)]
+    pub fn set_tables(&mut self, tables: Vec<Table>) {
         self.tables = tables.into();
     }
 

@@ -59,7 +59,7 @@ use alloc::vec::Vec;
 
 use super::instances::make_ready;
 use super::key::DispatchKey;
-use super::vertices::{InstancePhase, Successors};
+use super::vertices::{EndKind, InstancePhase, Successors};
 use super::{OWED, Scheduler};
 use crate::ids::{CoreId, Instance, Vertex};
 use crate::journal::EventKind;
@@ -132,15 +132,15 @@ impl Scheduler {
     #[inline]
     pub(super) fn give(&mut self, core: CoreId, key: DispatchKey) -> Decision {
         let vertex = self.vertices.get_mut(key.vertex());
-        let instance = vertex.present_instance();
-        // The phase still tells whether the instance has started: `Running` overwrites it below.
-        let what = match vertex.phase {
-            InstancePhase::Preempted => EventKind::Resume,
-            _ => EventKind::Start,
-        };
-        vertex.phase = InstancePhase::Running(core);
-        (self.cores).run(core, key, vertex.yields_to_the_unpinned());
-        Decision::new(what, core, instance)
+        (self.cores).run(core, key, vertex.yields_to_members());
+        vertex.run(core)
+    }
+
+    /// Gives a core to the innermost entry that has begun there.
+    #[inline]
+    pub(super) fn give_to_entry(&mut self, core: CoreId, entry: u32) -> Decision {
+        self.cores.run(core, ENTRY, false);
+        self.vertices.get_mut(entry).run(core)
     }
 
     /// Puts the instance that runs on a core back in line.
@@ -148,11 +148,10 @@ impl Scheduler {
     pub(super) fn preempt(&mut self, core: CoreId, running: DispatchKey) {
         let vertex = self.vertices.get_mut(running.vertex());
         vertex.phase = InstancePhase::Preempted;
-        let (line, instance) = (vertex.line, vertex.present_instance());
-        let decision = Decision::new(EventKind::Suspend, core, instance);
+        let decision = Decision::new(EventKind::Suspend, core, vertex.present_instance());
         self.decisions.push(decision);
         // With the key that it had: a preempted instance keeps its place in the order.
-        self.ready.insert(line, running);
+        self.ready.insert(vertex, running);
     }
 }
 
@@ -203,7 +202,8 @@ impl Scheduler {
             return (self.end_later(now_ns, core, vertex), Unwritten::Nothing);
         }
         let mut unwritten = Unwritten::Nothing;
-        if ending.only_passes_on && is_quiet {
+        let ends = ending.ends;
+        if ends == EndKind::PassesOn && is_quiet {
             let (ready, others) = self.vertices.pass_on(vertex.0);
             match ready {
                 // The end made nothing ready, so only what was in line before can take the core.
@@ -221,6 +221,13 @@ impl Scheduler {
                 // Several, or others in line: only their keys tell which is first.
                 Some(next) => self.line_up_all((core, vertex, now_ns), next, others),
             }
+        } else if ends == EndKind::PassesOnInTable
+            && is_quiet
+            && let Some(next) = self.ready.lists.hop(core)
+        {
+            self.vertices.hand_over(vertex.0, next, core);
+            let done = self.hand_off(core, (next, EventKind::Start));
+            return (done, Unwritten::FinishAndReady);
         } else {
             self.write_finish(core, vertex, now_ns);
             self.end_instance(vertex.0);
@@ -228,18 +235,17 @@ impl Scheduler {
         // The core takes one of the new instances; a second one may concern another core. (The
         // module says why one cannot.)
         let concerns_others = self.cores.count() > 1
-            && match self.fresh {
-                0 => false,
-                1 => self.ready.latest_concerns_others(core),
-                _ => true,
-            };
+            && self.fresh > 0
+            && (self.ready).concern_others(self.fresh, core, || {
+                !self.vertices.get(vertex.0).is_preemptible
+            });
         if concerns_others || self.log.now_ns >= self.quiet_until_ns {
             debug_assert!(unwritten == Unwritten::Nothing, "a finish is all there is");
             return (self.leave_open(core, vertex), Unwritten::Nothing);
         }
         // The dispatch is made here: what is in line preempts nobody.
         self.fresh = 0;
-        if let Some(first) = self.give_first(core) {
+        if let Some(first) = self.give_first(core, vertex.0) {
             return (self.hand_off(core, first), unwritten);
         }
         if unwritten == Unwritten::Finish {
@@ -288,6 +294,7 @@ impl Scheduler {
         // The core that became idle last is taken first, so the dispatch that follows gives it the
         // first in line.
         self.cores.free(core);
+        self.ready.lists.end(core, ended.0);
         self.fresh |= OWED;
         HandOff::Open
     }
@@ -300,7 +307,7 @@ impl Scheduler {
             self.dags[next.dag.index()].jobs.job(next.progress)
         });
         next.phase = InstancePhase::Running(core);
-        (self.cores).run(core, key, next.yields_to_the_unpinned());
+        (self.cores).run(core, key, next.yields_to_members());
     }
 
     /// Writes down that a core has finished the instance of a vertex, and puts an instance in line
@@ -339,9 +346,24 @@ impl Scheduler {
         }
     }
 
-    /// Gives a core the first in line: a vertex, and whether that starts or goes on.
+    /// Gives a core, where the instance of a vertex has ended, the first in line: a vertex, and
+    /// whether that starts or goes on.
     #[inline(always)]
-    pub(super) fn give_first(&mut self, core: CoreId) -> Option<(u32, EventKind)> {
+    pub(super) fn give_first(&mut self, core: CoreId, ended: u32) -> Option<(u32, EventKind)> {
+        if !self.ready.is_one_line() {
+            return self.give_first_apart(core, ended);
+        }
+        let key = self.ready.pop()?;
+        Some((key.vertex(), self.give(core, key).what))
+    }
+
+    /// Not a part of its callers, as most sets have one line.
+    #[inline(never)]
+    fn give_first_apart(&mut self, core: CoreId, ended: u32) -> Option<(u32, EventKind)> {
+        self.ready.lists.end(core, ended);
+        if let Some(entry) = self.follow(core) {
+            return Some((entry, self.give_to_entry(core, entry).what));
+        }
         let key = self.ready.pop_for(core)?;
         Some((key.vertex(), self.give(core, key).what))
     }
@@ -354,11 +376,14 @@ pub(super) struct CoreTable {
     idle: Vec<CoreId>,
 }
 
+/// Stands for the key of the innermost entry that has begun on a core.
+pub(super) const ENTRY: DispatchKey = DispatchKey::of_rank(0, u32::MAX - 1);
+
 #[derive(Clone, Copy, Debug, Hash)]
 struct CoreOccupancy {
     /// The key of what runs, if anything does.
     key: DispatchKey,
-    /// For an instance that is not pinned.
+    /// For a member of the core's group.
     may_be_preempted: bool,
 }
 

@@ -5,10 +5,10 @@
 //! are released at that instant (R3), so such a job ends by the same rules as
 //! any other, only without running.
 
+use super::groups::ReadyLines;
 use super::jobs::Job;
 use super::jobs::TimerKind;
-use super::pins::ReadyLines;
-use super::vertices::{InstancePhase, Vertex, VertexTable};
+use super::vertices::{EndKind, InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
@@ -41,6 +41,7 @@ impl Scheduler {
         match vertex.phase {
             InstancePhase::Running(core) if in_flight => {
                 self.cores.free(core);
+                self.ready.lists.end(core, number);
                 // The core is idle until a dispatch; the short way must not be taken before.
                 self.fresh |= OWED;
             }
@@ -50,7 +51,7 @@ impl Scheduler {
                 // No vertex keeps its key: it is absolute, so it comes out as when it was put in
                 // line.
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
-                self.ready.remove(vertex.line, key);
+                self.ready.remove(vertex, key);
             }
             _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
         }
@@ -88,6 +89,7 @@ impl Scheduler {
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
         self.cancel_waits(dag, sequence);
+        self.touch_lists();
         let state = &self.dags[dag.index()];
         // In topological order each vertex is looked at after its predecessors, so none becomes
         // ready behind the loop's back.
@@ -95,12 +97,12 @@ impl Scheduler {
             let number = self.task_set.first_vertex(dag) + subtask.0;
             let vertex = self.vertices.get_mut(number);
             // From now on an end has to ask whether its job is cut, which the short way does not.
-            vertex.only_passes_on = false;
+            vertex.ends = EndKind::Any;
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == InstancePhase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 let key = self.ready.key(number, vertex, || job);
-                self.ready.remove(vertex.line, key);
+                self.ready.remove(vertex, key);
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = InstancePhase::Absent;
@@ -280,7 +282,7 @@ pub(super) fn make_ready<'j>(
     log: &mut EventLog,
 ) {
     vertex.phase = InstancePhase::Ready;
-    ready.insert(vertex.line, ready.key(number, vertex, job));
+    ready.insert(vertex, ready.key(number, vertex, job));
     // No driver hears of it: the short way leaves it to the driver to write it down.
     log.on_this(EventKind::Ready, log.now_ns, vertex.present_instance());
 }

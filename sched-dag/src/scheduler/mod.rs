@@ -38,14 +38,15 @@
 
 mod bits;
 mod dispatch;
+mod groups;
 mod instances;
 mod jobs;
 mod key;
+mod lists;
 mod log;
 mod moment;
 mod overrun;
 mod phase;
-mod pins;
 mod ready_queue;
 mod signals;
 mod timers;
@@ -62,9 +63,9 @@ use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
 use crate::journal::EventKind;
 use crate::policies::SchedulerOptions;
 use crate::scheduler::dispatch::CoreTable;
+use crate::scheduler::groups::ReadyLines;
 use crate::scheduler::jobs::JobTable;
 use crate::scheduler::phase::SurvivedFaults;
-use crate::scheduler::pins::ReadyLines;
 use crate::scheduler::timers::Timers;
 use crate::scheduler::vertices::VertexTable;
 use crate::scheduler::waits::WaitTable;
@@ -251,8 +252,8 @@ impl Scheduler {
     /// If there is no such core.
     #[inline]
     pub fn running(&self, core: CoreId) -> Option<Instance> {
-        let key = self.cores.running(core)?;
-        Some(self.vertices.get(key.vertex()).present_instance())
+        let vertex = self.runs(core)?;
+        Some(self.vertices.get(vertex).present_instance())
     }
 
     /// Reports whether every DAG [is over](Self::is_over), and every skip is told of.

@@ -179,5 +179,6 @@ impl Scheduler {
         state.statistics.skips += 1;
         self.log
             .of_job(EventKind::Skipped, dag, job, Some(release_ns));
+        self.touch_lists();
     }
 }

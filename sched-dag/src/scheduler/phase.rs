@@ -331,6 +331,7 @@ impl Scheduler {
             self.tell_skip(dag);
             self.tell_skips();
         }
+        self.touch_lists();
         self.set_timer(dag);
     }
 

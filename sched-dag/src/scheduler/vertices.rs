@@ -24,9 +24,12 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::Decision;
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
+use crate::journal::EventKind;
 use crate::policy::Preemption;
+use crate::table::Table;
 use crate::task_set::TaskSet;
 
 /// The phase of a subtask's next instance.
@@ -44,26 +47,19 @@ pub(super) enum InstancePhase {
     Waiting,
 }
 
-/// The line that a subtask's instances come into: its core's, its group's, or the cluster's.
-///
-/// That of a core is twice the core; that of a group twice the first core of the group, and 1.
+/// The line that a subtask's instances come into: its group's, which has the number of the group's
+/// first core, or the cluster's; or none, if a table has the DAG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct LineId(pub(super) u16);
 
 impl LineId {
     pub(super) const CLUSTER: Self = Self(u16::MAX);
+    pub(super) const TABLE: Self = Self(u16::MAX - 1);
 
-    fn new(pin: Option<u32>, affinity: &[u32]) -> Self {
-        match (pin, affinity) {
-            (Some(core), _) => Self::of_core(CoreId(core)),
-            (None, [first, ..]) => Self(Self::of_core(CoreId(*first)).0 + 1),
-            (None, []) => Self::CLUSTER,
-        }
-    }
-
-    #[inline]
-    pub(super) fn of_core(core: CoreId) -> Self {
-        Self(2 * u16::try_from(core.0).expect("verified to be in range"))
+    pub(super) fn new(affinity: &[u32]) -> Self {
+        affinity.first().map_or(Self::CLUSTER, |first| {
+            Self(u16::try_from(*first).expect("verified to be in range"))
+        })
     }
 
     #[inline]
@@ -71,13 +67,22 @@ impl LineId {
         self == Self::CLUSTER
     }
 
-    /// Returns the core that it is of.
     #[inline]
-    pub(super) fn core(self) -> Option<CoreId> {
-        self.0
-            .is_multiple_of(2)
-            .then(|| CoreId(u32::from(self.0) / 2))
+    pub(super) fn is_table(self) -> bool {
+        self == Self::TABLE
     }
+}
+
+/// What has to be done at the end of an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum EndKind {
+    /// Anything.
+    Any,
+    /// The end is told to its successors and to nobody else: it has some, its job is the only one
+    /// in flight, and is not cut.
+    PassesOn,
+    /// Likewise, in a table.
+    PassesOnInTable,
 }
 
 /// One subtask, in one cache line.
@@ -95,9 +100,7 @@ pub(super) struct Vertex {
     pub(super) subtask: SubtaskId,
     /// Whether a started instance may lose its core.
     pub(super) is_preemptible: bool,
-    /// Whether the end of its instance is told to its successors and to nobody else:
-    /// it has some, its job is the only one in flight, and is not cut.
-    pub(super) only_passes_on: bool,
+    pub(super) ends: EndKind,
     pub(super) line: LineId,
     /// The initial value of a counter.
     initial: u32,
@@ -163,8 +166,8 @@ impl VertexTable {
                     subtask,
                     is_preemptible: preemption == Preemption::Enabled
                         && !attributes.is_non_preemptive(),
-                    only_passes_on: false,
-                    line: LineId::new(attributes.core(), dag.affinity()),
+                    ends: EndKind::Any,
+                    line: LineId::new(dag.affinity()),
                     initial,
                     counter: initial,
                     counters: to_u32(counters.len()),
@@ -181,6 +184,10 @@ impl VertexTable {
         all.vertices = vertices.into_boxed_slice();
         all.successors = successors.into_boxed_slice();
         all.counters = counters.into_boxed_slice();
+        for entry in task_set.tables().iter().flat_map(Table::entries) {
+            let vertex = task_set.first_vertex(entry.dag) + entry.subtask.0;
+            all.vertices[vertex as usize].line = LineId::TABLE;
+        }
         // No job is cut yet.
         all.allow_passing_on(0..all.vertices.len());
         all
@@ -209,7 +216,11 @@ impl VertexTable {
             let [from, to] = vertex.successors;
             // With one slot no next job can wait for this vertex, and only the end of a sink can be
             // the end of the job: with successors, neither has to be looked at.
-            vertex.only_passes_on = vertex.slot_mask == 0 && from < to;
+            vertex.ends = match vertex.slot_mask == 0 && from < to {
+                true if vertex.line.is_table() => EndKind::PassesOnInTable,
+                true => EndKind::PassesOn,
+                false => EndKind::Any,
+            };
         }
     }
 
@@ -227,7 +238,7 @@ impl VertexTable {
         ended
     }
 
-    /// Ends the instance of a vertex that [only passes on](Vertex::only_passes_on), and tells its
+    /// Ends the instance of a vertex that [only passes on](EndKind::PassesOn), and tells its
     /// successors up to the first that is ready by that. The others are still to be told.
     #[inline(always)]
     pub(super) fn pass_on(&mut self, vertex: u32) -> (Option<u32>, Successors) {
@@ -238,6 +249,20 @@ impl VertexTable {
         own.counter = own.initial;
         let mut successors = Successors { job, next, end };
         (self.next_ready(&mut successors), successors)
+    }
+
+    /// Ends the instance of a vertex that [only passes on](EndKind::PassesOn), to one that waits
+    /// for it alone and takes its core.
+    #[inline(always)]
+    pub(super) fn hand_over(&mut self, vertex: u32, next: u32, core: CoreId) {
+        let own = &mut self.vertices[vertex as usize];
+        let job = own.job;
+        own.phase = InstancePhase::Absent;
+        own.progress += 1;
+        own.counter = own.initial;
+        // Its counter would be counted down and set again.
+        let next = &mut self.vertices[next as usize];
+        (next.phase, next.job) = (InstancePhase::Running(core), job);
     }
 
     /// Tells successors, of one slot each, up to the first that is ready by that.
@@ -294,10 +319,22 @@ impl VertexTable {
 }
 
 impl Vertex {
-    /// Reports whether an instance that is not pinned may take its core from it.
+    /// Reports whether an instance of a group may take its core from it.
     #[inline]
-    pub(super) fn yields_to_the_unpinned(&self) -> bool {
-        self.is_preemptible && self.line.core().is_none()
+    pub(super) fn yields_to_members(&self) -> bool {
+        self.is_preemptible && !self.line.is_table()
+    }
+
+    /// Has a core begin or continue its instance.
+    #[inline]
+    pub(super) fn run(&mut self, core: CoreId) -> Decision {
+        // The phase still tells whether the instance has started.
+        let what = match self.phase {
+            InstancePhase::Preempted => EventKind::Resume,
+            _ => EventKind::Start,
+        };
+        self.phase = InstancePhase::Running(core);
+        Decision::new(what, core, self.present_instance())
     }
 
     /// Returns the vertex's part of a job.

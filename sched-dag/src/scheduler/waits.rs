@@ -137,9 +137,8 @@ impl Scheduler {
         let waiting = self.vertices.get_mut(vertex.0);
         let job = self.dags[waiting.dag.index()].jobs.job(waiting.progress);
         let is_alone = self.fresh == 0 && instant_ns < self.quiet_until_ns && job.cut.is_none();
-        // One that is not pinned might go on with another core then.
-        let own = self.ready.peek_own(core);
-        let is_alone = is_alone && (own.is_none() || waiting.line.core().is_some());
+        // What keeps its core keeps it from the entries of its list, until now.
+        let is_alone = is_alone && (waiting.is_preemptible || !self.ready.lists.has(core));
         if !is_alone || waiting.phase != InstancePhase::Running(core) {
             return None;
         }
@@ -166,9 +165,9 @@ impl Scheduler {
             waiting.phase = InstancePhase::Preempted;
             self.log.on_this(EventKind::Wait, now_ns, instance);
             self.log.of_instance(EventKind::Wake, instance);
-            self.ready.insert(waiting.line, key);
+            self.ready.insert(waiting, key);
         }
-        let Some(first) = self.give_first(core) else {
+        let Some(first) = self.give_first(core, vertex.0) else {
             self.cores.free(core);
             return Some(HandOff::Idle);
         };
@@ -255,7 +254,7 @@ impl Scheduler {
         vertex.phase = InstancePhase::Preempted;
         let job = self.dags[vertex.dag.index()].jobs.job(vertex.progress);
         let key = self.ready.key(number, vertex, || job);
-        self.ready.insert(vertex.line, key);
+        self.ready.insert(vertex, key);
         self.log.of_instance(EventKind::Wake, vertex.instance(job));
         self.fresh += 1;
     }

@@ -334,6 +334,27 @@ impl JobTable {
         }
     }
 
+    /// Returns the first job from this number on that is in flight or still may be.
+    pub(super) fn next_open(&self, dag: &Dag, number: i64) -> Option<u64> {
+        let from = u64::try_from(number).unwrap_or(0);
+        let mut in_flight = (self.oldest..self.next).map(|sequence| self.job(sequence).number);
+        in_flight.find(|open| *open >= from).or_else(|| {
+            let next = from.max(self.first_waiting);
+            let has_limit = dag.jobs().is_some_and(|jobs| next >= jobs);
+            (!self.is_closed() && !has_limit).then_some(next)
+        })
+    }
+
+    /// Reports whether the instance of a job with this number may start, now or later, of a vertex
+    /// that has come so far and has not started it.
+    pub(super) fn may_start(&self, dag: &Dag, number: i64, progress: u64) -> bool {
+        let is_open = self.next_open(dag, number).map(u64::cast_signed) == Some(number);
+        let is_it = |sequence: &u64| self.job(*sequence).number.cast_signed() == number;
+        let sequence = (self.oldest..self.next).find(is_it);
+        let has_instance = |sequence| progress <= sequence && self.job(sequence).cut.is_none();
+        is_open && sequence.is_none_or(has_instance)
+    }
+
     /// Returns the sequence number of the oldest job in flight that is not cut.
     #[inline]
     pub(super) fn oldest_uncut(&self) -> Option<u64> {
