@@ -171,4 +171,4 @@ pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::turn::WaitFault;
 pub use run::waiting::{sleep, until};
-pub use sched_dag::{FaultLimit, OverrunPolicy, Policy, Preemption, SubtaskOrder};
+pub use sched_dag::{FaultLimit, OverrunPolicy, Policy, Preemption};

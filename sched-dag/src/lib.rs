@@ -122,6 +122,7 @@ mod request;
 mod scheduler;
 mod spec;
 mod table;
+mod table_times;
 mod task_set;
 mod topic;
 mod verify;
@@ -151,7 +152,7 @@ pub use table::{CoreList, Table, TableEntry};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{
-    CommitOptions, ConstructionPolicy, CountLimit, DagFault, DagLabel, MAX_ARITY, MOST_FAULTS,
-    OverflowingTime, RejectedDags, SubtaskLabel, TopicSide, VerifiedDags, Warning, verify,
-    write_faults,
+    CommitOptions, ConstructionPolicy, CountLimit, DagFault, DagLabel, ListFault, MAX_ARITY,
+    MOST_FAULTS, OverflowingTime, RejectedDags, SubtaskLabel, TopicSide, VerifiedDags, Warning,
+    verify, write_faults,
 };

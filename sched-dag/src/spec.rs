@@ -36,8 +36,8 @@ pub struct DagSpec {
     pub order: SubtaskOrder,
     /// The cluster whose cores run it; `None` where they are not divided.
     pub cluster: Option<ClusterId>,
-    /// The cores of its cluster that execute those of its subtasks that state none, counted from
-    /// 0; empty: all. DAGs of a cluster have the same ones, or none in common.
+    /// The cores of its cluster that execute it, counted from 0; empty: all. DAGs of a cluster
+    /// have the same ones, or none in common. A DAG with a list of a core has none.
     pub affinity: Vec<u32>,
     /// The number of jobs to release; `None`: without end.
     pub jobs: Option<u64>,
@@ -166,7 +166,8 @@ pub struct SubtaskSpec {
     pub budget_ns: Option<u64>,
     /// The stack that it needs, in bytes, of [`STACK_BYTES`]; `None`: the driver's choice.
     pub stack_bytes: Option<u64>,
-    /// The core of its cluster that alone executes it, counted from 0; `None`: any.
+    /// To be removed.
+    #[doc(hidden)]
     pub core: Option<u32>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,

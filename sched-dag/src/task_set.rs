@@ -550,17 +550,16 @@ impl TaskSet {
 
     /// Returns the cores that may execute a DAG, ascending, on a machine of `all`.
     pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
-        let dag = self.dag(dag);
-        let cluster = self.cores_of(dag.cluster(), all);
-        let is_its = |core: &u32| {
-            let within = Some(core - cluster.start);
-            let is_pinned = dag.subtasks.iter().any(|subtask| subtask.core() == within);
-            let is_free = dag.subtasks.iter().any(|subtask| subtask.core().is_none());
-            let affinity = dag.affinity();
-            is_pinned
-                || is_free && (affinity.is_empty() || affinity.iter().any(|of| Some(*of) == within))
-        };
-        cluster.clone().filter(is_its).collect()
+        let cluster = self.cores_of(self.dag(dag).cluster(), all);
+        let lists = self.table_of(dag).map_or(&[][..], |table| &table.lists);
+        // No DAG has both.
+        let stated = lists.iter().map(|list| &list.core);
+        let stated = stated.chain(self.dag(dag).affinity());
+        let stated: Vec<u32> = stated.map(|core| cluster.start + core).collect();
+        match stated[..] {
+            [] => cluster.collect(),
+            _ => stated,
+        }
     }
 
     /// Reports whether the cores are divided into clusters.

@@ -7,6 +7,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use fass::commit::{Commit, CommitError, ConstructionPolicy, finish_create_dags_in_order};
 use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fass_dag_file::{Execution, FileDag, Length, Set};
 use random::nth;
@@ -54,6 +55,16 @@ pub fn build(set: &Set, settings: &Settings) -> Vec<Dag> {
         .collect()
 }
 
+/// Builds and commits the DAGs of a set, with its lists of cores.
+///
+/// # Errors
+///
+/// The faults of the commit.
+pub fn commit(set: &Set, settings: &Settings) -> Result<Commit, CommitError> {
+    let dags = build(set, settings);
+    finish_create_dags_in_order(&dags, ConstructionPolicy::any_graph(), &set.core_lists())
+}
+
 fn build_dag(
     described: &FileDag,
     settings: &Settings,
@@ -67,7 +78,6 @@ fn build_dag(
         .relative_deadline(time(spec.relative_deadline_ns))
         .offset(time(Some(spec.offset_ns)))
         .overrun(spec.overrun)
-        .order(spec.order)
         .affinity(&spec.affinity)
         .jobs(settings.length.jobs(spec));
     if let Some(jobs) = spec.in_flight {
@@ -92,9 +102,6 @@ fn build_dag(
             }
             if let Some(priority) = subtask.priority {
                 attributes = attributes.priority(priority.0);
-            }
-            if let Some(core) = subtask.core {
-                attributes = attributes.core(core);
             }
             if subtask.non_preemptive {
                 attributes = attributes.non_preemptive();
@@ -149,7 +156,6 @@ fn register(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fass::commit::{ConstructionPolicy, finish_create_dags_with};
     use fass_dag_file::parse;
     use virtual_time::VirtualTime;
 
@@ -182,8 +188,7 @@ mod tests {
             };
             let late = Duration::from_nanos(grid_ns / 10);
             let machine = VirtualTime::new().cores(2).late(late, 1);
-            let dags = build(&parse(TEXT).unwrap().sets[0], &settings);
-            finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+            commit(&parse(TEXT).unwrap().sets[0], &settings).unwrap();
             let report = machine.run();
             assert_eq!(report.violations(), []);
             let responses = report.jobs.iter().map(|job| job.response_time_ns());

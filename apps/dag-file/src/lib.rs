@@ -16,4 +16,4 @@ extern crate alloc;
 mod build;
 mod times;
 
-pub use build::{Settings, build};
+pub use build::{Settings, build, commit};

@@ -12,9 +12,9 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use dag_file::{Settings, build};
+use dag_file::{Settings, commit};
 use fass::Occupation;
-use fass::commit::{ConstructionPolicy, DagAnswer, finish_create_dags_with};
+use fass::commit::DagAnswer;
 use fass_dag_file::{DagFile, Execution, Length, check, parse};
 use kernel::options::UsageError;
 use kernel::{AppError, Machine, println};
@@ -53,15 +53,17 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     let file = read(machine, wishes.settings.length)?;
     let mut reports = Vec::new();
     for set in &file.sets {
-        let dags = build(set, &wishes.settings);
         // What is wrong with the DAGs is wrong with the file that we were given.
-        let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph())
-            .map_err(|error| usage(format!("DAG file: {error}")))?;
+        let commit =
+            commit(set, &wishes.settings).map_err(|error| usage(format!("DAG file: {error}")))?;
         for warning in commit.warnings() {
             println!("warning: {warning}");
         }
-        let is_placed = |answer: &&DagAnswer| answer.cluster.as_ref()?.why;
-        for answer in (commit.answers().iter()).filter(|answer| is_placed(answer).is_some()) {
+        let is_placed = |answer: &&DagAnswer| {
+            let is_chosen = answer.cluster.as_ref().is_some_and(|of| of.why.is_some());
+            is_chosen || answer.table.is_some()
+        };
+        for answer in commit.answers().iter().filter(is_placed) {
             println!("{answer}");
         }
         let run = match wishes.settings.grid_ns {

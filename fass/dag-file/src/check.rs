@@ -31,7 +31,8 @@ pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), V
     let specs: Vec<DagSpec> = specs.collect();
     let options = machine
         .clone()
-        .with_construction(ConstructionPolicy::any_graph());
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_lists(&set.core_lists());
     let Err(rejected) = verify(&specs, &options) else {
         return Ok(());
     };
@@ -68,7 +69,6 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
         }),
         DagFault::WcetExceedsDeadline { dag, subtask, .. }
         | DagFault::TooManyWaits { dag, subtask, .. }
-        | DagFault::CoreOutOfRange { dag, subtask, .. }
         | DagFault::ZeroSinkDeadline { dag, sink: subtask }
         | DagFault::SinkDeadlineBeyondDag {
             dag, sink: subtask, ..
@@ -99,6 +99,13 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
         | DagFault::AffinityOutOfRange { dag, .. }
         | DagFault::AffinitiesOverlap { dag, .. }
         | DagFault::PrioritiesExhausted { dag } => set.dags.get(dag.id.index()).map(|dag| dag.line),
+        DagFault::CoreList { list, .. } => {
+            let mut lists = set.lists.iter();
+            let is_it = |text: &str| text.split(':').next() == Some(list);
+            // Of two of one core the later one is too many.
+            let found = lists.rfind(|(_, text)| is_it(text));
+            found.map(|(line, _)| *line)
+        }
         _ => None,
     };
     line.unwrap_or(1)
@@ -145,9 +152,10 @@ period 9ms\nsubtask a wcet 1ms deadline 5ms\nsubtask b wcet 1ms deadline 0ns\ned
   line 3: subtask `b` of dag `x` has a WCET of 1ms, longer than the relative deadline of 0ns;
 period 9ms\nsubtask c wcet 1ms deadline 10ms
   line 2: subtask `c` of dag `x` has a relative deadline of 10ms, longer than its DAG's
-period 9ms affinity 0,2\nsubtask a wcet 1ms\nsubtask b wcet 1ms core 2
+period 9ms affinity 0,2\nsubtask a wcet 1ms
   line 1: dag `x` has an affinity to core 2, and its cluster has 2, counted from 0; state one
-  line 3: subtask `b` of dag `x` is pinned to core 2, and
+period 9ms\nsubtask a wcet 1ms\nsubtask b wcet 1ms\ncore 0: x.a x.b\ncore 1: x.b
+  line 4: the list of core 0: `x.b#0` stands twice
 period 9ms affinity 0\nsubtask a wcet 1ms\ndag y period 9ms\nsubtask a wcet 1ms
   line 3: dag `x` and dag `y` share core 0 and not all others
 period 9ms\nsubtask a wcet 1ms\ndag y period 9ms jobs 0\nsubtask a wcet 1ms

@@ -23,6 +23,15 @@ pub struct Set {
     pub name: String,
     /// The DAGs, at least one.
     pub dags: Vec<FileDag>,
+    /// The lists of cores, each with its line.
+    pub lists: Vec<(usize, String)>,
+}
+
+impl Set {
+    /// Returns the lists of cores.
+    pub fn core_lists(&self) -> Vec<&str> {
+        self.lists.iter().map(|(_, list)| list.as_str()).collect()
+    }
 }
 
 /// One DAG.

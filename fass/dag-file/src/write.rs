@@ -5,7 +5,7 @@
 
 use core::fmt::{Display, Formatter, Result};
 
-use sched_dag::{OverrunPolicy, SubtaskOrder, SubtaskSpec};
+use sched_dag::{OverrunPolicy, SubtaskSpec};
 
 use crate::file::{DagFile, FileDag, FileSubtask, sample_len};
 use crate::time::Time;
@@ -18,6 +18,9 @@ impl Display for DagFile {
             }
             for dag in &set.dags {
                 write_dag(dag, out)?;
+            }
+            for (_, list) in &set.lists {
+                writeln!(out, "{list}")?;
             }
         }
         writeln!(out, "end")
@@ -48,9 +51,6 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
         OverrunPolicy::Queue => {}
         OverrunPolicy::Skip => out.write_str(" overrun skip")?,
         OverrunPolicy::Abort => out.write_str(" overrun abort")?,
-    }
-    if spec.order == SubtaskOrder::Fixed {
-        out.write_str(" order fixed")?;
     }
     if let Some(jobs) = spec.in_flight {
         write!(out, " in-flight {jobs}")?;
@@ -84,9 +84,6 @@ fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>
     }
     if let Some(priority) = spec.priority {
         write!(out, " priority {}", priority.0)?;
-    }
-    if let Some(core) = spec.core {
-        write!(out, " core {core}")?;
     }
     if spec.non_preemptive {
         out.write_str(" non-preemptive")?;

@@ -297,13 +297,13 @@ crate::recordable! {
         /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
         /// of the segment that follows, if it is stated.
         pub waits: Vec<(u32, u32, u64, Option<u64>)>,
-        /// The subtasks that are pinned: DAG and subtask, and the core of their cluster. Since
-        /// version 7 of the format.
+        /// The subtasks that are pinned: DAG and subtask, and the core of their cluster. In versions
+        /// 7 to 9 of the format only.
         pub pins: Vec<(u32, u32, u32)>,
-        /// The affinities: a DAG, and one of the cores of its cluster that alone execute what of it is
-        /// not pinned. Since version 7, too.
+        /// The affinities: a DAG, and one of the cores of its cluster that alone execute it. Since
+        /// version 7, too.
         pub affinities: Vec<(u32, u32)>,
-        /// A move to another core takes so much, where subtasks are pinned. Since version 7, too.
+        /// A move to another core takes so much, where cores are told apart. Since version 7, too.
         pub move_ns: u64,
         /// By DAG, which test gave its bound, or why there is none. Since version 8.
         pub answers: Vec<String>,
@@ -313,6 +313,8 @@ crate::recordable! {
         /// The longest interrupt of a device, and the least time from one to the next; 0: there is
         /// none. Since version 9.
         pub device_ns: [u64; 2],
+        /// The lists of cores, by the numbers of DAGs and subtasks, with times. Since version 10.
+        pub lists: Vec<String>,
     }
 
     /// A DAG of a [`Commit`].

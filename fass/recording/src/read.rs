@@ -203,15 +203,16 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 8 it ends before the device, in version 7 before the answers and locks, in
-                // version 6 before the pins, and in version 5 before the waits: all that follows is 0.
+                // In version 9 it ends before the lists, in version 8 before the device, in version 7
+                // before the answers and locks, in version 6 before the pins, and in version 5 before
+                // the waits: all that follows is 0.
                 let of_before = |lacks: usize| {
-                    let bytes = [payload, &[0; 44][..lacks]].concat();
+                    let bytes = [payload, &[0; 48][..lacks]].concat();
                     Commit::from_bytes(&bytes).ok()
                 };
                 let commit = Commit::from_bytes(payload);
                 let commit = commit.or_else(|wrong| {
-                    [16, 24, 40, 44]
+                    [4, 20, 28, 44, 48]
                         .into_iter()
                         .find_map(of_before)
                         .ok_or(wrong)

@@ -34,8 +34,8 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 /// no [waits](Commit::waits) and no [answers](crate::Role::Answer); those before 7 no
 /// [pins](Commit::pins) and [affinities](Commit::affinities); those before 8 no
 /// [answers](Commit::answers) and [locks](Commit::locks); those before 9 no
-/// [device](Commit::device_ns).
-pub const VERSION: u16 = 9;
+/// [device](Commit::device_ns); those before 10 no [lists](Commit::lists), and later ones no pins.
+pub const VERSION: u16 = 10;
 
 /// The kinds of frames.
 pub(super) const HEADER: u8 = 1;

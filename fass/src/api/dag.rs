@@ -13,7 +13,7 @@ use alloc::rc::Rc;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
-use sched_dag::{ClusterId, DagId, DagKey, OverrunPolicy, SubtaskOrder, TaskSet};
+use sched_dag::{ClusterId, DagId, DagKey, OverrunPolicy, TaskSet};
 
 use super::topics::{self, Topics};
 use crate::draft::DagDraft;
@@ -93,14 +93,6 @@ impl Dag {
         self
     }
 
-    /// Lets the commit fix the order in which subtasks use the cores, where that proves a
-    /// shorter response time.
-    #[track_caller]
-    pub fn order(&self, order: SubtaskOrder) -> &Self {
-        self.open().spec.order = order;
-        self
-    }
-
     /// Puts the DAG into a cluster, on whose cores alone it runs; they are counted from 0.
     /// Where the machine's cores are divided, each DAG is to be in one.
     ///
@@ -128,8 +120,8 @@ impl Dag {
         self
     }
 
-    /// Lets only these cores of its cluster, counted from 0, execute those of its subtasks that are
-    /// not [pinned](crate::SubtaskAttributes::core); in any order, and none means all, as without it.
+    /// Lets only these cores of its cluster, counted from 0, execute it; in any order, and none
+    /// means all, as without it.
     ///
     /// DAGs of a cluster have the same affinity, or no core in common; anything else is a fault at
     /// commit, and so is a core that there is not. Cores that DAGs with an affinity leave idle execute

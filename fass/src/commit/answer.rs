@@ -339,6 +339,8 @@ pub struct DagAnswer {
     pub dag: DagLabel,
     /// Where it runs; `None` if the cores are not divided.
     pub cluster: Option<ClusterPlacement>,
+    /// Its table; `None` if no lists of cores have it.
+    pub table: Option<TablePlacement>,
     /// The verdict on the DAG.
     pub verdict: Verdict,
     /// The answer about each sink, in the order of registration.
@@ -367,6 +369,28 @@ pub struct ClusterPlacement {
     pub cores: Vec<u32>,
     /// Why the commit has put it there; `None` if the app has.
     pub why: Option<AssignmentReason>,
+}
+
+/// The table of a DAG: the cores that execute its subtasks in a stated or chosen order.
+///
+/// ```
+/// use fass::commit::TablePlacement;
+///
+/// let mut table = TablePlacement { cores: vec![0, 2], dags: 3, is_first: false };
+/// assert_eq!(table.to_string(), "in a table of 3 DAGs, on cores 0, 2");
+/// table.is_first = true;
+/// let told = "in a table of 3 DAGs, on cores 0, 2, where an overrun of one delays all, unless a budget \
+///             of its WCET ends it";
+/// assert_eq!(table.to_string(), told);
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TablePlacement {
+    /// The numbers of the cores that have lists, ascending.
+    pub cores: Vec<u32>,
+    /// How many DAGs are in the table.
+    pub dags: usize,
+    /// Whether it is the first of these DAGs.
+    pub is_first: bool,
 }
 
 /// The answer about the deadline of one sink.
@@ -487,6 +511,7 @@ impl CommitAnswers {
                     cores: task_set.cores_of_dag(dag, settings.cores),
                     why: task_set.dag(dag).why_there(),
                 }),
+                table: table(task_set, dag, settings.cores),
                 sinks: sinks(task_set, dag, &answer.sinks_ns[dag.index()]),
                 wcets: (task_set.dag(dag).subtasks().iter())
                     .map(Subtask::wcet_source)
@@ -529,6 +554,15 @@ impl CommitWords for Arc<[DagAnswer]> {
     }
 }
 
+fn table(task_set: &TaskSet, dag: DagId, all: u32) -> Option<TablePlacement> {
+    let dags = task_set.table_of(dag)?.dags();
+    Some(TablePlacement {
+        cores: task_set.cores_of_dag(dag, all),
+        is_first: dags.first() == Some(&dag),
+        dags: dags.len(),
+    })
+}
+
 fn sinks(task_set: &TaskSet, dag: DagId, bounds_ns: &[Option<u64>]) -> Vec<SinkAnswer> {
     let model = task_set.dag(dag);
     let sinks = model.sinks().iter().zip(bounds_ns);
@@ -553,6 +587,9 @@ impl fmt::Display for DagAnswer {
         }?;
         if let Some(placement) = &self.cluster {
             write!(f, "; it runs {placement}")?;
+        }
+        if let Some(table) = &self.table {
+            write!(f, "; it is {table}")?;
         }
         // What is observed is never called proven.
         let observed = self.wcets.iter().filter_map(|source| match source {
@@ -587,22 +624,41 @@ impl fmt::Display for ClusterPlacement {
             cores,
             why,
         } = self;
-        write!(f, "in cluster {}, on ", cluster.0)?;
-        let is_row = cores.windows(2).all(|pair| pair[0] + 1 == pair[1]);
-        match (cores.first(), is_row) {
-            (Some(first), true) => {
-                let count = CountedNoun(cores.len(), "core");
-                write!(f, "{count} from core {first} on")?;
-            }
-            _ => {
-                f.write_str("cores ")?;
-                for (place, core) in cores.iter().enumerate() {
-                    let comma = if place == 0 { "" } else { ", " };
-                    write!(f, "{comma}{core}")?;
-                }
-            }
-        }
+        write!(f, "in cluster {}, on {}", cluster.0, CoreNumbers(cores))?;
         why.map_or(Ok(()), |why| write!(f, ": {why}"))
+    }
+}
+
+impl fmt::Display for TablePlacement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let dags = CountedNoun(self.dags, "DAG");
+        write!(f, "in a table of {dags}, on {}", CoreNumbers(&self.cores))?;
+        match self.is_first && self.dags > 1 {
+            true => f.write_str(
+                ", where an overrun of one delays all, unless a budget of its WCET ends it",
+            ),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Cores in words.
+struct CoreNumbers<'c>(&'c [u32]);
+
+impl fmt::Display for CoreNumbers<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let cores = self.0;
+        let is_row = cores.windows(2).all(|pair| pair[0] + 1 == pair[1]);
+        if let (Some(first), true) = (cores.first(), is_row) {
+            let count = CountedNoun(cores.len(), "core");
+            return write!(f, "{count} from core {first} on");
+        }
+        f.write_str("cores ")?;
+        for (place, core) in cores.iter().enumerate() {
+            let comma = if place == 0 { "" } else { ", " };
+            write!(f, "{comma}{core}")?;
+        }
+        Ok(())
     }
 }
 

@@ -5,7 +5,7 @@
 //! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
 //!    there is one, nothing has happened; the handles are as they were.
 //! 2. *Assign.* Where the platform leaves that to the commit, the cores are divided among the
-//!    DAGs. The order of subtasks is fixed in DAGs that allow it, where that proves more.
+//!    DAGs.
 //! 3. *Answer.* The response times are bounded where that can be done, for the
 //!    model that the platform will run. A lacking proof that was demanded ends
 //!    the commit as a fault does.
@@ -114,6 +114,44 @@ pub fn finish_create_dags_with(
     dags: &[Dag],
     construction: ConstructionPolicy,
 ) -> Result<Commit, CommitError> {
+    finish_create_dags_in_order(dags, construction, &[])
+}
+
+/// Works like [`finish_create_dags_with`], with the order in which cores execute subtasks: a list
+/// for each of some cores, which is kept in every lap of the DAGs' common period.
+///
+/// A word of a list is `DAG.SUBTASK`, or `DAG.SUBTASK#N` for job N of a lap; what stands in
+/// parentheses may begin before the entry in front of them has ended. A DAG is in lists whole, and
+/// on the cores of its lists these go before everything else. `docs/dag-file.md` has the notation.
+///
+/// # Errors
+///
+/// As [`finish_create_dags_with`], and [`DagFault::CoreList`](sched_dag::DagFault::CoreList).
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::commit::{ConstructionPolicy, finish_create_dags_in_order};
+/// use fass::{SubtaskAttributes, create_dag};
+///
+/// # let machine = virtual_time::VirtualTime::new().silent(virtual_time::Silent::Wcet);
+/// let ms = Duration::from_millis;
+/// let dags = [("fly", 10, 4), ("map", 20, 9)].map(|(name, period, wcet)| {
+///     let dag = create_dag();
+///     dag.name(name).jobs(4).period(ms(period)).relative_deadline(ms(period));
+///     dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("run").wcet(ms(wcet)));
+///     dag
+/// });
+/// let lists = ["core 0: fly.run map.run ( fly.run )"];
+/// let commit = finish_create_dags_in_order(&dags, ConstructionPolicy::paper(), &lists).unwrap();
+/// assert_eq!(machine.run().violations(), []);
+/// ```
+pub fn finish_create_dags_in_order(
+    dags: &[Dag],
+    construction: ConstructionPolicy,
+    lists: &[&str],
+) -> Result<Commit, CommitError> {
     let construction = ConstructionPolicy {
         writers: CountLimit::One,
         ..construction
@@ -135,21 +173,32 @@ pub fn finish_create_dags_with(
     };
     let terms = platform.terms();
     let options = with(terms.scheduler.policy, terms.scheduler.cores);
-    let options = options.with_clusters(terms.clusters.clone());
+    let options = options
+        .with_clusters(terms.clusters.clone())
+        .with_lists(lists);
     let VerifiedDags {
         mut task_set,
         mut warnings,
     } = verify(&drafts, options, terms.wcets.as_deref())?;
-    if terms.assigns
-        && let Err(error) = assign_clusters(&mut task_set, &terms)
-    {
-        return Err(CommitError::of(Fault::NotAssigned(error), warnings));
+    let is_stated = !lists.is_empty();
+    if terms.assigns {
+        let why = "lists of cores are stated, and the commit is to divide the cores; leave one out";
+        let assigned = match is_stated {
+            true => Err(LaunchError::new(why.to_string())),
+            false => assign_clusters(&mut task_set, &terms),
+        };
+        if let Err(error) = assigned {
+            return Err(CommitError::of(Fault::NotAssigned(error), warnings));
+        }
+    }
+    // Stated times are kept.
+    if is_stated && !lists.iter().any(|list| list.contains('@')) {
+        task_set.charge_tables(&terms.settings());
     }
     let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
-    if demands_proof && !terms.assigns {
+    if demands_proof && !terms.assigns && !is_stated {
         divide_to_prove(&mut task_set, &terms, &drafts);
     }
-    analysis::fix_orders(&mut task_set, &terms.settings());
     let answers = CommitAnswers::new(&task_set, &terms);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));

@@ -2,7 +2,8 @@
 //!
 //! [`finish_create_dags`](crate::finish_create_dags) is all that most apps need of it.
 //!
-//! - Asked for: other shapes of graph, by [`finish_create_dags_with`].
+//! - Asked for: other shapes of graph, by [`finish_create_dags_with`], and lists of cores, by
+//!   [`finish_create_dags_in_order`].
 //! - Answered: [`Commit`] has warnings, a [`DagAnswer`] for each DAG with its proven bound or the
 //!   reason that there is none, and how old sampled values can be ([`Staleness`]).
 //! - Refused: a [`CommitError`] has every [`Fault`] of every DAG.
@@ -11,8 +12,10 @@ pub(crate) mod answer;
 pub(crate) mod finish;
 mod tie;
 
-pub use answer::{ClusterPlacement, Commit, DagAnswer, EndToEnd, SinkAnswer, Verdict};
-pub use finish::finish_create_dags_with;
+pub use answer::{
+    ClusterPlacement, Commit, DagAnswer, EndToEnd, SinkAnswer, TablePlacement, Verdict,
+};
+pub use finish::{finish_create_dags_in_order, finish_create_dags_with};
 pub use sched_dag::analysis::{NotProvenReason, OverheadSource, Overheads, SchedulabilityTest};
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{

@@ -144,7 +144,6 @@ impl DagDraft {
             waits,
             budget_ns,
             stack_bytes: attributes.stack_bytes,
-            core: attributes.core,
             priority: attributes.priority.map(Priority),
             non_preemptive: attributes.non_preemptive,
             ..SubtaskSpec::default()
@@ -363,7 +362,6 @@ pub struct SubtaskAttributes {
     waits: Vec<(Duration, Option<Duration>)>,
     pub(crate) budget: Option<Duration>,
     stack_bytes: Option<u64>,
-    core: Option<u32>,
     non_preemptive: bool,
 }
 
@@ -435,17 +433,6 @@ impl SubtaskAttributes {
     /// large as the largest; `measure=stacks` says how much of them each subtask uses.
     pub fn stack_bytes(mut self, bytes: u64) -> Self {
         self.stack_bytes = Some(bytes);
-        self
-    }
-
-    /// Pins the subtask to one core of its DAG's cluster, counted from 0; one that there is not is a
-    /// fault at commit.
-    ///
-    /// No other core executes it, and on that core it goes before all subtasks that are not pinned,
-    /// whatever their priorities; these share the cores that have nothing pinned to do. See
-    /// [`crate::Dag::affinity`].
-    pub fn core(mut self, core: u32) -> Self {
-        self.core = Some(core);
         self
     }
 

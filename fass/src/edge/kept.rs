@@ -167,12 +167,13 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
             })
             .collect(),
         waits: waits(task_set),
-        pins: pins(task_set),
+        pins: Vec::new(),
         affinities: affinities(task_set),
         locks: locks(task_set),
         move_ns: overheads.of_a_move_ns(options.preemption),
         answers: plan.answers.in_words(),
         device_ns: [overheads.device_ns, overheads.device_distance_ns],
+        lists: task_set.core_lists(),
     }
 }
 
@@ -184,11 +185,6 @@ fn subtasks(task_set: &TaskSet) -> impl Iterator<Item = (u32, u32, &Subtask)> {
             .zip(of_dag.subtasks())
             .map(move |(subtask, of)| (dag, subtask, of))
     })
-}
-
-fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
-    let pins = subtasks(task_set).filter_map(|(dag, subtask, of)| Some((dag, subtask, of.core()?)));
-    pins.collect()
 }
 
 fn affinities(task_set: &TaskSet) -> Vec<(u32, u32)> {

@@ -16,8 +16,12 @@ use crate::order::sorted;
 use crate::policy::{OnFault, Priority};
 use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
-/// Checks the attributes of the whole commit.
-pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
+/// Checks the attributes of the whole commit; `tables` says for each DAG in which table it is.
+pub(super) fn check(
+    options: &CommitOptions,
+    tables: &[Option<usize>],
+    findings: &mut VerifyFindings<'_>,
+) {
     let count = findings.specs.len();
     if count == 0 {
         findings.fault(DagFault::NoDags);
@@ -42,7 +46,7 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
         warn_of_equal_priorities(findings);
     }
     check_clusters(options, findings);
-    check_affinities(options, findings);
+    check_affinities(options, tables, findings);
     check_names(findings);
 }
 
@@ -327,7 +331,7 @@ fn cores_of(options: &CommitOptions, spec: &DagSpec) -> u32 {
     }
 }
 
-/// Checks the cores that a DAG and its subtasks state.
+/// Checks the cores that a DAG states.
 fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     let cores = cores_of(options, page.spec);
     // The scheduler has two lines for each, and one more, in 16 bits.
@@ -335,17 +339,6 @@ fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     let largest = page.spec.affinity.iter().copied().max();
     if let Some(core) = largest.filter(|&core| core >= most) {
         page.fault(|dag| DagFault::AffinityOutOfRange { dag, core, cores });
-    }
-    for (index, stated) in page.spec.subtasks.iter().enumerate() {
-        if let Some(core) = stated.core.filter(|&core| core >= most) {
-            let subtask = page.subtask(index);
-            page.fault(|dag| DagFault::CoreOutOfRange {
-                dag,
-                subtask,
-                core,
-                cores,
-            });
-        }
     }
 }
 
@@ -360,8 +353,12 @@ pub(super) fn affinity(options: &CommitOptions, spec: &DagSpec) -> Vec<u32> {
     cores
 }
 
-/// Checks that DAGs of a cluster execute what they do not pin on the same cores, or on others.
-fn check_affinities(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
+/// Checks that DAGs of a cluster without a table execute on the same cores, or on others.
+fn check_affinities(
+    options: &CommitOptions,
+    tables: &[Option<usize>],
+    findings: &mut VerifyFindings<'_>,
+) {
     let specs = findings.specs;
     if specs.iter().all(|spec| spec.affinity.is_empty()) {
         return;
@@ -369,7 +366,7 @@ fn check_affinities(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
     // Each affinity of a cluster, and the first DAG that has it.
     let mut groups: Vec<(ClusterId, Vec<u32>, usize)> = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
-        if spec.subtasks.iter().all(|subtask| subtask.core.is_some()) {
+        if tables[dag].is_some() {
             continue;
         }
         let (cluster, own) = (spec.cluster.unwrap_or_default(), affinity(options, spec));

@@ -13,9 +13,11 @@ use super::label::{
     DagLabel, SubtaskLabel, counted_from_0, list, members, ns, one_up_to, own_input, question,
     ring, undivided,
 };
+use super::lists::MOST_ENTRIES;
 use crate::ids::ClusterId;
 use crate::policy::Priority;
 use crate::spec::{MOST_WAITS, STACK_BYTES};
+use crate::worded::texts;
 use crate::{MAX_ARITY, worded};
 
 worded! {
@@ -185,15 +187,12 @@ worded! {
         /// More waits of a subtask than are told apart.
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
             "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
-        /// A subtask that is pinned to a core which its cluster does not have.
-        CoreOutOfRange { dag: DagLabel, subtask: SubtaskLabel, core: u32, cores: u32 } =
-            "core_out_of_range",
-            "{subtask} of {dag} is pinned to core {core}, and {}", counted_from_0(*cores);
+        /// A list of a core that cannot be enforced; `list` names the core.
+        CoreList { list: String, why: ListFault } = "core_list", "the list of {list}: {why}";
         /// A DAG with an affinity to a core which its cluster does not have.
         AffinityOutOfRange { dag: DagLabel, core: u32, cores: u32 } = "affinity_out_of_range",
             "{dag} has an affinity to core {core}, and {}", counted_from_0(*cores);
-        /// Two DAGs of a cluster that may share some of their cores for what they do not pin, and
-        /// not all of them.
+        /// Two DAGs of a cluster that may share some of their cores, and not all of them.
         AffinitiesOverlap { dag: DagLabel, other: DagLabel, core: u32 } = "affinities_overlap",
             "{other} and {dag} share core {core} and not all others (without an affinity a DAG has \
              every core); give both the same affinity, or no core in common";
@@ -306,6 +305,67 @@ worded! {
         /// caller that does.
         CertainMiss { dag: DagLabel, reason: String } = "certain_miss",
             "{dag} cannot keep its deadlines at its WCETs: {reason}";
+    }
+}
+
+texts! {
+    /// Why a list of a core cannot be enforced. `word` is a subtask as lists name it.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub enum ListFault {
+        /// It is no list.
+        Malformed { word: String } =
+            "`{word}` has no place there; write `core 2: dag.a ( dag.b#1 ) dag.a#1`, with blanks \
+             between words and parentheses";
+        /// No subtask has this name.
+        UnknownWord { word: String, meant: Option<String> } =
+            "`{word}` is no subtask; {}write DAG.SUBTASK, by names or numbers",
+            question(meant.as_ref());
+        /// Several subtasks may be meant.
+        AmbiguousWord { word: String } =
+            "`{word}` may be several subtasks; name one by numbers, as 0.1, or rename one";
+        /// Another list is of the same core.
+        CoreTwice = "another one is of that core; join both";
+        /// The core is not one of the DAG's cluster.
+        OutOfRange { dag: DagLabel, first: u32, cores: u32 } =
+            "{dag} has {cores} cores, from core {first} on; state one of these";
+        /// A DAG of the list has a subtask that waits.
+        Waits { word: String, dag: DagLabel } =
+            "`{word}` waits, and a list does not go on meanwhile; leave {dag} out of the lists, and \
+             state an affinity";
+        /// A DAG of the list states an affinity.
+        HasAffinity { dag: DagLabel } =
+            "{dag} has an affinity, and its lists say on which cores it executes; leave one out";
+        /// A sporadic DAG shares lists.
+        Sporadic { dag: DagLabel } =
+            "{dag} is sporadic, and other DAGs are in its lists; give it cores of its own, or no \
+             list";
+        /// The least common multiple of the periods is too long.
+        LapTooLong { dag: DagLabel } =
+            "a lap is the least common multiple of all periods, and that of {dag} makes it too \
+             long; choose periods on a grid";
+        /// A lap has too many entries.
+        TooManyEntries { count: u64 } =
+            "a lap of its DAGs has {count} entries, more than {MOST_ENTRIES}; choose periods on a \
+             grid";
+        /// An entry is of no job of the lap.
+        UnknownJob { word: String, job: i64, jobs: i64 } =
+            "`{word}#{job}` is of no job, as a lap has {jobs}, counted from 0; correct the number";
+        /// An entry stands there a second time.
+        EntryTwice { word: String, job: i64 } =
+            "`{word}#{job}` stands twice in a lap; leave one out, or correct a number";
+        /// A subtask has no entry for a job.
+        EntryMissing { dag: DagLabel, word: String, job: usize } =
+            "`{word}#{job}` is in none; add it, or leave all of {dag} out of the lists";
+        /// Entries of one subtask are on several cores, without a number.
+        NotNumbered { word: String } =
+            "`{word}` stands on several cores; number its jobs, as in `{word}#1`";
+        /// Some entries have times, and others not.
+        PartlyTimed =
+            "some of its entries have times within the lap, and others not; give times to all, or \
+             to none";
+        /// An entry would never start.
+        Blocked { word: String } =
+            "`{word}` would wait for ever, for what comes after it; change the order";
     }
 }
 

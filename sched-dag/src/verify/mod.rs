@@ -15,11 +15,13 @@
 mod attributes;
 mod fault;
 mod label;
+mod lists;
 mod model;
 mod names;
 mod shape;
 mod topics;
 
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::borrow::Borrow;
 use core::fmt;
@@ -30,7 +32,7 @@ use crate::policy::CoreDivision;
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 
-pub use fault::{DagFault, OverflowingTime, TopicSide, Warning};
+pub use fault::{DagFault, ListFault, OverflowingTime, TopicSide, Warning};
 pub use label::{DagLabel, SubtaskLabel};
 
 /// The most inputs and the most outputs that a subtask may have.
@@ -67,17 +69,22 @@ pub fn verify<S: Borrow<DagSpec>>(
 
 fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<VerifiedDags, RejectedDags> {
     let (mut findings, policy) = (VerifyFindings::new(specs), options.construction);
-    attributes::check(options, &mut findings);
+    let stated = lists::check(options, &mut findings);
+    attributes::check(options, &stated.of_dags, &mut findings);
     topics::check_states(&mut findings);
     let topologies = topics::check(options, &mut findings);
     let shapes = topologies.into_iter().enumerate();
     let shapes = shapes.map(|(dag, topology)| shape::check(dag, topology, policy, &mut findings));
     let shapes: Vec<_> = shapes.collect();
-    let task_set = if findings.has_faults() {
+    let mut task_set = if findings.has_faults() {
         None
     } else {
         model::build(options, shapes, &mut findings)
     };
+    if let Some(task_set) = &mut task_set {
+        lists::enforce(task_set, stated.tables, &mut findings);
+    }
+    let task_set = task_set.filter(|_| !findings.has_faults());
     let (mut faults, mut warnings) = findings.into_parts();
     names::suggest(specs, &mut faults);
     names::suggest_for_sinks(specs, &mut warnings);
@@ -182,6 +189,12 @@ impl<'s> VerifyFindings<'s> {
         self.faults.push((0, fault));
     }
 
+    /// Notes a fault of the list of a core.
+    fn core_list(&mut self, list: &str, why: ListFault) {
+        let list = list.into();
+        self.fault(DagFault::CoreList { list, why });
+    }
+
     fn has_faults(&self) -> bool {
         !self.faults.is_empty()
     }
@@ -230,6 +243,9 @@ pub struct CommitOptions {
     pub cores: u32,
     /// How these are divided.
     pub clusters: CoreDivision,
+    /// The lists of cores that are to be enforced, a text each, as `core 0: dag.a dag.b#1`;
+    /// `docs/dag-file.md` has the notation.
+    pub lists: Vec<String>,
     /// Which shapes of graph are wanted.
     pub construction: ConstructionPolicy,
     /// The most instances that the jobs in flight of all DAGs may have: the sum
@@ -273,13 +289,14 @@ impl CommitOptions {
             policy,
             cores,
             clusters: CoreDivision::Undivided,
+            lists: Vec::new(),
             construction: ConstructionPolicy::paper(),
             instance_limit: 1 << 20,
         }
     }
 
     /// Returns the same options with another construction policy.
-    pub const fn with_construction(mut self, construction: ConstructionPolicy) -> Self {
+    pub fn with_construction(mut self, construction: ConstructionPolicy) -> Self {
         self.construction = construction;
         self
     }
@@ -290,8 +307,14 @@ impl CommitOptions {
         self
     }
 
+    /// Returns the same options with lists of cores.
+    pub fn with_lists(mut self, lists: &[impl AsRef<str>]) -> Self {
+        self.lists = lists.iter().map(|list| list.as_ref().into()).collect();
+        self
+    }
+
     /// Returns the same options with another bound on instances in flight.
-    pub const fn with_instance_limit(mut self, instance_limit: u32) -> Self {
+    pub fn with_instance_limit(mut self, instance_limit: u32) -> Self {
         self.instance_limit = instance_limit;
         self
     }

@@ -110,7 +110,7 @@ fn joint(records: &Records, machines: &[Machine]) -> Result<Run, String> {
         run.options.cores = machine.cores.end;
     }
     run.machines = machines.to_vec();
-    run.task_set = task_set(run.options, CoreDivision::Undivided, &specs)?;
+    run.task_set = task_set(run.options, CoreDivision::Undivided, &[], &specs)?;
     Ok(run)
 }
 

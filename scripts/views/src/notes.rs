@@ -91,9 +91,15 @@ pub fn of_subtask(commit: &Committed, dag: DagId, subtask: SubtaskId) -> Vec<Str
     if commit.options().policy == Policy::StaticPriority {
         notes.push(format!("priority {}", of.priority));
     }
-    let pins = commit.told.pins.iter();
-    let pins = pins.filter(|pin| (pin.0, pin.1) == (dag.0, subtask.0));
-    notes.extend(pins.map(|pin| format!("core {}", pin.2)));
+    let tables = commit.task_set.tables().iter();
+    for (table, list) in tables.flat_map(|table| table.lists.iter().map(move |list| (table, list)))
+    {
+        let mut entries = list.entries.iter();
+        if entries.any(|entry| (entry.dag, entry.subtask) == (dag, subtask)) {
+            let core = commit.task_set.cores_of(table.cluster, 0).start + list.core;
+            notes.push(format!("listed on core {core}"));
+        }
+    }
     for &(sink, deadline_ns) in &told.sinks {
         if sink == subtask.0 && deadline_ns != told.relative_deadline_ns {
             notes.push(format!("deadline {}", briefly(deadline_ns)));
@@ -126,7 +132,8 @@ mod tests {
     use recording::Commit;
 
     const EYE: &str = "static 2
-eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2";
+eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2
+beat T=25000000 D=25000000: tick/4/1000000";
 
     fn committed(policy: Policy) -> Committed {
         let mut told = commit(EYE);
@@ -155,7 +162,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
         let told = Commit {
             policy: policy as u8,
             waits,
-            pins: vec![(0, 1, 1)],
+            lists: vec!["core 1: 1.0".into()],
             affinities: vec![(0, 0)],
             ..told
         };
@@ -181,13 +188,15 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
         assert_eq!(super::of_dag(&eye, DagId(0)), of_dag);
         let of = |subtask| of_subtask(&eye, DagId(0), SubtaskId(subtask)).join("; ");
         assert_eq!(of(0), "waits up to 3 ms, then 400 us; priority 1");
-        assert_eq!(of(1), "priority 2; core 1; non-preemptive");
+        assert_eq!(of(1), "priority 2; non-preemptive");
         assert_eq!(of(2), "waits up to 0 ns; priority 3; deadline 90 ms");
         let expected = (String::new(), 0);
-        assert_eq!((of(3), super::of_dag(&eye, DagId(1)).len()), expected);
+        assert_eq!((of(3), super::of_dag(&eye, DagId(2)).len()), expected);
+        let tick = of_subtask(&eye, DagId(1), SubtaskId(0));
+        assert_eq!(tick, ["priority 4", "listed on core 1"]);
         // Under EDF no priority is shown.
         let eye = committed(Policy::Edf);
-        let expected = ["core 1", "non-preemptive"];
+        let expected = ["non-preemptive"];
         assert_eq!(of_subtask(&eye, DagId(0), SubtaskId(1)), expected);
     }
 

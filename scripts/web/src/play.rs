@@ -1,7 +1,7 @@
 //! DAGs run in virtual time: their record, as `./scripts/run --keep` writes that of a boot.
 
 use dag_file::{Settings, build};
-use fass::commit::{ConstructionPolicy, Overheads, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, Overheads, finish_create_dags_in_order};
 use fass::{Dag, Occupation};
 use fass_dag_file::{Execution, FileDag, Length, check, kernel_overheads_ns, parse};
 use sched_dag::{CommitOptions, CoreDivision, Policy, Preemption};
@@ -19,8 +19,13 @@ pub(crate) fn play(request: &Request<'_>) -> Result<(Vec<u8>, Vec<String>), Faul
     let (machine, options) = machine(request)?;
     let seed = request.number("seed", 0..=u64::MAX, 1)?;
     let mut say: Box<dyn Fn() -> Option<String>> = Box::new(|| None);
+    let mut lists = Vec::new();
     let dags = match request.text("app") {
-        None => of_file(request, &options, seed)?,
+        None => {
+            let (dags, of_file) = of_file(request, &options, seed)?;
+            lists = of_file;
+            dags
+        }
         Some("drone") => {
             let workload = drone::Workload {
                 seconds: 8,
@@ -42,15 +47,20 @@ pub(crate) fn play(request: &Request<'_>) -> Result<(Vec<u8>, Vec<String>), Faul
             return Err(format!("app: {} is {why}", quoted(app)).into());
         }
     };
-    let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph());
+    let lists: Vec<&str> = lists.iter().map(String::as_str).collect();
+    let commit = finish_create_dags_in_order(&dags, ConstructionPolicy::any_graph(), &lists);
     let commit = commit.map_err(|error| error.to_string())?;
     machine.try_run().map_err(|error| error.to_string())?;
     let warnings = commit.warnings().iter().map(ToString::to_string);
     Ok((machine.recording(), warnings.chain(say()).collect()))
 }
 
-/// Builds the DAGs of a file.
-fn of_file(request: &Request<'_>, options: &CommitOptions, seed: u64) -> Result<Vec<Dag>, Faults> {
+/// Builds the DAGs of a file. Returns its lists of cores, too.
+fn of_file(
+    request: &Request<'_>,
+    options: &CommitOptions,
+    seed: u64,
+) -> Result<(Vec<Dag>, Vec<String>), Faults> {
     let text = String::from_utf8_lossy(request.body);
     let file = parse(&text).map_err(|fault| Faults(vec![fault]))?;
     let wanted = request.text("set").unwrap_or(&file.sets[0].name);
@@ -75,7 +85,8 @@ fn of_file(request: &Request<'_>, options: &CommitOptions, seed: u64) -> Result<
         length,
         grid_ns: 0,
     };
-    Ok(build(set, &settings))
+    let lists = set.core_lists().into_iter().map(Into::into);
+    Ok((build(set, &settings), lists.collect()))
 }
 
 /// Makes the machine that a request describes, and what a commit on it demands.

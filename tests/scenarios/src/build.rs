@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use core::time::Duration;
 
-use fass::commit::{Commit, CommitError, ConstructionPolicy, finish_create_dags_with};
+use fass::commit::{Commit, CommitError, ConstructionPolicy, finish_create_dags_in_order};
 use fass::shared::{Latest, Mode, Modes, Signal, State, Uses, shutting_down};
 use fass::{Dag, Occupation, SubtaskAttributes, VecToPubs, VecToSubs, create_dag, execute_for};
 
@@ -286,9 +286,6 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
             attributes = attributes.wcet(wcet);
         }
     }
-    if let Some(core) = subtask.core {
-        attributes = attributes.core(core);
-    }
     if subtask.is_non_preemptive {
         attributes = attributes.non_preemptive();
     }
@@ -299,7 +296,7 @@ impl DagText {
     /// Begins the DAG. Returns its signal, too, if it is sporadic.
     fn begin(&self) -> (Dag, Option<Signal>) {
         let dag = create_dag();
-        dag.name(&self.name).overrun(self.overrun).order(self.order);
+        dag.name(&self.name).overrun(self.overrun);
         dag.offset(self.offset).affinity(&self.affinity);
         dag.relative_deadline(self.deadline.unwrap_or(self.period));
         if self.jobs > 0 {
@@ -398,7 +395,8 @@ impl Scenario {
         devices.into_iter().for_each(connect);
         let all = (self.dags.iter()).map(|text| dags[&text.name].clone());
         let all: Vec<Dag> = all.collect();
-        finish_create_dags_with(&all, ConstructionPolicy::any_graph())
+        let lists: Vec<&str> = self.lists.iter().map(String::as_str).collect();
+        finish_create_dags_in_order(&all, ConstructionPolicy::any_graph(), &lists)
     }
 }
 

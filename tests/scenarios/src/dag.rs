@@ -5,14 +5,13 @@ use alloc::vec::Vec;
 use alloc::{format, vec};
 use core::time::Duration;
 
-use fass::SubtaskOrder;
 use fass::{FaultLimit, OverrunPolicy};
 
 use crate::number;
 
 /// A DAG: `NAME`, then any of
 /// `period T` or `sporadic T`, `deadline T`, `offset T`, `jobs N`, `in-flight N`,
-/// `overrun queue|skip|abort`, `order fixed`, `survives FAULTS/WINDOW/ALL`, `cluster N`,
+/// `overrun queue|skip|abort`, `survives FAULTS/WINDOW/ALL`, `cluster N`,
 /// `affinity N,N`, `paused`, `on-fault DAG`.
 ///
 /// It has one job, unless that is said (`jobs 0`: no end), and room for all of its jobs.
@@ -26,7 +25,6 @@ pub struct DagText {
     pub(crate) jobs: u64,
     pub(crate) in_flight: Option<u32>,
     pub(crate) overrun: OverrunPolicy,
-    pub(crate) order: SubtaskOrder,
     pub(crate) survives: Option<FaultLimit>,
     pub(crate) cluster: Option<u32>,
     pub(crate) affinity: Vec<u32>,
@@ -38,7 +36,7 @@ pub struct DagText {
 }
 
 /// A subtask: `NAME TIMES`, then any of
-/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `core N`, `non-preemptive`,
+/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `non-preemptive`,
 /// `fails N,N` (in these of its calls, from 0), `restarts` or `falls-back` (what replaces it after
 /// a fault), `updates STATE`, `reads STATE`, `samples NAME` (a subtask of another DAG), and with
 /// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N,N` and then
@@ -64,7 +62,6 @@ pub struct SubtaskText {
     /// How long a call of it may compute.
     pub budget: Option<Duration>,
     pub(crate) due: Option<Duration>,
-    pub(crate) core: Option<u32>,
     pub(crate) is_non_preemptive: bool,
     /// Whether it computes and does not hold its core; one with a budget does so in any case.
     pub computes: bool,
@@ -184,7 +181,6 @@ impl DagText {
                         _ => OverrunPolicy::Queue,
                     }
                 }
-                "order" => dag.order = value(words).map(|_| SubtaskOrder::Fixed)?,
                 "survives" => {
                     let limit: Vec<u64> = numbers(words)?;
                     let [faults, window, in_all] = limit[..] else {
@@ -248,7 +244,6 @@ impl DagText {
                 "wcet" => subtask.wcet = Some(time(words)?),
                 "budget" => subtask.budget = Some(time(words)?),
                 "due" => subtask.due = Some(time(words)?),
-                "core" => subtask.core = Some(number(value(words)?)?),
                 "non-preemptive" => subtask.is_non_preemptive = true,
                 "fails" => subtask.fails = numbers(words)?,
                 "restarts" => subtask.replaced = Replaced::Anew,

@@ -26,6 +26,7 @@
 //! | `cores N` | on so many; 1 if not said |
 //! | `clusters N,N` | which are divided so |
 //! | `policy WORD` | instead of static priorities |
+//! | `core N: DAG.SUBTASK ...` | the list of a core, as `docs/dag-file.md` says |
 //! | `preemption off` | nobody loses its core |
 //! | `mode NAME DAG DAG` | a mode, in which these DAGs run |
 //! | `dag NAME WORDS` | a DAG, see [`dag::DagText`] |
@@ -68,9 +69,9 @@ pub const SUITE: &[(&str, &str)] = &[
     ("lifecycle", include_str!("../lifecycle.txt")),
     ("modes", include_str!("../modes.txt")),
     ("overrun", include_str!("../overrun.txt")),
-    ("pins", include_str!("../pins.txt")),
     ("rules", include_str!("../rules.txt")),
     ("sharing", include_str!("../sharing.txt")),
+    ("tables", include_str!("../tables.txt")),
     ("waits", include_str!("../waits.txt")),
 ];
 
@@ -94,6 +95,8 @@ pub struct Scenario {
     pub modes: Vec<(String, Vec<String>)>,
     /// Its DAGs.
     pub dags: Vec<DagText>,
+    /// The lists of cores.
+    pub lists: Vec<String>,
     /// The events in virtual time, an instant a line.
     pub timeline: Vec<String>,
     /// Kinds of events that do not happen.
@@ -124,8 +127,8 @@ impl Scenario {
     pub fn read_all(text: &str) -> Result<Vec<Self>, String> {
         let mut all: Vec<Self> = Vec::new();
         for (number, line) in (1..).zip(text.lines()) {
-            let line = line.split('#').next().unwrap_or_default().trim_end();
-            if line.is_empty() {
+            let line = line.split(" #").next().unwrap_or_default().trim_end();
+            if line.is_empty() || line.starts_with('#') {
                 continue;
             }
             let told = |why: String| format!("line {number}: `{line}`: {why}");
@@ -187,6 +190,7 @@ impl Scenario {
             preemption: fass::Preemption::Enabled,
             modes: vec![],
             dags: vec![],
+            lists: vec![],
             timeline: vec![],
             never: vec![],
             exactly: vec![],
@@ -218,6 +222,7 @@ impl Scenario {
                 self.policy = fass::Policy::of_word(word).ok_or("there is no such policy")?;
             }
             ("preemption", "off") => self.preemption = fass::Preemption::Disabled,
+            ("core", _) => self.lists.push(line.into()),
             ("mode", _) => {
                 let (name, dags) = rest.split_once(' ').unwrap_or((rest, ""));
                 let dags = dags.split_whitespace().map(ToString::to_string);

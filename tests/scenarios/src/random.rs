@@ -2,8 +2,8 @@
 //!
 //! A *round* is a number that with a seed gives one scenario, the same everywhere. Drawn are the
 //! policy, the load, the DAGs with their graphs and times, how each treats jobs that overrun, and
-//! whether cores are divided. Each of these is in about half of the rounds: some subtasks are
-//! pinned, some wait, sinks have deadlines of their own, DAGs release others, and two modes take
+//! whether cores are divided. Each of these is in about half of the rounds: some DAGs are
+//! in a table, some subtasks wait, sinks have deadlines of their own, DAGs release others, and two modes take
 //! turns. Two of three rounds have *trouble*: functions that fail, after which their DAG ends or
 //! goes on, and DAGs that pause others, over and over. In one of eight rounds instances compute,
 //! and these have none: where cores take turns, the report of a fault is a longer turn than others
@@ -42,7 +42,6 @@ struct Round {
     /// Cores by cluster.
     clusters: Vec<u32>,
     has_trouble: bool,
-    has_pins: bool,
     has_sinks: bool,
     has_waits: bool,
     /// Whether each DAG but the first is released by the one before it.
@@ -65,7 +64,7 @@ impl Scenario {
         let mean_percent = u64::midpoint(LEAST_PERCENT, 100);
         let is_divided = cores > 1 && random.once_in(2);
         let has_trouble = !computes && !random.once_in(3);
-        let [has_pins, has_sinks, has_waits, releases, has_modes] =
+        let [has_lists, has_sinks, has_waits, releases, has_modes] =
             [(); 5].map(|()| random.once_in(2));
         let drawn = Round {
             length,
@@ -77,7 +76,6 @@ impl Scenario {
                 false => vec![cores],
             },
             has_trouble,
-            has_pins,
             has_sinks,
             has_waits,
             is_released: (0..sizes.len())
@@ -89,7 +87,14 @@ impl Scenario {
             },
         };
         let title = format!("round {round}: {name}, {load} % of {cores} cores");
+        let dags: Vec<DagText> = ((0..).zip(sizes))
+            .map(|(number, size)| drawn.dag(number, size, random))
+            .collect();
         Self {
+            lists: match has_lists {
+                true => lists(&dags, drawn.clusters[0], random),
+                false => vec![],
+            },
             cores,
             clusters: match is_divided {
                 true => drawn.clusters.clone(),
@@ -100,13 +105,55 @@ impl Scenario {
                 true => Preemption::Disabled,
                 false => Preemption::Enabled,
             },
-            dags: ((0..).zip(sizes))
-                .map(|(number, size)| drawn.dag(number, size, random))
-                .collect(),
+            dags,
             modes: drawn.modes,
             ..Self::new(&title)
         }
     }
+}
+
+/// Draws a table for some DAGs of the first cluster: their subtasks in the order of releases, each
+/// on any core, some nested in the one before.
+fn lists(dags: &[DagText], cores: u32, random: &mut Random) -> Vec<String> {
+    let may_be_listed = |dag: &&DagText| {
+        let waits = dag.subtasks.iter().any(|of| !of.waits.is_empty());
+        !waits && !dag.is_sporadic && dag.cluster.unwrap_or(0) == 0
+    };
+    let mut listed: Vec<&DagText> = dags.iter().filter(may_be_listed).collect();
+    listed.retain(|_| random.once_in(2));
+    listed.truncate(4);
+    let periods_ns: Vec<u128> = listed.iter().map(|dag| dag.period.as_nanos()).collect();
+    let longest_ns = periods_ns.iter().max().copied().unwrap_or(1);
+    let divides_all = |lap_ns: &u128| periods_ns.iter().all(|period_ns| lap_ns % period_ns == 0);
+    let lap_ns = (1..).map(|n| n * longest_ns).find(divides_all).unwrap_or(0);
+    let mut entries = vec![];
+    for (dag, period_ns) in listed.iter().zip(&periods_ns) {
+        let phase_ns = dag.offset.as_nanos() % period_ns;
+        for job in 0..lap_ns / period_ns {
+            let words = dag
+                .subtasks
+                .iter()
+                .map(|of| format!("{}.{}#{job}", dag.name, of.name));
+            let of_job = (phase_ns + job * period_ns, words.collect::<Vec<_>>());
+            entries.push(of_job);
+        }
+    }
+    entries.sort();
+    let mut lists = vec![String::new(); usize::try_from(cores).unwrap_or(0)];
+    for word in entries.into_iter().flat_map(|(_, words)| words) {
+        let list = random.index(lists.len());
+        let is_nested = !lists[list].is_empty() && random.once_in(8);
+        lists[list] += &match is_nested {
+            true => format!(" ( {word} )"),
+            false => format!(" {word}"),
+        };
+    }
+    let lists = (0..)
+        .zip(lists)
+        .filter(|(_, list): &(u32, String)| !list.is_empty());
+    lists
+        .map(|(core, list)| format!("core {core}:{list}"))
+        .collect()
 }
 
 /// Draws two modes: one with all DAGs of a cluster but the first two, and one with some of them.
@@ -174,8 +221,6 @@ impl Round {
                     }],
                     false => vec![],
                 },
-                core: (self.has_pins && random.once_in(4))
-                    .then(|| random.within(0..=self.cores_of(number) - 1)),
                 after: (before.iter())
                     .map(|before| subtasks[*before].name.clone())
                     .collect(),
@@ -232,12 +277,6 @@ impl Round {
             dag.jobs = 0;
         }
         dag
-    }
-
-    /// Returns how many cores a DAG has.
-    fn cores_of(&self, number: u64) -> u32 {
-        let cluster = usize::from(number % 2 == 1) % self.clusters.len();
-        self.clusters[cluster]
     }
 }
 

@@ -3,8 +3,7 @@
 
 use std::fs;
 
-use dag_file::{Settings, build};
-use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use dag_file::{Settings, commit};
 use fass::{Occupation, Policy, Preemption};
 use fass_dag_file::{Execution, Length, Set};
 use tool::dag_file::stg;
@@ -28,8 +27,7 @@ fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
         length: Length::Jobs(1),
         grid_ns: 0,
     };
-    let dags = build(graph, &settings);
-    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("it is a DAG");
+    commit(graph, &settings).expect("it is a DAG");
     let report = machine.run();
     assert_eq!(report.violations(), []);
     report.jobs[0].response_time_ns().expect("it is complete") / UNIT_NS

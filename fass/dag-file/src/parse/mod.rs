@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::{ClusterId, DagSpec, OverrunPolicy, Priority, SubtaskOrder, SubtaskSpec, Wait};
+use sched_dag::{ClusterId, DagSpec, OverrunPolicy, Priority, SubtaskSpec, Wait};
 use text::is_seen;
 use text::repeated;
 use text::{Line, Lines, Malformed, quoted};
@@ -24,7 +24,7 @@ use crate::file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 use crate::time::{Time, parse_ns};
 
 /// The words that may stand where a record begins.
-const RECORDS: &str = "`set`, `dag`, `subtask`, `edge` or `end`";
+const RECORDS: &str = "`set`, `dag`, `subtask`, `edge`, `core` or `end`";
 
 /// Reads a file.
 ///
@@ -120,6 +120,7 @@ impl<'a> Reader<'a> {
             "dag" => self.take_dag(line),
             "subtask" => self.take_subtask(line),
             "edge" => self.take_edge(line),
+            "core" => self.take_list(line),
             other => {
                 let remedy = match self.file.sets.is_empty() {
                     // Perhaps no line of it is meant for this reader.
@@ -147,7 +148,7 @@ impl<'a> Reader<'a> {
         self.dags.clear();
         self.file.sets.push(Set {
             name: name.into(),
-            dags: Vec::new(),
+            ..Set::default()
         });
         Ok(())
     }
@@ -201,6 +202,15 @@ impl<'a> Reader<'a> {
         let dag = self.open_dag(line)?;
         dag.spec.edges.push(edge);
         dag.edge_lines.push(line.number);
+        Ok(())
+    }
+
+    fn take_list(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        self.open_dag(line)?;
+        let list = format!("core {}", line.words.join(" "));
+        if let Some(set) = self.file.sets.last_mut() {
+            set.lists.push((line.number, list));
+        }
         Ok(())
     }
 
@@ -304,19 +314,15 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
                 }
             }
             "order" => {
-                spec.order = match keys.value(key)? {
-                    "free" => SubtaskOrder::Free,
-                    "fixed" => SubtaskOrder::Fixed,
-                    other => {
-                        let why = format!("order: {} is neither free nor fixed", quoted(other));
-                        return Err(line.malformed(why));
-                    }
-                }
+                return Err(keys.malformed(
+                    "`order` is no more; state the order of a core by `core 2: dag.a dag.b` after \
+                     the DAGs, or by `clusters=auto`",
+                ));
             }
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`period`, `deadline`, `offset`, `cluster`, `affinity`, `overrun`, `order`, \
+                    "`period`, `deadline`, `offset`, `cluster`, `affinity`, `overrun`, \
                      `in-flight`, `jobs`",
                 ));
             }
@@ -354,14 +360,19 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
                 return Err(line.malformed(message));
             }
             "priority" => spec.priority = Some(Priority(keys.number(key)?)),
-            "core" => spec.core = Some(keys.number(key)?),
+            "core" => {
+                return Err(keys.malformed(
+                    "`core` is no more; state `core 2: dag.a dag.b` after the DAGs, or of the DAG \
+                     `affinity 2`",
+                ));
+            }
             "non-preemptive" => spec.non_preemptive = true,
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
             "samples" => samples = Some(keys.value(key)?),
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`wcet`, after it any `wait` and `wcet`, `priority`, `core`, \
+                    "`wcet`, after it any `wait` and `wcet`, `priority`, \
                      `non-preemptive`, `deadline`, `samples`",
                 ));
             }

@@ -9,10 +9,11 @@ fn refusal(text: &str) -> String {
 const GOOD: &str = "\
 # Two sets.
 set first
-dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4 jobs 7 # all keys
-subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms
+dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip in-flight 4 jobs 7 # all keys
+subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms
 subtask show wcet 500us priority 6 deadline 30ms
 edge grab -> show
+core 1: camera.grab  camera.show#0 # a list of a core
 
 set second
 dag alone period 1s
@@ -37,6 +38,8 @@ fn a_file_is_read_and_written_back() {
         (Some(4), Some(7))
     );
     assert_eq!(camera.spec.affinity, [2, 0]);
+    let list = "core 1: camera.grab camera.show#0";
+    assert_eq!(file.sets[0].lists, [(7, list.into())]);
     let show = &camera.spec.subtasks[1];
     assert_eq!(show.relative_deadline_ns, Some(30_000_000));
     // Without a deadline it is the period.
@@ -56,8 +59,8 @@ fn a_file_is_read_and_written_back() {
 
     let written = file.to_string();
     assert_eq!(parse(&written).unwrap().to_string(), written);
-    let kept = "dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4 jobs 7\n\
-                subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms\n";
+    let kept = "dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip in-flight 4 jobs 7\n\
+                subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms\n";
     assert!(written.contains(kept), "{written}");
     let rest = "subtask rest wait 2ms wait 1ms priority 2 samples 1ms+2ms+3ms+0ns+1ms,5us+6us+7us+8us+9us\n";
     assert!(written.contains(rest), "{written}");
@@ -78,7 +81,10 @@ fn every_part_of_a_file_that_is_cut_off_is_refused() {
 const REFUSED: &str = r"
 => line 1: the file ends where a `dag` record should be; it is empty: describe a DAG, or name
 end => line 1: the file has no dag; add one before `end`
-dig x => line 1: expected `set`, `dag`, `subtask`, `edge` or `end`, found `dig`; correct it, or write a file of another format as docs
+{dag}{a}subtask b core 2 => line 3: `core` is no more; state `core 2: dag.a dag.b` after the DAGs, or of
+dag x period 1ms order fixed => line 1: `order` is no more; state
+core 2: x.a => line 1: `core` stands before any
+dig x => line 1: expected `set`, `dag`, `subtask`, `edge`, `core` or `end`, found `dig`; correct it, or write a file of another
 dag x => line 1: dag `x` has no period; add `period 25ms`
 dag => line 1: `dag` lacks its name
 dag x perod 1ms => line 1: unknown key `perod`; a dag has `period`, `deadline`,

@@ -200,7 +200,7 @@ pub type Slack = [Option<u64>; PARTS.len()];
 pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let task_set =
-            record::task_set(settings.scheduler(), CoreDivision::Undivided, dags).ok()?;
+            record::task_set(settings.scheduler(), CoreDivision::Undivided, &[], dags).ok()?;
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };

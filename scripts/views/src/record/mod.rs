@@ -380,10 +380,9 @@ impl Committed {
             };
             place.waits.push(wait);
         }
-        for &(dag, subtask, core) in &told.pins {
-            let place = subtask_of(&mut specs, dag, subtask);
-            let place = place.ok_or_else(|| in_commit("a pin is of no subtask".into()))?;
-            place.core = Some(core);
+        if !told.pins.is_empty() {
+            let why = "it has pins, which there are no more; read it by the version that wrote it";
+            return Err(in_commit(why.into()));
         }
         for &(dag, core) in &told.affinities {
             let place = specs.get_mut(DagId(dag).index());
@@ -411,7 +410,8 @@ impl Committed {
             task_set: TaskSet::default(),
             told,
         };
-        let task_set = task_set(committed.options(), clusters, &committed.specs);
+        let lists = &committed.told.lists;
+        let task_set = task_set(committed.options(), clusters, lists, &committed.specs);
         committed.task_set = task_set.map_err(in_commit)?;
         Ok(committed)
     }
@@ -503,6 +503,7 @@ impl Committed {
 pub fn task_set(
     options: SchedulerOptions,
     clusters: CoreDivision,
+    lists: &[String],
     dags: &[DagSpec],
 ) -> Result<TaskSet, String> {
     if dags.is_empty() {
@@ -511,6 +512,7 @@ pub fn task_set(
     let options = CommitOptions::new(options.policy, options.cores)
         .with_construction(ConstructionPolicy::any_graph())
         .with_clusters(clusters)
+        .with_lists(lists)
         .with_instance_limit(u32::MAX);
     let verified = verify(dags, &options).map_err(|rejected| {
         let faults: Vec<String> = rejected.faults().iter().map(ToString::to_string).collect();

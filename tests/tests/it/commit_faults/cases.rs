@@ -121,9 +121,6 @@ pub(crate) const CASES: &[Case] = &[
         given.register_sink_subtask(|(_,): (u32,)| (), vec!["echoes"], PERIOD, of("store"));
         vec![given, sound("lidar", "points")]
     }),
-    ("core_out_of_range", || {
-        read_by(PERIOD, attributes("read").core(9))
-    }),
     ("affinity_out_of_range", || {
         changed(|dag| _ = dag.affinity(&[0, 9]))
     }),
@@ -388,7 +385,7 @@ fn with(dag: Dag, subtasks: &str) -> Vec<Dag> {
 }
 
 /// A DAG without fault: a source, a topic, a sink.
-fn sound(name: &str, topic: &str) -> Dag {
+pub(crate) fn sound(name: &str, topic: &str) -> Dag {
     dag(&format!("{name}: > read > {topic}; {topic} > store >"))
 }
 

@@ -9,7 +9,7 @@ use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use cases::{CASES, GRAPHS, PERIOD};
+use cases::{CASES, GRAPHS, PERIOD, sound};
 use fass::{WaitFault, finish_create_dags};
 use harness::fault_page::{self, documented_faults, table};
 use harness::markdown::page;
@@ -56,6 +56,13 @@ fn affinities_overlap() -> fass::commit::CommitError {
     let dags = ["lidar", "camera"].map(starting);
     dags[1].affinity(&[0]);
     finish_create_dags(&dags).expect_err("the other one may have core 0, too")
+}
+
+fn core_list() -> fass::commit::CommitError {
+    let _machine = virtual_time::VirtualTime::new();
+    let (dags, paper) = ([sound("lidar", "points")], fass::commit::ConstructionPolicy::paper());
+    let refused = fass::commit::finish_create_dags_in_order(&dags, paper, &["core 0: lidar.read"]);
+    refused.expect_err("a subtask is in no list")
 }
 
 fn not_assigned() -> fass::commit::CommitError {
@@ -140,6 +147,7 @@ fn every_fault_is_found_and_said_as_documented() {
         clusters_beyond_cores(),
         no_cluster(),
         affinities_overlap(),
+        core_list(),
         not_assigned(),
     ] {
         said.insert(refused.faults()[0].code().into(), refused.to_string());

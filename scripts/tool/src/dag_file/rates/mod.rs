@@ -291,8 +291,8 @@ fn refuse_cycles(graph: &RateGraph, name: &str) -> Result<(), Vec<Malformed>> {
     };
     let dags = vec![whole];
     let set = Set {
-        name: String::new(),
         dags,
+        ..Set::default()
     };
     check(&set, &CommitOptions::new(Policy::Edf, 1), Length::Jobs(1))
 }

@@ -22,11 +22,11 @@ use super::yaml::{Node, YamlValue, parse};
 /// Every deviation from the form above, with its line.
 pub fn read(text: &str, name: &str, unit_ns: u64) -> Result<DagFile, Vec<Malformed>> {
     let graph = read_graph(text, unit_ns).map_err(|malformed| vec![malformed])?;
-    let dags = split(&graph, name)?;
-    let name = String::new();
-    Ok(DagFile {
-        sets: vec![Set { name, dags }],
-    })
+    let set = Set {
+        dags: split(&graph, name)?,
+        ..Set::default()
+    };
+    Ok(DagFile { sets: vec![set] })
 }
 
 fn malformed(line: usize, reason: impl Into<String>) -> Malformed {

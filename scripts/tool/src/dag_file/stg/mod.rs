@@ -50,9 +50,11 @@ pub fn read(text: &str, graph: Option<&str>, unit_ns: u64) -> Result<DagFile, Ma
         }
     }
     let sets = graphs.iter().map(|graph| {
-        let dags = vec![graph.dag(unit_ns)?];
-        let name = graph.name.clone();
-        Ok(Set { name, dags })
+        Ok(Set {
+            name: graph.name.clone(),
+            dags: vec![graph.dag(unit_ns)?],
+            ..Set::default()
+        })
     });
     let sets = sets.collect::<Result<_, _>>()?;
     Ok(DagFile { sets })
