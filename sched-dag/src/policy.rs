@@ -164,6 +164,29 @@ texts! {
         SqueezedByDensity = "attempt 3, squeezed, by density";
         /// As [`ByDeadline`](Self::ByDeadline), with squeezed lists.
         SqueezedByDeadline = "attempt 4, squeezed, by deadline";
+        /// One table for as many DAGs as can have one, whose entries preempt less urgent ones.
+        Nest = "attempt 5, one table";
+        /// As [`Nest`](Self::Nest), with fewer preemptions.
+        Lazy = "attempt 6, one table, lazy";
+    }
+}
+
+texts! {
+    /// Why an attempt to divide cores has failed, of a DAG or in general.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum AttemptFailure {
+        /// The DAG has no place.
+        Lent = "no place";
+        /// Some DAG can execute in a table only.
+        Excluded = "some dag needs a table";
+        /// No DAG can have a table with others.
+        Nothing = "no dag for a table";
+        /// The DAG neither fits into the table nor may execute in what that leaves.
+        Member = "no room in the table";
+        /// The DAG is late in the table, or no table closes.
+        Late = "no table in time";
+        /// The DAG has no place in what the table leaves.
+        Place = "no place next to the table";
     }
 }
 
@@ -183,6 +206,9 @@ texts! {
             "its own in a fixed order, as a job is {:?} of work within {:?}, with {left_percent} % of \
              them left ({attempt})",
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
+        /// It has a table with others: each of the cores runs a list of entries.
+        Table { attempt: LendingAttempt, left_percent: u32 } =
+            "those of its table, with {left_percent} % of them left ({attempt})";
         /// It shares what the owners of some cores leave.
         Member { attempt: LendingAttempt, left_percent: u32 } =
             "the first with room for it, with {left_percent} % of them left \

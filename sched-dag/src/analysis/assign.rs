@@ -1,11 +1,11 @@
 //! The commit's own clusters: cores that heavy DAGs own and lend, or cores of its own for each DAG
 //! that needs several and single cores for the others.
 //!
-//! Under static priorities the cores are divided as [`lend`](super::lend()) does, if subtasks can be
-//! pinned and that proves all DAGs. Else this is federated scheduling (the papers are named below).
-//! A DAG is *heavy* if a job of it is more work than one core does by its deadline, or by the next
-//! release if that comes first, or if subtasks of it wait; it gets a cluster of as many cores as its
-//! multi-path bound needs, or the order that may be fixed for it. The others are *light*: clusters
+//! The cores are divided as [`lend`](super::lend()) does, if that proves all DAGs; where priorities
+//! are not static, if a table has all of them. Else this is federated scheduling (the papers are
+//! named below). A DAG is *heavy* if a job of it is more work than one core does by its deadline, or
+//! by the next release if that comes first, or if subtasks of it wait; it gets a cluster of as many
+//! cores as its multi-path bound needs, or of fewer with a table. The others are *light*: clusters
 //! of one core each take them, the densest first, each where the sum of densities is least (worst
 //! fit), so that what room there is, is left on every core. A core takes light DAGs up to a sum of
 //! 1, which is enough for EDF and no proof for static priorities. Where that leaves a DAG without
@@ -32,28 +32,30 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::case::of_cluster;
-use super::lending::{LendingAnswer, LendingPlan, lend_amid};
+use super::lending::{ENTRY_LIMIT, LendingAnswer, LendingPlan, LendingTerms, late_and_limit_ns};
+use super::list_schedule::ListSchedule;
 use super::multi_path::multi_path;
 use super::ratio::{Ratio, sort_largest_first};
 use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
-use super::{AnalysisSettings, answer, fixed_order};
+use super::{AnalysisSettings, answer};
 use crate::ids::{ClusterId, DagId, to_u32};
-use crate::policy::{AssignmentReason, LendingAttempt, Preemption};
-use crate::task_set::{Dag, Subtask, TaskSet};
+use crate::policy::{AssignmentReason, AttemptFailure, Preemption};
+use crate::table::Table;
+use crate::task_set::TaskSet;
 use crate::worded::texts;
 
 /// A DAG that gets no cores, and why.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NotAssigned {
     /// The DAG.
     pub dag: DagId,
     /// Why it gets none.
     pub reason: AssignmentFailure,
-    /// The DAGs for which the [attempts](LendingAttempt) to lend cores failed; `None` where those
-    /// do not apply.
-    pub attempts: Option<[DagId; LendingAttempt::ALL.len()]>,
+    /// Why the [attempts](crate::LendingAttempt) to lend cores failed, and for which DAG, if there
+    /// is a first one; `None` where those do not apply.
+    pub attempts: Option<Vec<(Option<DagId>, AttemptFailure)>>,
 }
 
 texts! {
@@ -117,9 +119,9 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     let attempts = match lend_cores(task_set, &bursts, &tasks, settings) {
         None => None,
         Some(Ok(())) => return Ok(()),
-        Some(Err(failed)) => failed.try_into().ok(),
+        Some(Err(failed)) => Some(failed),
     };
-    let Err(refused) = federate(task_set, &tasks, settings) else {
+    let Err(refused) = federate(task_set, &bursts, &tasks, settings) else {
         return Ok(());
     };
     // Lending has tried that, where it applies; it knows neither waits nor EDF.
@@ -150,30 +152,31 @@ fn take_if_proven(
     is_proven
 }
 
-/// Divides the cores as [`lend`](super::lend()) does, if that applies; an error says for which DAG
-/// each attempt failed.
+/// Divides the cores as [`lend`](super::lend()) does, if that applies; an error says why each
+/// attempt failed.
 fn lend_cores(
     task_set: &mut TaskSet,
     bursts: &WorkloadBursts,
     tasks: &[Task],
     settings: &AnalysisSettings,
-) -> Option<Result<(), Vec<DagId>>> {
-    let is_plain = |dag: &Dag| {
-        let mut subtasks = dag.subtasks().iter();
-        dag.least_deadline_ns() == dag.relative_deadline_ns()
-            && !subtasks.any(Subtask::is_non_preemptive)
-    };
-    // It ranks DAGs, and no order that depends on releases does.
-    let applies = !settings.policy.adds_release()
-        && settings.preemption == Preemption::Enabled
-        && task_set.dags().iter().all(is_plain);
-    if !applies {
+) -> Option<Result<(), Vec<(Option<DagId>, AttemptFailure)>>> {
+    if settings.preemption == Preemption::Disabled {
         return None;
     }
     let tasks: Vec<&Task> = tasks.iter().collect();
-    let LendingAnswer { plan, failed } = lend_amid(bursts, &tasks, settings.cores)?;
+    // A table has no slack for steps, interrupts and sections that delay its entries all at once.
+    let is_delayed =
+        bursts.during(0) > 0 || task_set.dags().iter().any(|dag| !dag.locks().is_empty());
+    let terms = LendingTerms {
+        bursts,
+        entry_limit: if is_delayed { 0 } else { ENTRY_LIMIT },
+        // They are ranked by deadline, and no order that depends on releases does that.
+        has_members: !settings.policy.adds_release(),
+    };
+    let LendingAnswer { plan, failed } = terms.lend(&tasks, settings.cores)?;
     let Some(plan) = plan else {
-        let failed = failed.into_iter().map(|dag| DagId(to_u32(dag)));
+        let id = |dag| DagId(to_u32(dag));
+        let failed = failed.into_iter().map(|(dag, why)| (dag.map(id), why));
         return Some(Err(failed.collect()));
     };
     // Priorities that the app states may rank DAGs in another way than by deadline.
@@ -183,13 +186,14 @@ fn lend_cores(
 /// Divides the cores by federated scheduling.
 fn federate(
     task_set: &mut TaskSet,
+    bursts: &WorkloadBursts,
     tasks: &[Task],
     settings: &AnalysisSettings,
 ) -> Result<(), NotAssigned> {
     // The cores of each cluster, and where each DAG is.
     let mut sizes = Vec::new();
     let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
-    let mut left = settings.cores;
+    let (mut tables, mut left) = (Vec::new(), settings.cores);
     let mut light = Vec::new();
     for (dag, task) in tasks.iter().enumerate() {
         let (volume_ns, within_ns) = density(task);
@@ -208,16 +212,27 @@ fn federate(
             };
             return Err(refused(dag, too_long));
         }
-        let allows = fixed_order::allows(&task_set.dags()[dag]);
-        let is_enough = |&count: &u32| {
-            let fixed = || fixed_order::shorter(task, count).filter(|_| allows);
-            multi_path(task, count).is_some_and(|ns| ns <= within_ns)
-                || fixed().is_some_and(|schedule| schedule.length_ns() <= within_ns)
+        let may_have_table = settings.preemption == Preemption::Enabled
+            && !task.has_waits()
+            && task_set.dags()[dag].locks().is_empty()
+            && task.table_terms().sink_deadlines_ns.is_empty();
+        let (_, limit_ns) = late_and_limit_ns(bursts, task);
+        let enough = |count: u32| {
+            if multi_path(task, count).is_some_and(|ns| ns <= within_ns) {
+                return Some((count, None));
+            }
+            let limits_ns = vec![limit_ns; task.subtask_count().min(count as usize)];
+            let schedule = ListSchedule::within(task, &limits_ns).filter(|_| may_have_table)?;
+            Some((count, Some(schedule.table(dag, task.period_ns(), 0))))
         };
         // The least number that proves it, since light DAGs share what is left.
-        let Some(count) = (1..=left).find(is_enough) else {
+        let Some((count, table)) = (1..=left).find_map(enough) else {
             return Err(refused(dag, AssignmentFailure::TooHeavy { left }));
         };
+        tables.extend(table.map(|table| Table {
+            cluster: ClusterId(to_u32(sizes.len())),
+            ..table
+        }));
         let why = match volume_ns > within_ns {
             true => AssignmentReason::Heavy {
                 volume_ns,
@@ -231,6 +246,7 @@ fn federate(
     }
     pack(tasks, light, left, &mut sizes, &mut of_dags)?;
     task_set.divide(&sizes, &of_dags);
+    task_set.set_tables(tables);
     Ok(())
 }
 
@@ -245,8 +261,7 @@ fn refused(dag: usize, reason: AssignmentFailure) -> NotAssigned {
 
 /// Returns the work of a job, and the time in which one core would have to do it.
 fn density(task: &Task) -> (u64, u64) {
-    let within_ns = task.relative_deadline_ns().min(task.period_ns());
-    (task.volume_ns(), within_ns)
+    (task.volume_ns(), task.within_ns())
 }
 
 /// Packs light DAGs onto clusters of one core each, at most `left`.
@@ -376,7 +391,6 @@ mod tests {
         };
         let mut divided = verified.task_set;
         assign(&mut divided, &settings)?;
-        crate::analysis::fix_orders(&mut divided, &settings);
         let answer = crate::analysis::answer(&divided, &settings);
         assert!(answer.is_proven(), "{:?}", answer.first_failing);
         Ok(divided)
@@ -421,11 +435,9 @@ mod tests {
     }
 
     #[test]
-    fn an_order_that_may_be_fixed_needs_fewer_cores() {
-        let mut dag = parallel(&[3, 3, 2, 2, 2], 7);
-        assert_eq!(sizes(&assigned(&[dag.clone()], 4).unwrap()), [3]);
-        dag.order = crate::SubtaskOrder::Fixed;
-        assert_eq!(sizes(&assigned(&[dag], 4).unwrap()), [2]);
+    fn a_table_needs_fewer_cores() {
+        let found = assigned(&[parallel(&[3, 3, 2, 2, 2], 7)], 4).unwrap();
+        assert_eq!((sizes(&found), found.tables().len()), (vec![2], 1));
     }
 
     #[test]

@@ -1,51 +1,63 @@
-//! Lending: the cores of a commit divided among DAGs, heavy ones with a fixed order on cores of their
-//! own, light ones on what these leave.
+//! Lending: the cores of a commit divided among DAGs, some with a table on cores of their own,
+//! others on what these leave.
 //!
-//! A DAG is *heavy* if its volume exceeds its deadline, so that no core alone is enough for it, else
-//! *light*. There are five [attempts](LendingAttempt), and the first that proves a bound for every
-//! DAG is taken. In the first one all DAGs share all cores. In the others:
+//! A DAG is *heavy* if its volume exceeds the time until its deadline or the next release, so that no
+//! core alone is enough for it, else *light*. There are seven [attempts](LendingAttempt), and the
+//! first that proves a bound for every DAG is taken. In the first one all DAGs share all cores. In
+//! the next four:
 //!
 //! - *Owners*: the heavy DAGs, the one with the least slack `D - length` first, take the first cores
 //!   that are left, each the least number on which its [list schedule](ListSchedule) ends by its
-//!   deadline. One for which too few are left is *late*.
+//!   deadline: a table of one DAG. One for which too few are left is *late*.
 //! - *Members*: the late DAGs and then the light ones are placed one by one: on the first core on
 //!   which it is proven with all that are there; else in the first group of several cores; else on
 //!   cores that are in no group yet, the least busy ones first, as few as prove it.
 //!
-//! In the last two attempts the owners' lists are squeezed before that. A member that is placed
-//! lowers nobody's bound but those of its own group, which depend on the supplies of the group's
-//! cores ([`CoreSupply`]) and on its members only.
+//! In two of these the owners' lists are squeezed before that. In the last two attempts as many
+//! periodic DAGs as a lap has room for are a *family*, which gets one table (`table_making`); heavy
+//! ones of the rest are owners, on the last cores, and all others members. The family has as few
+//! cores less as members need, if they need any.
 //!
-//! Guaranteed: every job of every DAG responds within its bound, if the plan is enforced: owners'
-//! subtasks on their cores in the order of the lists and above all else, members on the cores of
-//! their group by deadline (ties by position) and below owners. See `docs/bounds.md`, "Lent cores".
+//! A member that is placed lowers nobody's bound but those of its own group, which depend on the
+//! supplies of the group's cores ([`CoreSupply`]) and on its members only.
+//!
+//! Guaranteed: every job of every DAG responds within its bound, if the plan is enforced: tables by
+//! T1 to T3, members on the cores of their group by deadline (ties by position) and below the
+//! entries of tables. See `docs/bounds.md`, "Tables".
 //!
 //! Not guaranteed: that a set which is not proven misses a deadline, or that no other division
-//! would prove it. DAGs with `D > T` and DAGs that wait are not covered.
+//! would prove it. DAGs that wait are not covered.
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT, parts_per_million};
 use super::list_schedule::ListSchedule;
 use super::ratio::sort_largest_first;
 use super::set::constrained;
+use super::table_making::{TableFamily, TableMethod, may_be_member};
 use super::task::Task;
 use super::workload::WorkloadBursts;
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
-use crate::policy::{AssignmentReason, LendingAttempt};
+use crate::policy::{AssignmentReason, AttemptFailure, LendingAttempt};
+use crate::table::{Table, TableEntry};
 use crate::task_set::TaskSet;
 
-/// A heavy DAG on cores of its own.
+/// DAGs with a table on cores of their own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoreOwner {
-    /// The position of the DAG.
-    pub dag: usize,
-    /// The first of its cores, which follow one another.
+    /// The positions of the DAGs: a heavy one, or a family.
+    pub dags: Vec<usize>,
+    /// The first of the cores, which follow one another.
     pub first_core: usize,
-    /// Its lists; the bound is [`ListSchedule::length_ns`].
-    pub schedule: ListSchedule,
+    /// The number of cores, not all of which need have a list.
+    pub cores: usize,
+    /// The table, on cores that are counted from 0 of all.
+    pub table: Table,
+    /// The number of tries that it took.
+    pub tries: u32,
 }
 
 /// Cores that DAGs share, with what owners leave of them.
@@ -67,8 +79,6 @@ pub struct LendingPlan {
     pub owners: Vec<CoreOwner>,
     /// The groups, in the order in which they were made; each DAG is an owner or in one of them.
     pub groups: Vec<LentGroup>,
-    /// By core, what its owner leaves.
-    pub supplies: Vec<CoreSupply>,
 }
 
 /// The outcome of all attempts.
@@ -76,8 +86,8 @@ pub struct LendingPlan {
 pub struct LendingAnswer {
     /// The plan; `None`: no attempt proved all DAGs.
     pub plan: Option<LendingPlan>,
-    /// For each attempt that failed, the position of the DAG for which it found no place.
-    pub failed: Vec<usize>,
+    /// For each attempt that failed, why, and the position of the DAG, if there is a first one.
+    pub failed: Vec<(Option<usize>, AttemptFailure)>,
 }
 
 impl LendingPlan {
@@ -89,7 +99,6 @@ impl LendingPlan {
             attempt: LendingAttempt::Whole,
             owners: Vec::new(),
             groups: vec![group],
-            supplies: vec![CoreSupply::UNOWNED; cores],
         }
     }
 
@@ -107,22 +116,32 @@ impl LendingPlan {
             found.expect("owners and groups make the clusters")
         };
         let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
+        let mut tables = Vec::new();
         for owner in &self.owners {
             let (cluster, first) = place(owner.first_core);
-            let cores = owner.schedule.places().into_iter().map(|core| first + core);
-            let dag = DagId(to_u32(owner.dag));
-            let mut order =
-                task_set.ordered(dag, &owner.schedule.edges(), &cores.collect::<Vec<_>>());
-            task_set.exchange(dag, &mut order);
-            let task = tasks[owner.dag];
-            let own = owner.first_core..owner.first_core + owner.schedule.cores.len();
-            let why = AssignmentReason::Owner {
-                attempt: self.attempt,
-                volume_ns: task.volume_ns(),
-                within_ns: task.relative_deadline_ns(),
-                left_percent: self.left_percent(&own.collect::<Vec<_>>(), tasks),
-            };
-            of_dags[owner.dag] = (cluster, why);
+            let mut table = owner.table.clone();
+            table.cluster = cluster;
+            for list in &mut table.lists {
+                list.core = list.core - to_u32(owner.first_core) + first;
+            }
+            tables.push(table);
+            let left_percent = self.left_percent(&owner.own_cores(), tasks);
+            for &dag in &owner.dags {
+                let (attempt, task) = (self.attempt, tasks[dag]);
+                let why = match attempt {
+                    LendingAttempt::Nest | LendingAttempt::Lazy => AssignmentReason::Table {
+                        attempt,
+                        left_percent,
+                    },
+                    _ => AssignmentReason::Owner {
+                        attempt,
+                        volume_ns: task.volume_ns(),
+                        within_ns: task.within_ns(),
+                        left_percent,
+                    },
+                };
+                of_dags[dag] = (cluster, why);
+            }
         }
         for group in &self.groups {
             let (cluster, _) = place(group.cores[0]);
@@ -146,15 +165,13 @@ impl LendingPlan {
         }
         let sizes: Vec<u32> = clusters.iter().map(|cores| to_u32(cores.len())).collect();
         task_set.divide(&sizes, &of_dags);
+        task_set.set_tables(tables);
     }
 
     /// Returns the cores of each cluster, ascending.
     fn clusters(&self) -> Vec<Vec<usize>> {
         let mut clusters: Vec<Vec<usize>> = Vec::new();
-        let own = self.owners.iter().map(|owner| {
-            let first = owner.first_core;
-            (first..first + owner.schedule.cores.len()).collect()
-        });
+        let own = self.owners.iter().map(CoreOwner::own_cores);
         for cores in own.chain(self.groups.iter().map(|group| group.cores.clone())) {
             let (met, mut apart): (Vec<_>, Vec<_>) = (clusters.into_iter())
                 .partition(|cluster| cluster.iter().any(|core| cores.contains(core)));
@@ -178,10 +195,15 @@ impl LendingPlan {
     /// Returns how much of the time of some cores, in hundredths, is left by their owners and by
     /// the members of groups on them.
     fn left_percent(&self, cores: &[usize], tasks: &[&Task]) -> u32 {
-        let mut taken: u64 = cores
-            .iter()
-            .map(|&core| self.supplies[core].taken_ppm())
-            .sum();
+        let of_list = |core: &usize| {
+            let owns = |owner: &&CoreOwner| owner.own_cores().contains(core);
+            let table = &self.owners.iter().find(owns)?.table;
+            let work_ns =
+                |entry: &TableEntry| tasks[entry.dag.index()].wcets_ns()[entry.subtask.index()];
+            let entries = table.list(to_u32(*core))?.entries.iter();
+            Some(parts_per_million(entries.map(work_ns).sum(), table.lap_ns))
+        };
+        let mut taken: u64 = cores.iter().filter_map(of_list).sum();
         for group in &self.groups {
             let shared = group
                 .cores
@@ -200,136 +222,270 @@ impl LendingPlan {
     }
 }
 
-/// Divides cores among DAGs by the analysis of lent cores in `docs/bounds.md`.
-///
-/// `None` if it does not apply: there is no core, a DAG has `D > T`, or a subtask waits.
-#[must_use]
-pub fn lend(tasks: &[&Task], cores: u32) -> Option<LendingAnswer> {
-    lend_amid(&WorkloadBursts::default(), tasks, cores)
+/// The most entries in a lap of the table of several DAGs that a commit makes.
+pub const ENTRY_LIMIT: usize = 4096;
+
+/// What divisions depend on besides the DAGs.
+pub(super) struct LendingTerms<'b> {
+    pub(super) bursts: &'b WorkloadBursts,
+    /// The most entries in a lap; 0: there may be no table of several DAGs.
+    pub(super) entry_limit: usize,
+    /// Whether DAGs may share cores, by static priorities.
+    pub(super) has_members: bool,
 }
 
-/// As [`lend`], with long steps of the scheduler.
-pub(super) fn lend_amid(
-    bursts: &WorkloadBursts,
-    tasks: &[&Task],
-    cores: u32,
-) -> Option<LendingAnswer> {
-    if !constrained(tasks, cores) || tasks.iter().any(|task| task.has_waits()) {
-        return None;
-    }
-    let members = (tasks.iter()).map(|task| MemberTask::of(task, cores, bursts));
-    let members: Vec<MemberTask<'_>> = members.collect();
-    let count = cores as usize;
-    let (mut owners, mut late, mut failed) = (Vec::new(), Vec::new(), Vec::new());
-    for attempt in LendingAttempt::ALL {
-        match attempt {
-            LendingAttempt::ByDensity => (owners, late) = own_cores(bursts, tasks, count),
-            LendingAttempt::SqueezedByDensity => squeeze(bursts, tasks, &mut owners),
-            // The owners of the attempt before, and none at first.
-            _ => {}
+/// Divides cores among DAGs by the analysis of tables in `docs/bounds.md`; a table of several DAGs
+/// has a number of entries at most ([`ENTRY_LIMIT`] where a commit makes it).
+///
+/// `None` if it does not apply: there is no core, or a subtask waits.
+#[must_use]
+pub fn lend(tasks: &[&Task], cores: u32, entry_limit: usize) -> Option<LendingAnswer> {
+    let terms = LendingTerms {
+        bursts: &WorkloadBursts::default(),
+        entry_limit,
+        has_members: true,
+    };
+    terms.lend(tasks, cores)
+}
+
+/// Why an attempt failed, of which DAG.
+type Failed = (Option<usize>, AttemptFailure);
+
+impl LendingTerms<'_> {
+    /// As [`lend`].
+    pub(super) fn lend(&self, tasks: &[&Task], cores: u32) -> Option<LendingAnswer> {
+        if cores == 0 || tasks.iter().any(|task| task.has_waits()) {
+            return None;
         }
-        let mut placement = MemberPlacing::of(bursts, &members, &owners, count);
-        let placed = match attempt {
-            LendingAttempt::Whole => placement.share_all(),
-            _ => placement.place_all(late.iter().copied().chain(attempt.light(tasks))),
-        };
-        match placed {
-            Err(dag) => failed.push(dag),
-            Ok(()) => {
-                let (groups, supplies) = (placement.groups, placement.supplies);
-                let plan = Some(LendingPlan {
-                    attempt,
-                    owners,
-                    groups,
-                    supplies,
-                });
-                return Some(LendingAnswer { plan, failed });
+        let members = tasks
+            .iter()
+            .map(|task| MemberTask::of(task, cores, self.bursts));
+        let members: Vec<MemberTask<'_>> = members.collect();
+        let are_plain = self.has_members
+            && constrained(tasks, cores)
+            && tasks.iter().all(|task| may_be_member(task));
+        let all: Vec<usize> = (0..tasks.len()).collect();
+        let count = cores as usize;
+        let (mut owners, mut late, mut failed) = (Vec::new(), Vec::new(), Vec::new());
+        let mut family = None;
+        for attempt in LendingAttempt::ALL {
+            match attempt {
+                LendingAttempt::ByDensity if are_plain => {
+                    (owners, late) = self.own_cores(tasks, &all, 0..count)
+                }
+                LendingAttempt::SqueezedByDensity => self.squeeze(tasks, &mut owners),
+                // The owners of the attempt before, and none at first.
+                _ => {}
+            }
+            let placed = match attempt {
+                LendingAttempt::Nest => {
+                    let family = family.get_or_insert(TableFamily::of(tasks, self.entry_limit));
+                    self.with_family(family, &members, count, TableMethod::Nest)
+                }
+                LendingAttempt::Lazy => {
+                    let family = family.get_or_insert(TableFamily::of(tasks, self.entry_limit));
+                    self.with_family(family, &members, count, TableMethod::Lazy)
+                }
+                _ if !are_plain => Err((None, AttemptFailure::Excluded)),
+                _ => {
+                    let owners: Vec<_> = owners.iter().map(HeavyOwner::with_table).collect();
+                    let mut placement = MemberPlacing::of(self.bursts, &members, &owners, count);
+                    let placed = match attempt {
+                        LendingAttempt::Whole => placement.share_all(),
+                        _ => placement
+                            .place_all(late.iter().copied().chain(attempt.light(tasks, &all))),
+                    };
+                    placed
+                        .map(|()| (owners, placement.groups))
+                        .map_err(|dag| (Some(dag), AttemptFailure::Lent))
+                }
+            };
+            match placed {
+                Err(of) => failed.push(of),
+                Ok((owners, groups)) => {
+                    let plan = Some(LendingPlan {
+                        attempt,
+                        owners,
+                        groups,
+                    });
+                    return Some(LendingAnswer { plan, failed });
+                }
             }
         }
+        Some(LendingAnswer { plan: None, failed })
     }
-    Some(LendingAnswer { plan: None, failed })
+
+    /// Makes the table of a family, and places the DAGs that are not in it.
+    fn with_family(
+        &self,
+        family: &mut TableFamily<'_>,
+        members: &[MemberTask<'_>],
+        cores: usize,
+        method: TableMethod,
+    ) -> Result<(Vec<CoreOwner>, Vec<LentGroup>), Failed> {
+        let tasks: Vec<&Task> = members.iter().map(|of| of.task).collect();
+        if family.dags.is_empty() {
+            return Err((None, AttemptFailure::Nothing));
+        }
+        let mut rest: Vec<usize> = (0..tasks.len())
+            .filter(|dag| !family.dags.contains(dag))
+            .collect();
+        if let Some(&dag) = rest.iter().find(|&&dag| !may_be_member(tasks[dag])) {
+            return Err((Some(dag), AttemptFailure::Member));
+        }
+        let (mut heavy, late) = self.own_cores(&tasks, &rest, 0..cores - 1);
+        rest.retain(|&dag| heavy.iter().all(|owner| owner.dag != dag));
+        if let Some(&dag) = rest.first().filter(|_| !self.has_members) {
+            return Err((Some(dag), AttemptFailure::Member));
+        }
+        // The table has the first cores.
+        let left = cores
+            - heavy
+                .iter()
+                .map(|owner| owner.schedule.cores.len())
+                .sum::<usize>();
+        heavy.iter_mut().for_each(|owner| owner.first_core += left);
+        let light = LendingAttempt::Nest.light(&tasks, &rest);
+        let order: Vec<usize> = late.into_iter().chain(light).collect();
+        let (mut first_failure, fewer) = (None, family.least_cores()..left);
+        for count in core::iter::once(left).chain(fewer) {
+            let (table, tries) = match family.make(count, method) {
+                Ok(made) => made,
+                Err(late) if count == left => return Err((late, AttemptFailure::Late)),
+                Err(_) => continue,
+            };
+            let mut owners = vec![CoreOwner {
+                dags: family.dags.clone(),
+                first_core: 0,
+                cores: count,
+                table,
+                tries,
+            }];
+            owners.extend(heavy.iter().map(HeavyOwner::with_table));
+            let mut placement = MemberPlacing::of(self.bursts, members, &owners, cores);
+            match placement.place_all(order.iter().copied()) {
+                Ok(()) => return Ok((owners, placement.groups)),
+                Err(dag) => first_failure = first_failure.or(Some(dag)),
+            }
+        }
+        Err((first_failure, AttemptFailure::Place))
+    }
+
+    /// Gives heavy DAGs of these cores of their own, and returns those for which too few are left.
+    fn own_cores<'t>(
+        &self,
+        tasks: &[&'t Task],
+        dags: &[usize],
+        cores: Range<usize>,
+    ) -> (Vec<HeavyOwner<'t>>, Vec<usize>) {
+        let mut heavy: Vec<usize> = dags
+            .iter()
+            .copied()
+            .filter(|&dag| is_heavy(tasks[dag]))
+            .collect();
+        sort_by_key(&mut heavy, |dag| {
+            i128::from(tasks[dag].within_ns()) - i128::from(tasks[dag].length_ns())
+        });
+        let (mut owners, mut late, mut first_core) = (Vec::new(), Vec::new(), cores.start);
+        for dag in heavy {
+            let (task, (_, limit_ns)) = (tasks[dag], late_and_limit_ns(self.bursts, tasks[dag]));
+            let least = task.volume_ns().div_ceil(limit_ns.max(1));
+            let least = usize::try_from(least).unwrap_or(usize::MAX);
+            let most = task.subtask_count().min(cores.end - first_core);
+            let on = |count| ListSchedule::within(task, &vec![limit_ns; count]);
+            match (least..=most).find_map(on) {
+                Some(schedule) => {
+                    let count = schedule.cores.len();
+                    owners.push(HeavyOwner {
+                        dag,
+                        task,
+                        first_core,
+                        schedule,
+                    });
+                    first_core += count;
+                }
+                None => late.push(dag),
+            }
+        }
+        (owners, late)
+    }
+
+    fn squeeze(&self, tasks: &[&Task], owners: &mut [HeavyOwner<'_>]) {
+        for HeavyOwner { dag, schedule, .. } in owners {
+            let (_, limit_ns) = late_and_limit_ns(self.bursts, tasks[*dag]);
+            *schedule = schedule.squeezed(tasks[*dag], limit_ns);
+        }
+    }
+}
+
+/// A heavy DAG on cores of its own.
+struct HeavyOwner<'t> {
+    dag: usize,
+    task: &'t Task,
+    first_core: usize,
+    schedule: ListSchedule,
+}
+
+impl HeavyOwner<'_> {
+    fn with_table(&self) -> CoreOwner {
+        CoreOwner {
+            dags: vec![self.dag],
+            first_core: self.first_core,
+            cores: self.schedule.cores.len(),
+            table: self
+                .schedule
+                .table(self.dag, self.task.period_ns(), self.first_core),
+            tries: 1,
+        }
+    }
+}
+
+impl CoreOwner {
+    fn own_cores(&self) -> Vec<usize> {
+        (self.first_core..self.first_core + self.cores).collect()
+    }
 }
 
 impl LendingAttempt {
     /// All attempts, in their order.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Whole,
         Self::ByDensity,
         Self::ByDeadline,
         Self::SqueezedByDensity,
         Self::SqueezedByDeadline,
+        Self::Nest,
+        Self::Lazy,
     ];
 
-    /// Returns the positions of the light DAGs in the order in which they are placed.
-    fn light(self, tasks: &[&Task]) -> Vec<usize> {
-        let mut light: Vec<usize> = (0..tasks.len())
+    /// Returns the light ones of some DAGs in the order in which they are placed.
+    fn light(self, tasks: &[&Task], dags: &[usize]) -> Vec<usize> {
+        let mut light: Vec<usize> = dags
+            .iter()
+            .copied()
             .filter(|&dag| !is_heavy(tasks[dag]))
             .collect();
-        let deadline_ns = |dag: usize| tasks[dag].relative_deadline_ns();
+        let within_ns = |dag: usize| tasks[dag].within_ns();
         match self {
-            Self::ByDensity | Self::SqueezedByDensity => {
-                sort_largest_first(&mut light, |dag| (tasks[dag].volume_ns(), deadline_ns(dag)));
-            }
-            _ => sort_by_key(&mut light, deadline_ns),
+            Self::ByDeadline | Self::SqueezedByDeadline => sort_by_key(&mut light, within_ns),
+            _ => sort_largest_first(&mut light, |dag| (tasks[dag].volume_ns(), within_ns(dag))),
         }
         light
     }
 }
 
-const fn is_heavy(task: &Task) -> bool {
-    task.volume_ns() > task.relative_deadline_ns()
+fn is_heavy(task: &Task) -> bool {
+    task.volume_ns() > task.within_ns()
 }
 
 /// Returns by how much an owner's subtasks are late at most, and when its lists have to end for that.
-fn late_and_limit_ns(bursts: &WorkloadBursts, task: &Task) -> (u64, u64) {
-    let deadline_ns = task.relative_deadline_ns();
-    let late_ns = u64::try_from(bursts.during(deadline_ns.into())).unwrap_or(u64::MAX);
-    (late_ns, deadline_ns.saturating_sub(late_ns))
+pub(super) fn late_and_limit_ns(bursts: &WorkloadBursts, task: &Task) -> (u64, u64) {
+    let within_ns = task.within_ns();
+    let late_ns = u64::try_from(bursts.during(within_ns.into())).unwrap_or(u64::MAX);
+    (late_ns, within_ns.saturating_sub(late_ns))
 }
 
-/// Gives heavy DAGs cores of their own, and returns those for which too few are left.
-fn own_cores(
-    bursts: &WorkloadBursts,
-    tasks: &[&Task],
-    cores: usize,
-) -> (Vec<CoreOwner>, Vec<usize>) {
-    let mut heavy: Vec<usize> = (0..tasks.len())
-        .filter(|&dag| is_heavy(tasks[dag]))
-        .collect();
-    sort_by_key(&mut heavy, |dag| {
-        i128::from(tasks[dag].relative_deadline_ns()) - i128::from(tasks[dag].length_ns())
-    });
-    let (mut owners, mut late, mut first_core) = (Vec::new(), Vec::new(), 0);
-    for dag in heavy {
-        let (task, (_, limit_ns)) = (tasks[dag], late_and_limit_ns(bursts, tasks[dag]));
-        let least = task.volume_ns().div_ceil(limit_ns.max(1));
-        let least = usize::try_from(least).unwrap_or(usize::MAX);
-        let most = task.subtask_count().min(cores - first_core);
-        let on = |count| ListSchedule::within(task, &vec![limit_ns; count]);
-        match (least..=most).find_map(on) {
-            Some(schedule) => {
-                let count = schedule.cores.len();
-                owners.push(CoreOwner {
-                    dag,
-                    first_core,
-                    schedule,
-                });
-                first_core += count;
-            }
-            None => late.push(dag),
-        }
-    }
-    (owners, late)
-}
-
-fn squeeze(bursts: &WorkloadBursts, tasks: &[&Task], owners: &mut [CoreOwner]) {
-    for CoreOwner { dag, schedule, .. } in owners {
-        let (_, limit_ns) = late_and_limit_ns(bursts, tasks[*dag]);
-        *schedule = schedule.squeezed(tasks[*dag], limit_ns);
-    }
-}
-
-/// Members on what the owners leave, as far as they are placed.
+/// Members on what the tables leave, as far as they are placed.
 struct MemberPlacing<'a> {
     members: &'a [MemberTask<'a>],
     supplies: Vec<CoreSupply>,
@@ -345,14 +501,15 @@ impl<'a> MemberPlacing<'a> {
         owners: &[CoreOwner],
         cores: usize,
     ) -> Self {
-        let mut supplies = vec![CoreSupply::UNOWNED; cores];
-        for owner in owners {
-            let task = members[owner.dag].task;
-            let (late_ns, _) = late_and_limit_ns(bursts, task);
-            let times_ns = (owner.schedule.length_ns(), late_ns);
-            let own = supplies[owner.first_core..].iter_mut();
-            for (supply, list) in own.zip(&owner.schedule.cores) {
-                *supply = CoreSupply::of(task.period_ns(), list, times_ns);
+        let mut supplies = vec![CoreSupply::FREE; cores];
+        let of_tables: usize = owners.iter().map(|owner| owner.dags.len()).sum();
+        // Without members nobody asks what is left.
+        for owner in owners.iter().filter(|_| of_tables < members.len()) {
+            let (late_ns, _) = late_and_limit_ns(bursts, members[owner.dags[0]].task);
+            for list in &owner.table.lists {
+                let task = |dag: DagId| members[dag.index()].task;
+                let supply = CoreSupply::of_list(&owner.table, list, task, late_ns);
+                supplies[list.core as usize] = supply;
             }
         }
         Self {
@@ -367,7 +524,7 @@ impl<'a> MemberPlacing<'a> {
     fn share_all(&mut self) -> Result<(), usize> {
         let mut group = LentGroup::of((0..self.supplies.len()).collect());
         let members = self.members;
-        let deadline_ns = |dag: usize| members[dag].task.relative_deadline_ns();
+        let deadline_ns = |dag: usize| members[dag].task.within_ns();
         for dag in sorted_by_key(members.len(), deadline_ns) {
             group = self.join(group, dag).ok_or(dag)?;
         }
@@ -404,7 +561,7 @@ impl<'a> MemberPlacing<'a> {
     /// busy first.
     fn place_in_new_group(&mut self, dag: usize) -> bool {
         let task = self.members[dag].task;
-        let (deadline_ns, length_ns) = (task.relative_deadline_ns(), task.length_ns());
+        let (deadline_ns, length_ns) = (task.within_ns(), task.length_ns());
         let busy_ns = |core: usize| self.supplies[core].busy_ns(deadline_ns);
         let mut free: Vec<usize> = (0..self.supplies.len())
             .filter(|&core| self.group_of(core).is_none())
@@ -436,7 +593,7 @@ impl<'a> MemberPlacing<'a> {
     /// Returns a group with one more member if all of them are proven in it.
     fn join(&mut self, mut group: LentGroup, dag: usize) -> Option<LentGroup> {
         let members = self.members;
-        let urgency = |dag: usize| (members[dag].task.relative_deadline_ns(), dag);
+        let urgency = |dag: usize| (members[dag].task.within_ns(), dag);
         let is_above = |&(other, _): &(usize, u64)| urgency(other) < urgency(dag);
         let place = group.members.partition_point(is_above);
         group.members.insert(place, (dag, 0));
@@ -468,7 +625,7 @@ mod tests {
     use random::Random;
 
     fn lent(tasks: &[Task], cores: u32) -> LendingAnswer {
-        lend(&tasks.iter().collect::<Vec<_>>(), cores).expect("it applies")
+        lend(&tasks.iter().collect::<Vec<_>>(), cores, 0).expect("it applies")
     }
 
     #[test]
@@ -503,16 +660,18 @@ mod tests {
     #[test]
     fn what_is_not_covered_gets_no_answer() {
         let task = |deadline_ns| Task::new(10, deadline_ns, vec![2, 3], &[]).unwrap();
-        assert!(lend(&[&task(10)], 1).is_some());
-        assert_eq!(lend(&[&task(10)], 0), None);
-        assert_eq!(lend(&[&task(10), &task(11)], 2), None);
+        assert!(lend(&[&task(10)], 1, 0).is_some());
+        assert_eq!(lend(&[&task(10)], 0, 0), None);
+        // A job that may overlap the next one is for a table only.
+        let excluded = [(None, AttemptFailure::Excluded); 5];
+        assert_eq!(lent(&[task(10), task(11)], 2).failed[..5], excluded);
         let waits = |&wcet_ns: &u64| SubtaskWaits {
             count: 1,
             limits_ns: 1,
             longest_segment_ns: wcet_ns,
         };
         let waiting = task(10).with_waits([2, 3].iter().map(waits).collect());
-        assert_eq!(lend(&[&waiting.unwrap()], 2), None);
+        assert_eq!(lend(&[&waiting.unwrap()], 2, 0), None);
         // Nothing has to be proven of no DAG.
         assert_eq!(lent(&[], 2).failed, []);
     }
@@ -521,8 +680,8 @@ mod tests {
     fn large_numbers_are_not_proven_rather_than_wrong() {
         let large = Task::new(u64::MAX, u64::MAX - 1, vec![u64::MAX], &[]).unwrap();
         let half = || Task::new(u64::MAX, u64::MAX, vec![u64::MAX / 2 + 1], &[]).unwrap();
-        assert_eq!(lent(&[half(), large], 4).failed, [1; 5]);
-        let answer = lent(&[half(), half(), half()], 2);
-        assert_eq!(answer.failed, [2; 5]);
+        let failed = |dag| [(Some(dag), AttemptFailure::Lent); 5];
+        assert_eq!(lent(&[half(), large], 4).failed[..5], failed(1));
+        assert_eq!(lent(&[half(), half(), half()], 2).failed[..5], failed(2));
     }
 }

@@ -1,18 +1,16 @@
-//! Cores that are lent: the time that an owner takes from them, and response times in the rest.
+//! Cores that are lent: the time that a table takes from them, and response times in the rest.
 //!
-//! A heavy DAG *owns* cores: it executes there by a [list schedule](super::ListSchedule), and nothing
-//! wins over it. What its lists leave is *lent* to a *group*: some cores, and DAGs that are its
-//! *members*, the more urgent first by deadline. On cores of a group on which no owner's subtask
-//! executes, ready subtasks of its members do. Proofs are in `docs/bounds.md`, "Lent cores"; here
-//! in short.
+//! On the cores of a table nothing wins over its entries. What these leave is *lent* to a *group*:
+//! some cores, and DAGs that are its *members*, the more urgent first by deadline. On cores of a group
+//! on which no entry executes, ready subtasks of its members do. Proofs are in `docs/bounds.md`,
+//! "Tables"; here in short.
 //!
-//! *Busy time.* In a window of length `r` the owner, of period `T`, executes on one of its cores for
-//! [`busy_ns`](CoreSupply::busy_ns) at most. Let `b` be the core's work of one job, `s_x` the start
-//! of the x-th subtask of its list, `S(s_x)` the work of the list from there on, and
-//! `Z(z) = (z / T) b + min(b, z mod T)`. Then it is the largest of `min(b, r)` and of
-//! `S(s_x) + Z(r + s_x - T)` for all x with `r + s_x > T`: the window begins with the rest of one
-//! job, and all that can follow does. So `r - busy(r)` is the core's supply bound function
-//! (I. Shin, I. Lee, RTSS 2003).
+//! *Busy time.* Let `t` be the begin of a stretch without idle time in the table. Of the entries that
+//! start at `t` or later, let all that are released by `t` be there at once, and the others at their
+//! releases. A core that is never idle with work executes as much of that in the `r` after `t` as the
+//! table does in no such window more: `busy(r)` is the most over all `t`. It is not what the table
+//! executes, since an entry that ends early brings later ones forward. So `r - busy(r)` is the core's
+//! supply bound function (I. Shin, I. Lee, RTSS 2003).
 //!
 //! *One core.* A member is a sequence of its volume there. Its response time is the least `r` with
 //! `r >= volume + sum of (r / T_h) volume_h (ceiling) + busy(r)`, over the more urgent members h.
@@ -23,111 +21,231 @@
 //! - `(q - j) x >= B_j + sum of busy(r) + sum of W_h(r)`, or
 //! - `(q - j) x >= max(1, B_j) + sum of min(busy(r), x) + sum of W_h(r) clipped to x`.
 //!
-//! *Long steps* (bursts, in `workload`) take `E(r)` from every core. An owner's subtasks are late by
-//! as much then, so its lists are shifted; and `E(r)`, or `(q - j) E(r)`, is added on the right. So is,
-//! on several cores, the time for going on elsewhere with what an owner's subtask finds on its core.
+//! *Long steps* (bursts, in `workload`) take `E(r)` from every core. The entries of a table of one DAG
+//! are late by as much then, so `t` is; and `E(r)`, or `(q - j) E(r)`, is added on the right. So is,
+//! on several cores, the time for going on elsewhere with what an entry finds on its core.
 //!
-//! Assumes: `D <= T` for all, subtasks that can be preempted and do not wait, and bounds that all
-//! owners and more urgent members keep. Releases may be sporadic.
+//! Assumes: a table that is right, members of which a job is complete by the next release, subtasks
+//! that can be preempted and do not wait, and bounds that all more urgent members keep. Members
+//! may be sporadic.
 //!
-//! Traps: a job of the owner that is under way when the window begins, which the form without
-//! `S(s_x)` leaves out; and `max(1, ..)`, as in `multi_path`.
+//! Traps: entries that are under way or overdue when the window begins; and `max(1, ..)`, as in
+//! `multi_path`.
 
 use alloc::vec::Vec;
 
 use super::cover::parallelism_covers_and_parts;
-use super::list_schedule::ScheduledSubtask;
 use super::task::Task;
 use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
-use crate::ids::to_u32;
+use crate::ids::{DagId, to_u32};
+use crate::order::sorted_by_key;
+use crate::table::{CoreList, Table};
 
-/// The time that one core supplies besides its owner's subtasks.
+/// The time that one core supplies besides the entries of its table.
 ///
-/// See the analysis of lent cores in `docs/bounds.md`.
+/// See "Tables" in `docs/bounds.md`. In a window that begins with a stretch of the table the
+/// core is busy without a break at first; from `full_ns` on, the busy time repeats by laps. Within
+/// one it is the most of all *ramps*: `w - idle`, up to `top`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoreSupply {
-    /// The owner's period; without an owner any.
-    period_ns: u64,
-    /// When the owner's jobs are complete, from their releases on.
-    response_ns: u64,
-    /// The owner's subtasks on this core, in the order of their starts.
-    tails: Vec<ListTail>,
+    lap_ns: u64,
+    /// The work of one lap.
+    work_ns: u64,
+    full_ns: u64,
+    /// The idle time in a window, and the most work; both ascending.
+    ramps: Vec<(u64, u64)>,
+    /// The number of entries in a lap, and for how long one may have been released as it starts.
+    starts: usize,
+    waiting_ns: u64,
 }
 
-/// The part of a list from one subtask on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct ListTail {
-    start_ns: u64,
-    /// The sum of the WCETs.
-    work_ns: u64,
+/// An entry, with its WCET alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SuppliedEntry {
+    /// From the beginning of the lap on; negative: before that.
+    pub(super) release_ns: i64,
+    pub(super) start_ns: u64,
+    pub(super) wcet_ns: u64,
 }
 
 impl CoreSupply {
-    /// A core that nobody owns.
-    pub(super) const UNOWNED: Self = Self {
-        period_ns: 1,
-        response_ns: 0,
-        tails: Vec::new(),
+    /// A core without a table.
+    pub(super) const FREE: Self = Self {
+        lap_ns: 1,
+        work_ns: 0,
+        full_ns: 0,
+        ramps: Vec::new(),
+        starts: 0,
+        waiting_ns: 0,
     };
 
-    /// Describes a core with a list of an owner whose lists together have a length, and whose subtasks
-    /// are late by so much at most; even then it ends within its period.
-    pub(super) fn of(
-        period_ns: u64,
-        list: &[ScheduledSubtask],
-        (length_ns, late_ns): (u64, u64),
+    /// Describes the core of a list of a table, whose entries are late by so much at most; the
+    /// tasks are by DAG.
+    pub fn of_list<'a>(
+        table: &Table,
+        list: &CoreList,
+        task: impl Fn(DagId) -> &'a Task,
+        late_ns: u64,
     ) -> Self {
-        let mut work_ns = 0;
-        let tails = list.iter().rev().map(|of| {
-            work_ns += of.finish_ns - of.start_ns;
-            ListTail {
-                start_ns: of.start_ns + late_ns,
-                work_ns,
+        let is_alone = table.dags().len() == 1;
+        let entries = list.entries.iter().map(|entry| {
+            let task = task(entry.dag);
+            SuppliedEntry {
+                release_ns: task.release_in_lap_ns(entry.job, is_alone),
+                start_ns: entry.start_ns,
+                wcet_ns: task.wcets_ns()[entry.subtask.index()],
             }
         });
-        let mut tails: Vec<ListTail> = tails.collect();
-        tails.reverse();
-        Self {
-            period_ns,
-            response_ns: length_ns.saturating_add(late_ns),
-            tails,
+        Self::of(table.lap_ns, &entries.collect::<Vec<_>>(), late_ns)
+    }
+
+    /// Describes a core with a list, in its order.
+    pub(super) fn of(lap_ns: u64, list: &[SuppliedEntry], late_ns: u64) -> Self {
+        let waits = |of: &SuppliedEntry| {
+            of.start_ns
+                .saturating_add_signed(of.release_ns.saturating_neg())
+        };
+        let waiting_ns = list.iter().map(waits).max().unwrap_or(0);
+        let mut supply = Self {
+            lap_ns,
+            work_ns: list.iter().map(|of| of.wcet_ns).sum(),
+            starts: list.len(),
+            waiting_ns: waiting_ns.saturating_add(late_ns),
+            ..Self::FREE
+        };
+        // No sum of these times overflows.
+        let is_small = [lap_ns, supply.work_ns, supply.waiting_ns]
+            .iter()
+            .all(|&ns| ns < 1 << 60);
+        if !is_small || supply.work_ns >= lap_ns && !list.is_empty() {
+            supply.full_ns = u64::MAX;
+            return supply;
+        }
+        let releases_ns: Vec<u64> = list
+            .iter()
+            .map(|of| {
+                of.release_ns
+                    .rem_euclid(lap_ns.cast_signed())
+                    .cast_unsigned()
+            })
+            .collect();
+        let arrivals: Vec<(u64, u64)> = sorted_by_key(list.len(), |place| releases_ns[place])
+            .into_iter()
+            .map(|place| (releases_ns[place], list[place].wcet_ns))
+            .collect();
+        let mut idle_at: Vec<(u64, u64)> = Vec::new();
+        for start_ns in stretches(lap_ns, list) {
+            let origin_ns = start_ns + late_ns;
+            // What has been released and not begun, of all laps.
+            let open = |of: &SuppliedEntry| {
+                let laps = (origin_ns + waits(of) + lap_ns - of.start_ns) / lap_ns;
+                of.wcet_ns * laps.saturating_sub(u64::from(of.start_ns < start_ns))
+            };
+            let open_ns = list.iter().map(open).sum();
+            let origin_ns = origin_ns % lap_ns;
+            let full_ns = supply.until_idle_ns(&arrivals, origin_ns, open_ns);
+            supply.full_ns = supply.full_ns.max(full_ns);
+            idle_at.push((origin_ns, full_ns));
+        }
+        for (origin_ns, full_ns) in idle_at {
+            supply.add_ramps(&arrivals, origin_ns, full_ns);
+        }
+        supply
+    }
+
+    /// Returns how long a core is busy from a time of the lap on, with so much work at once and what
+    /// arrives later.
+    fn until_idle_ns(&self, arrivals: &[(u64, u64)], origin_ns: u64, open_ns: u64) -> u64 {
+        let mut room_ns = 0;
+        let mut came_ns = 0;
+        let mut gaps = Vec::new();
+        let first = arrivals.partition_point(|&(ns, _)| ns <= origin_ns);
+        for (ns, wcet_ns) in arrivals[first..].iter().chain(&arrivals[..first]) {
+            // In the lap that ends with the origin.
+            let after_ns = (ns + self.lap_ns - origin_ns - 1) % self.lap_ns + 1;
+            room_ns = room_ns.max(after_ns.saturating_sub(came_ns));
+            gaps.push((after_ns, came_ns));
+            came_ns += wcet_ns;
+        }
+        // Each lap without a gap leaves less work to the next by the table's idle time.
+        let gain_ns = self.lap_ns - self.work_ns;
+        let laps = open_ns.saturating_sub(room_ns).div_ceil(gain_ns);
+        let left_ns = open_ns - laps * gain_ns;
+        let gap = gaps
+            .iter()
+            .find(|&&(after_ns, came_ns)| left_ns + came_ns <= after_ns);
+        laps * self.lap_ns + left_ns + gap.map_or(0, |&(_, came_ns)| came_ns)
+    }
+
+    /// Adds the ramps of a window that begins at a time of the lap, for the lap from `full_ns` on.
+    fn add_ramps(&mut self, arrivals: &[(u64, u64)], origin_ns: u64, busy_ns: u64) {
+        let laps = (self.full_ns - busy_ns) / self.lap_ns;
+        let (mut now_ns, mut done_ns) =
+            (busy_ns + laps * self.lap_ns, busy_ns + laps * self.work_ns);
+        self.offer(now_ns - done_ns, done_ns);
+        let at_ns = (origin_ns + busy_ns) % self.lap_ns;
+        let (begin_ns, end_ns) = (now_ns, self.full_ns + self.lap_ns);
+        let mut first = arrivals.partition_point(|&(ns, _)| ns < at_ns);
+        for lap in 0.. {
+            for (ns, wcet_ns) in &arrivals[first..] {
+                let came_ns = begin_ns + lap * self.lap_ns + ns - at_ns;
+                if came_ns >= end_ns {
+                    return;
+                }
+                now_ns = now_ns.max(came_ns);
+                let idle_ns = now_ns - done_ns;
+                now_ns += wcet_ns;
+                done_ns += wcet_ns;
+                self.offer(idle_ns, done_ns);
+            }
+            first = 0;
         }
     }
 
-    /// Returns the most time that the owner executes on this core in any window of a length, both
-    /// in nanoseconds; never more than the length, 0 without an owner.
+    /// Adds a ramp if no other is as high everywhere, and removes those below.
+    fn offer(&mut self, idle_ns: u64, top_ns: u64) {
+        let end = self.ramps.partition_point(|ramp| ramp.0 <= idle_ns);
+        if end > 0 && self.ramps[end - 1].1 >= top_ns {
+            return;
+        }
+        let first = self.ramps[..end].partition_point(|ramp| ramp.0 < idle_ns);
+        let below = self.ramps[first..].partition_point(|ramp| ramp.1 <= top_ns);
+        self.ramps.splice(first..first + below, [(idle_ns, top_ns)]);
+    }
+
+    /// Returns the most time that the table executes on this core in any window of a length, both
+    /// in nanoseconds; never more than the length, 0 without a table.
     pub fn busy_ns(&self, window_ns: u64) -> u64 {
         self.busiest(window_ns).0
     }
 
-    /// Returns the part of its time that the owner takes, in millionths, rounded up.
-    pub(super) fn taken_ppm(&self) -> u64 {
-        let job_ns = self.tails.first().map_or(0, |tail| tail.work_ns);
-        parts_per_million(job_ns, self.period_ns)
-    }
-
     /// Returns that time, and by how much it grows at once with the window, one for one.
     fn busiest(&self, window_ns: u64) -> (u64, u64) {
-        let job_ns = self.tails.first().map_or(0, |tail| tail.work_ns);
-        let within = |time_ns: u64| (job_ns.min(time_ns), job_ns.saturating_sub(time_ns));
-        let mut busiest = within(window_ns);
-        for tail in &self.tails {
-            // From the next release on; it lies in the window if that is not over before.
-            if let Some(after_ns @ 1..) = window_ns.checked_sub(self.period_ns - tail.start_ns) {
-                // A list takes no more than its period, so this is no more than the window.
-                let whole_ns = after_ns / self.period_ns * job_ns;
-                let (last_ns, more_ns) = within(after_ns % self.period_ns);
-                busiest = busiest.max((tail.work_ns + whole_ns + last_ns, more_ns));
-            }
-        }
-        busiest
+        let Some(after_ns) = window_ns.checked_sub(self.full_ns) else {
+            return (window_ns, self.full_ns - window_ns);
+        };
+        let laps = after_ns / self.lap_ns;
+        let within_ns = window_ns - laps * self.lap_ns;
+        let next = self
+            .ramps
+            .partition_point(|ramp| ramp.0 + ramp.1 <= within_ns);
+        let flat_ns = self.ramps[..next].last().map_or(0, |ramp| ramp.1);
+        let rising = self.ramps.get(next).map(|ramp| {
+            (
+                within_ns.saturating_sub(ramp.0),
+                ramp.0 + ramp.1 - within_ns,
+            )
+        });
+        let (busy_ns, more_ns) = rising
+            .filter(|&(busy_ns, _)| busy_ns >= flat_ns)
+            .unwrap_or((flat_ns, 0));
+        (laps * self.work_ns + busy_ns, more_ns)
     }
 
-    /// Adds the time that it takes members to go on with another core, as the owner's subtasks take
-    /// this one.
+    /// Adds the time that it takes members to go on with another core, as entries take this one.
     fn add_moves(&self, bursts: &mut WorkloadBursts) {
-        let takes = self.tails.len() as u128 * u128::from(bursts.move_ns);
-        bursts.add(self.period_ns.into(), self.response_ns.into(), takes);
+        let takes = self.starts as u128 * u128::from(bursts.move_ns);
+        bursts.add(self.lap_ns.into(), self.waiting_ns.into(), takes);
     }
 
     /// Returns the busy time as work of one core, as far as it surely grows.
@@ -136,6 +254,26 @@ impl CoreSupply {
         let span = (more > 0).then_some(more.into());
         WorkloadSegment::new(value.into(), u128::from(more > 0), span)
     }
+}
+
+/// Returns where the stretches without idle time begin that a list makes in its lap.
+fn stretches(lap_ns: u64, list: &[SuppliedEntry]) -> Vec<u64> {
+    let mut begins = Vec::new();
+    // A lap later, so that none of these is negative.
+    let mut end_ns = 0;
+    // The second time, what goes on from the lap before is known.
+    for _ in 0..2 {
+        begins.clear();
+        for of in list {
+            let start_ns = of.start_ns + lap_ns;
+            if start_ns > end_ns {
+                begins.push(of.start_ns);
+            }
+            end_ns = end_ns.max(start_ns) + of.wcet_ns;
+        }
+        end_ns = end_ns.saturating_sub(lap_ns);
+    }
+    begins
 }
 
 /// Returns a part of a period in millionths, rounded up; no more than `u64::MAX`.
@@ -183,7 +321,7 @@ impl<'a> MemberTask<'a> {
             _ => self.task.length_ns(),
         };
         let terms = to_u32(cores.len() * (above.len() + 1));
-        while window_ns <= self.task.relative_deadline_ns() {
+        while window_ns <= self.task.within_ns() {
             *steps = steps.checked_sub(terms)?;
             let lack = match cores {
                 [core] => self.on_one(core, above, window_ns),
@@ -287,19 +425,19 @@ pub(super) struct LentForm {
 
 #[cfg(test)]
 mod tests {
-    use super::{CoreSupply, MemberTask, STEP_LIMIT};
+    use super::{CoreSupply, MemberTask, STEP_LIMIT, SuppliedEntry};
+    use crate::analysis::Task;
     use crate::analysis::workload::WorkloadBursts;
-    use crate::analysis::{ScheduledSubtask, Task};
     use random::Random;
 
     /// A core with the list of an owner, by starts and finishes.
     fn owned(period_ns: u64, list: &[(u64, u64)]) -> CoreSupply {
-        let list = list.iter().map(|&(start_ns, finish_ns)| ScheduledSubtask {
-            subtask: 0,
+        let list = list.iter().map(|&(start_ns, finish_ns)| SuppliedEntry {
+            release_ns: 0,
             start_ns,
-            finish_ns,
+            wcet_ns: finish_ns - start_ns,
         });
-        CoreSupply::of(period_ns, &list.collect::<Vec<_>>(), (0, 0))
+        CoreSupply::of(period_ns, &list.collect::<Vec<_>>(), 0)
     }
 
     fn bound(task: &Task, cores: &[&CoreSupply], above: &[(&Task, u64)]) -> Option<u64> {
@@ -371,8 +509,8 @@ mod tests {
         }
         let no_bursts = WorkloadBursts::default();
         let member = MemberTask::of(&large, 1, &no_bursts);
-        assert_eq!(member.respond(&[&CoreSupply::UNOWNED], &[], &mut 0), None);
-        let alone = member.respond(&[&CoreSupply::UNOWNED], &[], &mut 1);
+        assert_eq!(member.respond(&[&CoreSupply::FREE], &[], &mut 0), None);
+        let alone = member.respond(&[&CoreSupply::FREE], &[], &mut 1);
         assert_eq!(alone, Some(u64::MAX));
     }
 }

@@ -22,7 +22,8 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use super::task::Task;
-use crate::ids::to_u32;
+use crate::ids::{ClusterId, DagId, SubtaskId, to_u32};
+use crate::table::{CoreList, Table, TableEntry};
 
 /// How often one core's limit is lowered, at most.
 const SQUEEZES: usize = 256;
@@ -150,25 +151,32 @@ impl ListSchedule {
         finishes_ns.max().unwrap_or(0)
     }
 
-    /// Returns the core of each subtask.
-    pub(super) fn places(&self) -> Vec<u32> {
-        let mut places = vec![0; self.cores.iter().map(Vec::len).sum()];
-        for (core, list) in self.cores.iter().enumerate() {
-            for of in list {
-                places[of.subtask] = to_u32(core);
-            }
+    /// Returns the schedule as a table of one DAG on cores from a first one on.
+    pub(super) fn table(&self, dag: usize, period_ns: u64, first_core: usize) -> Table {
+        let lists = self
+            .cores
+            .iter()
+            .zip(first_core..)
+            .filter(|(list, _)| !list.is_empty());
+        let lists = lists.map(|(list, core)| CoreList {
+            core: to_u32(core),
+            entries: list
+                .iter()
+                .map(|of| TableEntry {
+                    dag: DagId(to_u32(dag)),
+                    subtask: SubtaskId(to_u32(of.subtask)),
+                    job: 0,
+                    depth: 0,
+                    start_ns: of.start_ns,
+                    length_ns: of.finish_ns - of.start_ns,
+                })
+                .collect(),
+        });
+        Table {
+            cluster: ClusterId(0),
+            lap_ns: period_ns,
+            lists: lists.collect(),
         }
-        places
-    }
-
-    /// Returns an edge for each two neighbours of a list. With the DAG's own ones they make no
-    /// cycle, as each goes to a later start.
-    pub(super) fn edges(&self) -> Vec<(u32, u32)> {
-        let mut edges = Vec::new();
-        for pair in self.cores.iter().flat_map(|list| list.windows(2)) {
-            edges.push((to_u32(pair[0].subtask), to_u32(pair[1].subtask)));
-        }
-        edges
     }
 }
 
@@ -192,8 +200,8 @@ mod tests {
                 let length = schedule.length_ns();
                 assert!(length <= multi_path(&task, super::to_u32(cores)).unwrap());
                 // Lemma 1: the lists as edges make a longest path of that length.
-                let order = schedule.edges().into_iter();
-                let order = order.map(|(from, to)| (from as usize, to as usize));
+                let pairs = schedule.cores.iter().flat_map(|list| list.windows(2));
+                let order = pairs.map(|pair| (pair[0].subtask, pair[1].subtask));
                 let all: Vec<_> = edges.iter().copied().chain(order).collect();
                 let ordered = Task::new(999, 999, wcets.clone(), &all).unwrap();
                 assert_eq!(ordered.length_ns(), length);

@@ -48,6 +48,18 @@ pub struct Task {
     length_ns: u64,
     /// `None`: no subtask waits.
     waits: Option<Box<TaskWaits>>,
+    table_terms: TableTerms,
+}
+
+/// The attributes that matter to a table alone; by default those of a sporadic DAG.
+#[derive(Clone, Debug, Default)]
+pub struct TableTerms {
+    /// The offset of a periodic DAG; `None`: it is sporadic.
+    pub offset_ns: Option<u64>,
+    /// The subtasks that are not preempted.
+    pub non_preemptive: Vec<usize>,
+    /// The sinks with a relative deadline of their own, and that.
+    pub sink_deadlines_ns: Vec<(usize, u64)>,
 }
 
 /// The waits of a task's subtasks, by subtask, and the task with all waits executed.
@@ -155,6 +167,15 @@ impl Task {
         let wcets_ns = wcets_ns.collect::<Result<Vec<u64>, _>>()?;
         let (period_ns, deadline_ns) = (dag.period_ns(), dag.relative_deadline_ns());
         let task = Self::assemble(period_ns, deadline_ns, wcets_ns, dag.graph.clone())?;
+        let ids = 0..dag.subtasks().len();
+        let keeps = |&id: &usize| dag.subtasks()[id].is_non_preemptive();
+        let sinks = dag.sinks().iter().map(|id| id.index());
+        let own = sinks.map(|id| (id, dag.subtasks()[id].relative_deadline_ns()));
+        let task = task.with_table_terms(TableTerms {
+            offset_ns: (!dag.is_sporadic()).then_some(dag.offset_ns()),
+            non_preemptive: ids.filter(keeps).collect(),
+            sink_deadlines_ns: own.filter(|&(_, ns)| ns != deadline_ns).collect(),
+        });
         let task = Self {
             least_deadline_ns: dag.least_deadline_ns(),
             ..task
@@ -206,6 +227,15 @@ impl Task {
         })
     }
 
+    /// Returns the task with what a table of it depends on besides.
+    #[must_use]
+    pub fn with_table_terms(self, table_terms: TableTerms) -> Self {
+        Self {
+            table_terms,
+            ..self
+        }
+    }
+
     fn assemble(
         period_ns: u64,
         relative_deadline_ns: u64,
@@ -231,6 +261,7 @@ impl Task {
             volume_ns,
             length_ns: 0,
             waits: None,
+            table_terms: TableTerms::default(),
         };
         task.length_ns = task.bottom_levels().into_iter().max().unwrap_or(0);
         Ok(task)
@@ -249,6 +280,27 @@ impl Task {
     /// Returns the least relative deadline of a sink, never 0.
     pub const fn least_deadline_ns(&self) -> u64 {
         self.least_deadline_ns
+    }
+
+    /// Returns the time by which a job is complete at the latest, if none is to overlap the next.
+    pub(super) fn within_ns(&self) -> u64 {
+        self.relative_deadline_ns.min(self.period_ns)
+    }
+
+    /// Returns when a job of lap 0 is released in a table, of this DAG alone or with others, from
+    /// the beginning of the lap on.
+    pub const fn release_in_lap_ns(&self, job: i64, is_alone: bool) -> i64 {
+        let offset_ns = match self.table_terms.offset_ns {
+            Some(offset_ns) if !is_alone => offset_ns.cast_signed(),
+            _ => 0,
+        };
+        job.wrapping_mul(self.period_ns.cast_signed())
+            .wrapping_add(offset_ns)
+    }
+
+    /// Returns the attributes that matter to a table.
+    pub const fn table_terms(&self) -> &TableTerms {
+        &self.table_terms
     }
 
     /// Returns the WCETs by subtask.

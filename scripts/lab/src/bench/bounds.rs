@@ -26,8 +26,8 @@ static COMMAND: Command = Command {
     notes: "\
 A set has as many DAGs as cores, but 8 at least. Methods: graham, federated scheduling; multi_path,
 the same by the multi-path bound, or global deadline-monotonic priorities; v_fed, virtually-federated
-scheduling; lent, heavy DAGs with a fixed order that lend their idle time; fluid, a density test. The
-last one is of a scheduler that no machine has.
+scheduling; lent, heavy DAGs with tables that lend their idle time; table, that and one table for
+several DAGs; fluid, a density test. The last one is of a scheduler that no machine has.
 
 Exit code: 0 counted; 1 no file can be written; 2 the command line or a file is refused.
 ",

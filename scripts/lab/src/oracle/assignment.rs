@@ -1,4 +1,4 @@
-//! Reference values of lent cores: attempts, clusters, orders, busy times, groups and bounds.
+//! Reference values of tables and lent cores: attempts, lists, busy times, groups and bounds.
 //!
 //! A case gives a set of DAGs and what an independent implementation divides the cores into;
 //! [`check`] computes the same with `sched_dag::analysis::lend` and compares record by record.
@@ -15,12 +15,25 @@
 //! guest DAG R k k ..  a member, its bound and the cores of its group; by position
 //! end
 //! ```
+//!
+//! With tables of several DAGs (attempts 5 and 6) other records come in:
+//!
+//! ```text
+//! case NAME m ndags limit                         the most entries of a table
+//! dag T D O p|s np nsub nedge nsink / wcet / edge / sink v D_v ..
+//! failed d why ..                                 the DAG may be -
+//! table H c N tries i ..                          then for each of c cores:
+//! list k i j v start finish depth ..
+//! busy k w B ..                                   in windows of H / 7, H / 2 (ceiling), H, 4 H / 3
+//! bound i R .. / sinkbound i v R ..               then `own` to `guest`
+//! ```
 
-use sched_dag::analysis::{CoreOwner, LendingAnswer, LendingPlan, Task, lend};
+use sched_dag::analysis::{CoreOwner, CoreSupply, LendingAnswer, TableTerms, Task, lend};
+use sched_dag::{Table, TableEntry};
 use text::{Line, Lines, Malformed, cases};
 
 use super::FileOracle;
-use super::bounds::{list, parse_task};
+use super::bounds::parse_task;
 
 /// The kind `assignment`.
 pub(super) static ORACLE: FileOracle<AssignmentCase> = FileOracle {
@@ -40,6 +53,8 @@ pub struct AssignmentCase {
     pub name: String,
     /// The number of cores.
     pub(crate) cores: u32,
+    /// The most entries of a table; `None`: the case is of lent cores alone.
+    pub(crate) limit: Option<usize>,
     /// The DAGs.
     pub(crate) tasks: Vec<Task>,
     records: Vec<String>,
@@ -69,51 +84,130 @@ fn parse_case(
     lines: &mut Lines<'_>,
     is_answered: bool,
 ) -> Result<AssignmentCase, Malformed> {
-    let [name, cores, count] = header.fixed()?;
-    let (cores, count) = (header.cores(cores)?, header.at_least_one(count)?);
-    let tasks = (0..count).map(|_| parse_task(lines));
+    let limit = header.words.get(3).map(|word| header.number(word));
+    let limit = limit.transpose()?;
+    let words = header.exactly(3 + usize::from(limit.is_some()))?;
+    let (name, cores, count) = (
+        words[0],
+        header.cores(words[1])?,
+        header.at_least_one(words[2])?,
+    );
+    let tasks = (0..count).map(|_| match limit {
+        Some(_) => parse_attributes(lines),
+        None => parse_task(lines),
+    });
     let tasks = tasks.collect::<Result<Vec<_>, Malformed>>()?;
     let mut records = Vec::new();
     if is_answered || lines.clone().next_if("attempt").is_some() {
         for kind in ["attempt", "failed"] {
-            records.push(record(&lines.expect(kind)?)?);
+            records.push(record(&lines.expect(kind)?, limit.is_some())?);
         }
-        let kinds = ["own", "order", "busy", "guest"];
+        let kinds = [
+            "table",
+            "list",
+            "bound",
+            "sinkbound",
+            "own",
+            "order",
+            "busy",
+            "guest",
+        ];
+        let kinds = &kinds[if limit.is_some() { 0 } else { 4 }..];
         while let Some(line) = kinds.iter().find_map(|kind| lines.next_if(kind)) {
-            records.push(record(&line)?);
+            records.push(record(&line, limit.is_some())?);
         }
     }
     lines.expect("end")?.exactly(0)?;
     Ok(AssignmentCase {
         name: name.to_owned(),
         cores,
+        limit,
         tasks,
         records,
     })
 }
 
+/// Reads a DAG with its offset, whether it is sporadic or non-preemptive, and deadlines of sinks.
+fn parse_attributes(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
+    let header = lines.expect("dag")?;
+    let [
+        period,
+        deadline,
+        offset,
+        kind,
+        keeps,
+        subtasks,
+        edges,
+        sinks,
+    ] = header.fixed()?;
+    let subtasks = header.at_least_one(subtasks)? as usize;
+    let (sinks, offset_ns) = (header.number::<usize>(sinks)?, header.number(offset)?);
+    let wcets_ns = lines.expect("wcet")?.numbers(subtasks)?;
+    let edges = lines.edges(header.number(edges)?, subtasks)?;
+    let sinks = (0..sinks).map(|_| {
+        let line = lines.expect("sink")?;
+        let [sink, deadline] = line.fixed()?;
+        Ok((
+            line.index("subtask", sink, subtasks)?,
+            line.number(deadline)?,
+        ))
+    });
+    let terms = TableTerms {
+        sink_deadlines_ns: sinks.collect::<Result<_, Malformed>>()?,
+        non_preemptive: (0..if header.flag(keeps)? { subtasks } else { 0 }).collect(),
+        offset_ns: match kind {
+            "p" => Some(offset_ns),
+            "s" => None,
+            _ => return Err(header.malformed("expected `p` or `s`")),
+        },
+    };
+    let (period_ns, deadline_ns) = (header.number(period)?, header.number(deadline)?);
+    let task = Task::new(period_ns, deadline_ns, wcets_ns, &edges);
+    let task = task.map_err(|error| header.malformed(error.to_string()))?;
+    Ok(task.with_table_terms(terms))
+}
+
 /// Checks the form of a record, and returns it in normal form: spellings such as `007` are equal.
-fn record(line: &Line<'_>) -> Result<String, Malformed> {
+fn record(line: &Line<'_>, has_tables: bool) -> Result<String, Malformed> {
     if line.kind == "attempt" && line.words == ["-"] {
         return Ok("attempt -".to_owned());
     }
     let words = line.words.len();
     let (is_right, form) = match line.kind {
         "attempt" => (words == 1, "attempt A"),
+        "failed" if has_tables => (words.is_multiple_of(2), "failed d why .."),
         "failed" => (words <= 5, "failed d_0 d_1 .."),
+        "table" => (words >= 5, "table H c N tries i .."),
+        "list" => (words % 6 == 1, "list k i j v start finish depth .."),
+        "bound" => (words == 2, "bound i R"),
+        "sinkbound" => (words == 3, "sinkbound i v R"),
         "own" => (words == 4, "own DAG R FIRST C"),
         "order" => (words % 2 == 1, "order K v s v s .."),
-        "busy" => (words == 7, "busy K r B r B r B"),
+        "busy" => (words == 7 || words == 9 && has_tables, "busy K r B r B r B"),
         _ => (words >= 3, "guest DAG R k k .."),
     };
     match is_right {
-        true => Ok(shown(line.kind, &line.numbers(words)?)),
+        true if line.kind == "failed" && has_tables => Ok(failed(&line.words)),
+        true => {
+            let number = |word: &&str| match word.strip_prefix('-') {
+                // Of a job that is begun in a lap before.
+                Some(word) if line.kind == "list" => Ok(-line.number::<i128>(word)?),
+                _ => line.number::<i128>(word),
+            };
+            let numbers = line.words.iter().map(number);
+            Ok(shown(line.kind, &numbers.collect::<Result<Vec<_>, _>>()?))
+        }
         false => Err(line.malformed(format!("expected `{form}`, found {words} words"))),
     }
 }
 
-fn shown(kind: &str, numbers: &[u64]) -> String {
-    format!("{kind} {}", list(numbers)).trim_end().to_owned()
+fn failed(words: &[impl std::borrow::Borrow<str>]) -> String {
+    format!("failed {}", words.join(" ")).trim_end().to_owned()
+}
+
+fn shown(kind: &str, numbers: &[i128]) -> String {
+    let words: Vec<String> = numbers.iter().map(i128::to_string).collect();
+    format!("{kind} {}", words.join(" ")).trim_end().to_owned()
 }
 
 /// Computes and compares the records of a case.
@@ -123,9 +217,8 @@ fn shown(kind: &str, numbers: &[u64]) -> String {
 /// The first difference, in one line.
 pub fn check(case: &AssignmentCase) -> Result<(), String> {
     let tasks: Vec<&Task> = case.tasks.iter().collect();
-    let answer =
-        lend(&tasks, case.cores).ok_or("D exceeds T, which the analysis does not cover")?;
-    let computed = records(&tasks, &answer);
+    let answer = lend(&tasks, case.cores, case.limit.unwrap_or(0)).ok_or("it does not apply")?;
+    let computed = records(&tasks, &answer, case.limit.is_some());
     let ends = [case.records.len(), computed.len()];
     for place in 0..ends.into_iter().max().unwrap_or(0) {
         let of = |records: &[String]| records.get(place).map_or("end", |record| record).to_owned();
@@ -138,16 +231,30 @@ pub fn check(case: &AssignmentCase) -> Result<(), String> {
 }
 
 /// Returns the records of an answer.
-fn records(tasks: &[&Task], answer: &LendingAnswer) -> Vec<String> {
+fn records(tasks: &[&Task], answer: &LendingAnswer, has_tables: bool) -> Vec<String> {
     let attempt = answer.plan.as_ref().map(|plan| plan.attempt as u64);
     let attempt = attempt.map_or("-".to_owned(), |attempt| attempt.to_string());
-    let failed: Vec<u64> = answer.failed.iter().map(|&dag| dag as u64).collect();
-    let mut records = vec![format!("attempt {attempt}"), shown("failed", &failed)];
+    let words = answer.failed.iter().flat_map(|(dag, why)| {
+        let dag = dag.map_or("-".to_owned(), |dag| dag.to_string());
+        [
+            Some(dag),
+            has_tables.then(|| format!("{why:?}").to_lowercase()),
+        ]
+    });
+    // Without tables there are five attempts.
+    let words = words.flatten().take(if has_tables { 14 } else { 5 });
+    let mut records = vec![
+        format!("attempt {attempt}"),
+        failed(&words.collect::<Vec<_>>()),
+    ];
     if let Some(plan) = &answer.plan {
         let mut owners: Vec<&CoreOwner> = plan.owners.iter().collect();
-        owners.sort_by_key(|owner| owner.dag);
+        if plan.attempt as u64 >= 5 {
+            records.extend(of_family(owners.remove(0), tasks));
+        }
+        owners.sort_by_key(|owner| owner.dags[0]);
         for owner in owners {
-            records.extend(of_owner(owner, plan, tasks[owner.dag].period_ns()));
+            records.extend(of_owner(owner, tasks));
         }
         let mut members = Vec::new();
         for group in &plan.groups {
@@ -155,30 +262,136 @@ fn records(tasks: &[&Task], answer: &LendingAnswer) -> Vec<String> {
         }
         members.sort_by_key(|((dag, _), _)| *dag);
         for (&(dag, bound_ns), cores) in members {
-            let cores = cores.iter().map(|&core| core as u64);
-            let numbers: Vec<u64> = [dag as u64, bound_ns].into_iter().chain(cores).collect();
-            records.push(shown("guest", &numbers));
+            let cores = cores.iter().map(|&core| core as i128);
+            let numbers = [dag as i128, bound_ns.into()].into_iter().chain(cores);
+            records.push(shown("guest", &numbers.collect::<Vec<_>>()));
         }
     }
     records
 }
 
-fn of_owner(owner: &CoreOwner, plan: &LendingPlan, period_ns: u64) -> Vec<String> {
-    let lists = &owner.schedule.cores;
-    let (dag, first) = (owner.dag as u64, owner.first_core as u64);
-    let own = [dag, owner.schedule.length_ns(), first, lists.len() as u64];
+fn of_owner(owner: &CoreOwner, tasks: &[&Task]) -> Vec<String> {
+    let (first, table) = (owner.first_core, &owner.table);
+    let (dag, period_ns) = (owner.dags[0], table.lap_ns);
+    let entries = || table.lists.iter().flat_map(|list| &list.entries);
+    let bound_ns = entries()
+        .map(|entry| entry.start_ns + entry.length_ns)
+        .max();
+    let own = [
+        dag as i128,
+        bound_ns.unwrap_or(0).into(),
+        first as i128,
+        owner.cores as i128,
+    ];
     let mut records = vec![shown("own", &own)];
     let windows_ns = [period_ns.div_ceil(3), period_ns, period_ns + period_ns / 2];
-    for (core, list) in (owner.first_core..).zip(lists) {
-        let starts = list.iter().flat_map(|of| [of.subtask as u64, of.start_ns]);
-        let numbers: Vec<u64> = [core as u64].into_iter().chain(starts).collect();
+    for core in first..first + owner.cores {
+        let entries = list(table, core).iter();
+        let starts = entries.flat_map(|of| [of.subtask.0.into(), i128::from(of.start_ns)]);
+        let numbers: Vec<i128> = [core as i128].into_iter().chain(starts).collect();
         records.push(shown("order", &numbers));
-        let supply = &plan.supplies[core];
-        let busy = windows_ns.map(|window_ns| [window_ns, supply.busy_ns(window_ns)]);
-        let numbers = [core as u64].into_iter().chain(busy.into_iter().flatten());
-        records.push(shown("busy", &numbers.collect::<Vec<u64>>()));
+        records.push(busy(table, core, tasks, &windows_ns));
     }
     records
+}
+
+fn of_family(owner: &CoreOwner, tasks: &[&Task]) -> Vec<String> {
+    let (table, lap_ns) = (&owner.table, owner.table.lap_ns);
+    let entries = || table.lists.iter().flat_map(|list| &list.entries);
+    let sizes = [
+        lap_ns.into(),
+        owner.cores as i128,
+        entries().count() as i128,
+        owner.tries.into(),
+    ];
+    let dags = owner.dags.iter().map(|&dag| dag as i128);
+    let numbers: Vec<i128> = sizes.into_iter().chain(dags).collect();
+    let mut records = vec![shown("table", &numbers)];
+    let windows_ns = [
+        lap_ns.div_ceil(7),
+        lap_ns.div_ceil(2),
+        lap_ns,
+        lap_ns + lap_ns / 3,
+    ];
+    // The records count from the grid also where a table counts from the release of its one DAG.
+    let is_alone = owner.dags.len() == 1;
+    let grid = |entry: &TableEntry| {
+        let task = tasks[entry.dag.index()];
+        let offset_ns = task.table_terms().offset_ns.unwrap_or(0);
+        let phase_ns = if is_alone {
+            offset_ns % task.period_ns()
+        } else {
+            0
+        };
+        let first = if is_alone {
+            0
+        } else {
+            i128::from(offset_ns / task.period_ns())
+        };
+        let start_ns = entry.start_ns + phase_ns;
+        let jobs = i128::from(lap_ns / task.period_ns());
+        (
+            start_ns % lap_ns,
+            i128::from(entry.job) + first - i128::from(start_ns / lap_ns) * jobs,
+        )
+    };
+    for core in 0..owner.cores {
+        let mut entries: Vec<_> = list(table, core)
+            .iter()
+            .map(|entry| (grid(entry), entry))
+            .collect();
+        entries.sort_by_key(|((start_ns, _), _)| *start_ns);
+        let entries = entries.into_iter().flat_map(|((start_ns, job), of)| {
+            let (dag, subtask, depth) = (of.dag.0.into(), of.subtask.0.into(), of.depth.into());
+            let finish_ns = i128::from(start_ns + of.length_ns);
+            [dag, job, subtask, start_ns.into(), finish_ns, depth]
+        });
+        let numbers: Vec<i128> = [core as i128].into_iter().chain(entries).collect();
+        records.push(shown("list", &numbers));
+        records.push(busy(table, core, tasks, &windows_ns));
+    }
+    let response_ns = |entry: &TableEntry| {
+        let release_ns = tasks[entry.dag.index()].release_in_lap_ns(entry.job, is_alone);
+        i128::from(entry.start_ns + entry.length_ns) - i128::from(release_ns)
+    };
+    for &dag in &owner.dags {
+        let own = entries().filter(|entry| entry.dag.index() == dag);
+        let bound_ns = own.map(response_ns).max().unwrap_or(0);
+        records.push(shown("bound", &[dag as i128, bound_ns]));
+    }
+    for &dag in &owner.dags {
+        let is_sink = |subtask: &usize| tasks[dag].successors(*subtask).len() == 0;
+        let states = !tasks[dag].table_terms().sink_deadlines_ns.is_empty();
+        for sink in (0..tasks[dag].subtask_count())
+            .filter(|_| states)
+            .filter(is_sink)
+        {
+            let own = entries().filter(|of| (of.dag.index(), of.subtask.index()) == (dag, sink));
+            let bound_ns = own.map(response_ns).max().unwrap_or(0);
+            records.push(shown("sinkbound", &[dag as i128, sink as i128, bound_ns]));
+        }
+    }
+    records
+}
+
+fn list(table: &Table, core: usize) -> &[TableEntry] {
+    let list = u32::try_from(core).ok().and_then(|core| table.list(core));
+    list.map_or(&[], |list| &list.entries)
+}
+
+fn busy(table: &Table, core: usize, tasks: &[&Task], windows_ns: &[u64]) -> String {
+    let list = u32::try_from(core).ok().and_then(|core| table.list(core));
+    let supply = list.map(|list| CoreSupply::of_list(table, list, |dag| tasks[dag.index()], 0));
+    let busy_ns = |&window_ns: &u64| {
+        let busy_ns = supply
+            .as_ref()
+            .map_or(0, |supply| supply.busy_ns(window_ns));
+        [i128::from(window_ns), busy_ns.into()]
+    };
+    let numbers = [core as i128]
+        .into_iter()
+        .chain(windows_ns.iter().flat_map(busy_ns));
+    shown("busy", &numbers.collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -192,6 +405,11 @@ mod tests {
     #[test]
     fn all_public_cases_agree() {
         assert_agree(&ORACLE, FILE, 60);
+        assert_agree(
+            &ORACLE,
+            include_str!("../../../../tests/oracle/table.txt"),
+            60,
+        );
     }
 
     fn first() -> &'static str {
@@ -206,7 +424,7 @@ busy 4 271 27 811 | busy 4 271 28 811 | expected `busy 4 271 28 811 27 1216 54`,
 own 4 219 | own 4 220 | expected `own 4 220 0 3`, computed `own 4 219 0 3`
 guest 3 3420 7 4\n |  | expected `end`, computed `guest 3 3420 7 4`
 \nend\n | \nguest 3 1 1\nend\n | expected `guest 3 1 1`, computed `end`
-dag 834 178 | dag 177 178 | D exceeds T, which the analysis does not cover";
+dag 834 178 | dag 177 178 | expected `attempt 3`, computed `attempt -`";
 
     #[test]
     fn a_difference_names_the_record() {

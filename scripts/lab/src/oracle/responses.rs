@@ -24,7 +24,7 @@ use std::sync::Arc;
 use random::Random;
 use random::sets::set;
 use sched_dag::OverrunPolicy::{Abort, Queue, Skip};
-use sched_dag::analysis::{AnalysisSettings, Overheads, answer, fix_orders};
+use sched_dag::analysis::{AnalysisSettings, Overheads, answer};
 use sched_dag::journal::EventKind;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, DriverNotice, Instance, Policy,
@@ -111,7 +111,6 @@ impl Seen {
         };
         let mut task_set = verified.task_set;
         let settings = costs.charged(options);
-        fix_orders(&mut task_set, &settings);
         let answer = answer(&task_set, &settings);
         if answer.bounds.iter().all(Option::is_none) {
             return Vec::new();

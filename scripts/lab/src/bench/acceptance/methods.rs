@@ -6,7 +6,8 @@
 //! - *V-Fed*: virtually-federated scheduling (X. Jiang, N. Guan, H. Liang, Y. Tang, L. Qiao, W. Yi,
 //!   RTSS 2021; with light DAGs: X. Jiang, H. Liang, N. Guan, Y. Tang, L. Qiao, Y. Wang, IEEE TPDS
 //!   34(1), 2023);
-//! - *lent*: the analysis of lent cores in `docs/bounds.md`;
+//! - *lent*: the analysis of tables in `docs/bounds.md`, with tables of one DAG only;
+//! - *table*: the same with all tables, where the DAGs are periodic;
 //! - *fluid*: the density test of DAG-Fluid (F. Guan, L. Peng, J. Qiao, IEEE TC 71(8), 2022).
 //!
 //! V-Fed and fluid stand here for comparison only: no scheduler of this project does what they
@@ -17,7 +18,8 @@
 //! Assumes `D <= T`; `V` is the volume, `L` the length.
 
 use sched_dag::analysis::{
-    InterferenceBound, ListSchedule, Task, federated, lend, multi_path, multi_path_fp,
+    ENTRY_LIMIT, InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path,
+    multi_path_fp,
 };
 
 /// A test of whether DAGs with `D <= T` can be executed on a number of cores.
@@ -31,7 +33,7 @@ pub(super) struct Method {
 }
 
 /// The methods, in the order of columns, curves and legend.
-pub(super) const METHODS: [Method; 5] = [
+pub(super) const METHODS: [Method; 6] = [
     Method {
         name: "graham",
         title: "federated, Graham's bound",
@@ -50,7 +52,12 @@ pub(super) const METHODS: [Method; 5] = [
     Method {
         name: "lent",
         title: "lent cores (here)",
-        accepts: |tasks, cores| lend(tasks, cores).is_some_and(|answer| answer.plan.is_some()),
+        accepts: |tasks, cores| lend(tasks, cores, 0).is_some_and(|answer| answer.plan.is_some()),
+    },
+    Method {
+        name: "table",
+        title: "tables (here)",
+        accepts: by_tables,
     },
     Method {
         name: "fluid",
@@ -61,6 +68,18 @@ pub(super) const METHODS: [Method; 5] = [
 
 const fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.relative_deadline_ns()
+}
+
+/// Divides the cores as a commit does, of DAGs with all offsets 0.
+fn by_tables(tasks: &[&Task], cores: u32) -> bool {
+    let terms = TableTerms {
+        offset_ns: Some(0),
+        ..TableTerms::default()
+    };
+    let periodic = |task: &&Task| (*task).clone().with_table_terms(terms.clone());
+    let periodic: Vec<Task> = tasks.iter().map(periodic).collect();
+    let answer = lend(&periodic.iter().collect::<Vec<_>>(), cores, ENTRY_LIMIT);
+    answer.is_some_and(|answer| answer.plan.is_some())
 }
 
 /// Gives each heavy DAG the least number of cores by the multi-path bound, and partitions the light

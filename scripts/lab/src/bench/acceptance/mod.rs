@@ -209,7 +209,7 @@ mod tests {
         let mut points = points(&[2, 4]);
         for (nth, point) in (0..).zip(&mut points) {
             point.counts.sets = 200;
-            point.counts.accepted = [nth, 2 * nth, 100, 200 - nth, 200];
+            point.counts.accepted = [nth, 2 * nth, 100, 200 - nth, 150, 200];
         }
         points
     }
@@ -219,16 +219,22 @@ mod tests {
         let points = counted();
         let (text, table) = (csv(&points), table(&points));
         let (lines, rows): (Vec<_>, Vec<_>) = (text.lines().collect(), table.lines().collect());
-        let header = "cores,deadlines,utilization,sets,graham,multi_path,v_fed,lent,fluid";
+        let header = "cores,deadlines,utilization,sets,graham,multi_path,v_fed,lent,table,fluid";
         assert_eq!(
             (lines[0], lines.len(), rows.len()),
             (header, 1 + 64, 2 + 64)
         );
-        assert_eq!(lines[1], "2,implicit,0.20,200,0,0,100,200,200");
-        assert_eq!(lines[1 + 17], "2,constrained,0.25,200,17,34,100,183,200");
-        assert_eq!(lines[1 + 63], "4,constrained,0.95,200,63,126,100,137,200");
+        assert_eq!(lines[1], "2,implicit,0.20,200,0,0,100,200,150,200");
+        assert_eq!(
+            lines[1 + 17],
+            "2,constrained,0.25,200,17,34,100,183,150,200"
+        );
+        assert_eq!(
+            lines[1 + 63],
+            "4,constrained,0.95,200,63,126,100,137,150,200"
+        );
         let cells: Vec<&str> = rows[2 + 17].split_whitespace().collect();
-        let expected = "2 constrained 0.25 8.5 17.0 50.0 91.5 100.0";
+        let expected = "2 constrained 0.25 8.5 17.0 50.0 91.5 75.0 100.0";
         assert_eq!(cells.join(" "), expected);
     }
 

@@ -24,6 +24,7 @@ const STYLES: [&str; METHODS.len()] = [
     "stroke=\"#0072b2\" stroke-width=\"1.8\" stroke-dasharray=\"7 3\"",
     "stroke=\"#b5179e\" stroke-width=\"1.8\" stroke-dasharray=\"8 3 2 3\"",
     "stroke=\"#f08c2e\" stroke-width=\"4\"",
+    "stroke=\"#2a9d3a\" stroke-width=\"1.8\"",
     "stroke=\"#1b1b1b\" stroke-width=\"1.3\"",
 ];
 /// The curve that lies below the others.
