@@ -130,7 +130,7 @@ pub mod virtual_time;
 pub mod wcets;
 mod worded;
 
-pub use crate::policy::{AssignmentReason, CoreDivision, LendingAttempt};
+pub use crate::policy::{AssignmentReason, AttemptFailure, CoreDivision, LendingAttempt};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use key::{DagKey, SubtaskKey};

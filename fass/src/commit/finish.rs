@@ -363,14 +363,10 @@ fn assign_clusters(task_set: &mut TaskSet, terms: &RunConfig) -> Result<(), Laun
          }| {
             let dag = task_set.label(dag);
             let mut text = format!("{dag} gets no cores: {reason}");
-            if let Some([first, later @ ..]) = attempts {
-                let label = |dag| task_set.label(dag);
-                text += &format!(
-                    "; lending cores, attempt 0 has no place for {}",
-                    label(first)
-                );
-                for (number, dag) in (1..).zip(later) {
-                    text += &format!(", {number} for {}", label(dag));
+            for (number, (dag, why)) in (0..).zip(attempts.into_iter().flatten()) {
+                text += &format!("; attempt {number}: {why}");
+                if let Some(dag) = dag {
+                    text += &format!(" ({})", task_set.label(dag));
                 }
             }
             LaunchError::new(text)

@@ -11,25 +11,34 @@ use alloc::vec::Vec;
 use super::features::Features;
 use super::ranks::{InstanceOrder, PreemptionMix, RankRelation};
 use super::set::{EquationSet, constrained};
+use super::table_check::{TableDag, TableTimes, check_table};
 use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
 use super::{AnalysisResult, AnalysisSettings, NotProvenReason};
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::Preemption;
+use crate::table::Table;
 use crate::task_set::{Dag, Subtask};
 
 /// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
-/// others of these cannot be. There are no other DAGs on the cores of the settings.
+/// others of these cannot be. There are no other DAGs on the cores of the settings, and no other
+/// tables.
 pub(super) fn with_case(
-    dags: &[Dag],
+    (dags, tables): (&[Dag], &[&Table]),
     own: &[usize],
     settings: &AnalysisSettings,
     reasons: &mut [Option<NotProvenReason>],
     work: impl FnOnce(&AnalysisInput<'_>, AnalysisResult, &mut [Option<NotProvenReason>]),
 ) {
-    let relation = RankRelation::new(dags, own, settings.policy, settings.preemption);
-    let tasks = analysable(dags, own, &relation, settings, reasons);
+    let places = CorePlaces::of(dags, tables, own);
+    let free = own
+        .iter()
+        .copied()
+        .filter(|&dag| places.table_of[dag].is_none());
+    let free: Vec<usize> = free.collect();
+    let relation = RankRelation::new(dags, &free, settings.policy, settings.preemption);
+    let tasks = analysable(&places, own, &relation, settings, reasons);
     let can_be = |dag: &usize| reasons[*dag].is_none();
     let members: Vec<usize> = own.iter().copied().filter(can_be).collect();
     let tasks: Vec<&Task> = members
@@ -37,14 +46,72 @@ pub(super) fn with_case(
         .filter_map(|&dag| tasks[dag].as_ref())
         .collect();
     let relation = relation.among(&members);
-    let mut case = AnalysisInput::new(dags, own, (&members, &tasks), relation, settings);
+    let mut case = AnalysisInput::new(places, own, (&members, &tasks), relation, settings);
     let verdict = case.settle();
     work(&case, verdict, reasons);
 }
 
-/// Reports whether cores of a cluster with these DAGs are told apart.
-fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
-    dags.any(Dag::is_confined)
+/// Where the DAGs of a commit execute, as far as they are in one cluster.
+struct CorePlaces<'a> {
+    all: &'a [Dag],
+    tables: &'a [&'a Table],
+    /// By DAG, the position of its table.
+    table_of: Vec<Option<usize>>,
+    /// Whether cores of the cluster are told apart.
+    are_told: bool,
+}
+
+impl<'a> CorePlaces<'a> {
+    fn of(all: &'a [Dag], tables: &'a [&'a Table], own: &[usize]) -> Self {
+        let mut table_of = vec![None; all.len()];
+        for (position, table) in tables.iter().enumerate() {
+            for dag in table.dags() {
+                table_of[dag.index()] = Some(position);
+            }
+        }
+        let mut own = own.iter();
+        let are_told = !tables.is_empty() || own.any(|&dag| !all[dag].affinity().is_empty());
+        Self {
+            all,
+            tables,
+            table_of,
+            are_told,
+        }
+    }
+
+    /// Reports whether two DAGs without tables are members of one group.
+    fn share(&self, one: usize, other: usize) -> bool {
+        let is_free = |dag: usize| self.table_of[dag].is_none();
+        let same = self.all[one].affinity() == self.all[other].affinity();
+        is_free(one) && is_free(other) && same
+    }
+
+    /// Reports whether a member's group has a core of a table.
+    fn meets(&self, member: usize, table: usize) -> bool {
+        let affinity = self.all[member].affinity();
+        let mut lists = self.tables[table].lists.iter();
+        affinity.is_empty() || lists.any(|list| affinity.contains(&list.core))
+    }
+
+    /// Reports whether a DAG in a table, or one that keeps its core, may delay another because of
+    /// the table; `None`: it is no matter of a table.
+    fn by_table(&self, other: usize, dag: usize, keep_cores: bool) -> Option<bool> {
+        match (self.table_of[other], self.table_of[dag]) {
+            (Some(one), Some(two)) => Some(one == two),
+            (Some(table), None) => Some(self.meets(dag, table)),
+            (None, Some(table)) => Some(keep_cores && self.meets(other, table)),
+            (None, None) => None,
+        }
+    }
+}
+
+/// A table of a case.
+pub(super) struct CaseTable<'a> {
+    pub(super) table: &'a Table,
+    /// Its DAGs that can be analysed, ascending by their positions in the case.
+    pub(super) dags: Vec<usize>,
+    /// Its times, if it is right.
+    pub(super) times: Result<TableTimes, NotProvenReason>,
 }
 
 /// Returns the settings for a cluster of so many cores, with these DAGs.
@@ -62,8 +129,7 @@ pub(super) fn of_cluster(
 
 /// The DAGs that can be analysed, and what follows from their attributes.
 pub(super) struct AnalysisInput<'a> {
-    /// All DAGs of the commit.
-    all: &'a [Dag],
+    places: CorePlaces<'a>,
     /// The positions of those on these cores, also of those that cannot be analysed.
     own: &'a [usize],
     /// Those of this case; elsewhere a DAG is a position in this list.
@@ -74,14 +140,14 @@ pub(super) struct AnalysisInput<'a> {
     /// The most urgent DAG first.
     pub(super) order: Vec<usize>,
     pub(super) set: EquationSet<'a>,
-    is_pinned: bool,
+    pub(super) tables: Vec<CaseTable<'a>>,
     /// By DAG, the features that enter it: its own, and those of all that may delay it.
     pub(super) entering: Vec<Features>,
 }
 
 impl<'a> AnalysisInput<'a> {
     fn new(
-        all: &'a [Dag],
+        places: CorePlaces<'a>,
         own: &'a [usize],
         (members, tasks): (&'a [usize], &'a [&'a Task]),
         relation: RankRelation,
@@ -92,7 +158,7 @@ impl<'a> AnalysisInput<'a> {
             _ => tasks[dag].relative_deadline_ns(),
         });
         let mut case = Self {
-            all,
+            places,
             own,
             members,
             tasks,
@@ -100,9 +166,15 @@ impl<'a> AnalysisInput<'a> {
             relation,
             order,
             set: EquationSet::new(tasks, settings.cores),
-            is_pinned: is_pinned(own.iter().map(|&dag| &all[dag])),
+            tables: Vec::new(),
             entering: Vec::new(),
         };
+        case.tables = case
+            .places
+            .tables
+            .iter()
+            .map(|table| case.checked(table))
+            .collect();
         case.set.bursts = case.bursts(|_| false);
         case.entering = case.features();
         case.complete();
@@ -112,14 +184,14 @@ impl<'a> AnalysisInput<'a> {
     /// Returns the bursts of the DAGs of the commit on these cores, some of which may fall behind.
     fn bursts(&self, fall_behind: impl Fn(usize) -> bool) -> WorkloadBursts {
         let own = self.own.iter();
-        let own = own.map(|&dag| (&self.all[dag], fall_behind(dag)));
+        let own = own.map(|&dag| (&self.places.all[dag], fall_behind(dag)));
         WorkloadBursts::of(own, self.settings)
     }
 
     /// Answers, and lets those fall behind that have no bound, until the bounds of the others rest on
     /// no such one.
     fn settle(&mut self) -> AnalysisResult {
-        let mut has_bound = vec![false; self.all.len()];
+        let mut has_bound = vec![false; self.places.all.len()];
         for &dag in self.members {
             has_bound[dag] = true;
         }
@@ -142,36 +214,74 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
+    /// Checks a table by the WCETs with what they are charged.
+    fn checked(&self, table: &'a Table) -> CaseTable<'a> {
+        let ids = table.dags();
+        let place = |id: &DagId| self.members.iter().position(|&dag| dag == id.index());
+        let dags: Vec<usize> = ids.iter().filter_map(place).collect();
+        let of = |&dag: &usize| {
+            let model = self.dag(dag);
+            let subtasks = model.subtasks().iter();
+            TableDag {
+                id: self.id(dag),
+                task: self.tasks[dag],
+                // The laps of a DAG alone begin with its jobs.
+                offset_ns: model.offset_ns() * u64::from(ids.len() > 1),
+                keeps_core: subtasks.map(|subtask| self.keeps_core(subtask)).collect(),
+            }
+        };
+        let of_table: Vec<TableDag<'_>> = dags.iter().map(of).collect();
+        CaseTable {
+            table,
+            times: check_table(table, &of_table).map_err(NotProvenReason::NotRight),
+            dags,
+        }
+    }
+
     /// Returns by DAG the features that enter it.
     fn features(&self) -> Vec<Features> {
-        let is_pinned = self.is_pinned();
         let (settings, relation) = (self.settings, &self.relation);
-        let all = Features::of_case(settings, relation, &self.set.bursts, is_pinned);
-        let own = (0..self.members.len()).map(|dag| Features::of_dag(self.dag(dag)).and(all));
-        // What is pinned goes before all that is not.
+        let all = Features::of_machine(settings, &self.set.bursts, self.tells_cores());
+        let of_order = Features::of_order(relation);
+        let own = (0..self.members.len()).map(|dag| {
+            let own = Features::of_dag(self.dag(dag)).and(all);
+            let member = self.members[dag];
+            let mut tables = 0..self.places.tables.len();
+            match self.table_of(dag) {
+                Some(_) => own.and(Features::TABLE),
+                None => own.and(of_order).and(
+                    Features::TABLE.if_so(tables.any(|table| self.places.meets(member, table))),
+                ),
+            }
+        });
+        // What a table leaves does not depend on more than that it is right.
+        let in_table = |dag: usize| self.table_of(dag).is_some();
         Features::spread(own.collect(), |other, dag| {
-            self.has_pins(other) || relation.may_delay(other, dag)
+            (in_table(dag) || !in_table(other)) && self.may_delay(other, dag)
         })
     }
 
-    /// Reports whether a subtask of a DAG is pinned.
-    fn has_pins(&self, dag: usize) -> bool {
-        self.dag(dag).is_pinned()
+    /// Reports whether a DAG may have to wait for another one.
+    fn may_delay(&self, other: usize, dag: usize) -> bool {
+        let [one, two] = [other, dag].map(|dag| self.members[dag]);
+        let keep_cores = self.relation.preemption != PreemptionMix::All;
+        let by_table = self.places.by_table(one, two, keep_cores);
+        other != dag
+            && by_table.unwrap_or_else(|| {
+                self.places.share(one, two) && self.relation.may_delay(other, dag)
+            })
     }
 
     /// Reports whether an instance of `other` may go before one of `dag` on a core that counts for
-    /// that.
+    /// that, where both are members of groups.
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
-        let ranked = self.relation.may_outrank(other, dag);
-        if !self.is_pinned() || other == dag {
-            return ranked;
-        }
-        let shares = self.dag(other).affinity() == self.dag(dag).affinity();
-        let is_kept = self.relation.preemption != PreemptionMix::All;
-        self.has_pins(other) || is_kept || ranked && shares
+        let is_kept = self.tells_cores() && self.relation.preemption != PreemptionMix::All;
+        let [one, two] = [other, dag].map(|dag| self.members[dag]);
+        let outranks = other != dag && (is_kept || self.relation.may_outrank(other, dag));
+        outranks && self.places.share(one, two)
     }
 
-    /// Returns the cores that execute what of a DAG is not pinned.
+    /// Returns the cores that execute a DAG without a table.
     pub(super) fn group(&self, dag: usize) -> Vec<u32> {
         match self.dag(dag).affinity() {
             [] => (0..self.settings.cores).collect(),
@@ -179,43 +289,25 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Returns the DAGs with subtasks that are pinned to cores of a DAG's group, and how long it takes
-    /// to go on elsewhere with what a job of each finds there.
-    fn moves(&self, dag: usize) -> Vec<(usize, u128)> {
-        let group = self.group(dag);
-        let is_free = |subtask: &Subtask| subtask.core().is_none();
-        if group.len() == 1 || !self.dag(dag).subtasks().iter().any(is_free) {
-            return Vec::new();
-        }
-        let takes = |other: usize| {
-            let subtasks = self.dag(other).subtasks().iter();
-            let starts = subtasks.filter(|of| of.core().is_some_and(|core| group.contains(&core)));
-            let starts = starts.map(|of| 1 + of.waits().len() as u128);
-            (
-                other,
-                starts.sum::<u128>() * u128::from(self.set.bursts.move_ns),
-            )
-        };
-        let all = (0..self.members.len()).map(takes);
-        all.filter(|(_, takes)| *takes > 0).collect()
-    }
-
-    /// Returns how many cores count for a DAG where cores are told apart.
-    fn counted_cores(&self, dag: usize) -> u32 {
-        match (self.has_pins(dag), self.dag(dag).affinity().len()) {
-            (true, _) => 1,
-            (false, 0) => self.settings.cores,
-            (false, cores) => to_u32(cores),
-        }
+    /// Returns the table of a DAG.
+    pub(super) fn table_of(&self, dag: usize) -> Option<&CaseTable<'a>> {
+        let table = self.places.table_of[self.members[dag]]?;
+        self.tables.get(table)
     }
 
     /// Reports whether cores of the cluster are told apart.
-    pub(super) const fn is_pinned(&self) -> bool {
-        self.is_pinned
+    pub(super) const fn tells_cores(&self) -> bool {
+        self.places.are_told
+    }
+
+    /// Reports whether a DAG of the cluster enters sections of a lock.
+    pub(super) fn has_locks(&self) -> bool {
+        let mut own = self.own.iter();
+        own.any(|&dag| !self.places.all[dag].locks().is_empty())
     }
 
     pub(super) fn dag(&self, dag: usize) -> &'a Dag {
-        &self.all[self.members[dag]]
+        &self.places.all[self.members[dag]]
     }
 
     pub(super) fn id(&self, dag: usize) -> DagId {
@@ -236,22 +328,21 @@ impl<'a> AnalysisInput<'a> {
 
     /// Tells the equations what follows from the attributes.
     fn complete(&mut self) {
-        let is_pinned = self.is_pinned();
-        self.set.keep_cores = !is_pinned && self.relation.preemption == PreemptionMix::None;
-        self.set.deadlines_limit = !is_pinned
+        let tells_cores = self.tells_cores();
+        self.set.keep_cores = !tells_cores && self.relation.preemption == PreemptionMix::None;
+        self.set.deadlines_limit = !tells_cores
             && self.relation.order == InstanceOrder::ByDeadline
             && self.relation.preemption != PreemptionMix::Some
             && constrained(self.tasks, self.settings.cores);
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
-            figures.allow_in_flight(self.all[self.members[dag]].in_flight());
+            figures.allow_in_flight(self.places.all[self.members[dag]].in_flight());
         }
-        if is_pinned {
+        if tells_cores {
             for dag in 0..self.members.len() {
-                self.set.count_on(dag, self.counted_cores(dag));
+                self.set.count_on(dag, to_u32(self.group(dag).len()));
             }
             self.set.forbid_overlap(vec![true; self.members.len()]);
-            self.set.moves = (0..self.members.len()).map(|dag| self.moves(dag)).collect();
         } else if self.set.has_waits() {
             let entering = self.entering.iter();
             let with_waits = entering.map(|features| features.cover(Features::WAITS));
@@ -268,12 +359,13 @@ pub(super) fn dag_id(dag: usize) -> DagId {
 /// Returns the DAGs at the positions `own` as the analysis sees them, and notes for each that
 /// cannot be analysed the reason: its own, or that it may have to wait for such a one.
 fn analysable(
-    dags: &[Dag],
+    places: &CorePlaces<'_>,
     own: &[usize],
     relation: &RankRelation,
     settings: &AnalysisSettings,
     reasons: &mut [Option<NotProvenReason>],
 ) -> Vec<Option<Task>> {
+    let dags = places.all;
     let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
     let mut tasks: Vec<Option<Task>> = dags.iter().map(|_| None).collect();
     let unbounded = own.iter().find_map(|&dag| {
@@ -296,13 +388,14 @@ fn analysable(
     let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
         own.iter().partition(|&&dag| reasons[dag].is_none());
     let mut seen = 0;
+    let keep_cores = relation.preemption != PreemptionMix::All;
     // Until nothing more follows: what is delayed by an unknown DAG is unknown, too.
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
         known.retain(|&dag| {
-            // What is pinned goes before all that is not.
-            let is_pinned = dags[other].is_pinned();
-            let is_delayed = is_pinned || relation.may_delay(other, dag);
+            let by_table = places.by_table(other, dag, keep_cores);
+            let is_delayed = by_table
+                .unwrap_or_else(|| places.share(other, dag) && relation.may_delay(other, dag));
             if is_delayed {
                 reasons[dag] = Some(NotProvenReason::DelayedBy { dag: dag_id(other) });
                 unknown.push(dag);

@@ -53,8 +53,10 @@ features! {
     SINK_DEADLINES
     /// Of two DAGs each may outrank the other, in the same order for every job.
     INTERLEAVED
-    /// Cores are told apart: subtasks are pinned, or DAGs confined to groups of cores.
-    PINS
+    /// Cores are told apart: DAGs are confined to groups of cores, or tables run on some.
+    GROUPS
+    /// The DAG is in a table, or a core of its group has one.
+    TABLE
     /// Subtasks wait.
     WAITS
     /// A deadline is beyond the period, so jobs may overlap.
@@ -104,13 +106,12 @@ impl Features {
         of
     }
 
-    /// Returns the features of the machine, and those that the DAGs of a case make together. Each
-    /// setting is named, as the attributes of a DAG are below.
-    pub(super) fn of_case(
+    /// Returns the features of the machine. Each setting is named, as the attributes of a DAG are
+    /// below.
+    pub(super) fn of_machine(
         settings: &AnalysisSettings,
-        relation: &RankRelation,
         bursts: &WorkloadBursts,
-        is_pinned: bool,
+        tells_cores: bool,
     ) -> Self {
         let AnalysisSettings {
             // Both are in the relation, with what subtasks state.
@@ -119,6 +120,20 @@ impl Features {
             cores,
             overheads,
         } = settings;
+        let count = if *cores == 1 {
+            Self::ONE_CORE
+        } else {
+            Self::CORES
+        };
+        count
+            .and(Self::OVERHEADS.if_so(*overheads != Overheads::default()))
+            .and(Self::DEVICE.if_so(overheads.device_ns > 0))
+            .and(Self::BURSTS.if_so(!bursts.are_none()))
+            .and(Self::GROUPS.if_so(tells_cores))
+    }
+
+    /// Returns the features that the DAGs without tables make together.
+    pub(super) fn of_order(relation: &RankRelation) -> Self {
         let order = match relation.order {
             InstanceOrder::Ranked => {
                 Self::RANKED.and(Self::INTERLEAVED.if_so(relation.interleaves()))
@@ -131,24 +146,8 @@ impl Features {
             PreemptionMix::None => Self::ALL_KEEP,
             PreemptionMix::Some => Self::SOME_KEEP,
         };
-        let count = if *cores == 1 {
-            Self::ONE_CORE
-        } else {
-            Self::CORES
-        };
-        let charges = Self::OVERHEADS
-            .if_so(*overheads != Overheads::default())
-            .and(Self::DEVICE.if_so(overheads.device_ns > 0));
         let sinks = Self::SINK_DEADLINES.if_so(relation.ranks_sinks);
-        let both = Self::BURSTS
-            .if_so(!bursts.are_none())
-            .and(Self::PINS.if_so(is_pinned));
-        order
-            .and(preemption)
-            .and(count)
-            .and(charges)
-            .and(sinks)
-            .and(both)
+        order.and(preemption).and(sinks)
     }
 
     /// Returns the features that the attributes of a DAG make. Each attribute is named: a new one
@@ -163,7 +162,8 @@ impl Features {
             locks,
             name: _,
             graph_hash: _,
-            // Bounds hold for any offsets and any of the jobs.
+            // Bounds hold for any offsets, but those of tables, which are made for them; and for
+            // any of the jobs.
             offset_ns: _,
             first_job: _,
             jobs: _,
@@ -173,7 +173,7 @@ impl Features {
             // A case has the DAGs of one cluster.
             cluster: _,
             why_there: _,
-            // Cores are told apart for all DAGs of a case: see `of_case`.
+            // Cores are told apart for all DAGs of a case: see `of_machine`.
             affinity: _,
             // An order and a shared state are edges.
             order: _,
@@ -200,7 +200,7 @@ impl Features {
             wcet_source: _,
             budget_ns: _,
             stack_bytes: _,
-            // What these come to depends on the settings and on the other DAGs: see `of_case`.
+            // What these come to depends on the settings and on the other DAGs: see `of_order`.
             core: _,
             priority: _,
             non_preemptive: _,

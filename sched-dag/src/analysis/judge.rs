@@ -14,6 +14,7 @@ use super::schedulability::{JobBounds, bound_jobs, bound_sinks};
 use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason};
 use crate::ids::{SubtaskId, to_u32};
+use crate::table::Table;
 use crate::task_set::{Dag, TaskSet};
 
 /// Bounds the response time of every DAG, as far as a test proves it.
@@ -36,8 +37,10 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
         let settings = of_cluster(settings, cores, &mut own.iter().map(|&dag| &dags[dag]));
         let first_failing = &mut answer.first_failing;
+        let tables = task_set.tables().iter();
+        let tables: Vec<&Table> = tables.filter(|table| table.cluster == cluster).collect();
         with_case(
-            dags,
+            (dags, &tables),
             &own,
             &settings,
             &mut answer.reasons,

@@ -25,8 +25,9 @@
 //! | `features`, `schedulability` | what enters a DAG; the tests, each with what it covers | Joseph and Pandya 1986; Baruah 1990 |
 //! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
-//! | `list_schedule`, `fixed_order` | orders that the commit fixes | Graham 1969 |
+//! | `list_schedule` | orders of a DAG on some cores | Graham 1969 |
 //! | `lending`, `lent_cores` | heavy DAGs that lend what their orders leave | derived here |
+//! | `table_check` | whether a table keeps its times | derived here |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -71,7 +72,6 @@ mod blocking;
 mod case;
 mod cover;
 mod features;
-mod fixed_order;
 mod interference;
 mod intra_task;
 mod judge;
@@ -85,6 +85,8 @@ mod ranks;
 mod ratio;
 mod schedulability;
 mod set;
+mod table_check;
+mod table_making;
 mod task;
 mod waiting;
 mod whole_units;
@@ -103,17 +105,17 @@ use crate::worded::texts;
 
 pub use assign::{AssignmentFailure, Federation, NotAssigned, assign, federated};
 pub use cover::{covers, parallelism, width};
-pub use fixed_order::fix_orders;
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
-pub use lending::{CoreOwner, LendingAnswer, LendingPlan, LentGroup, lend};
+pub use lending::{CoreOwner, ENTRY_LIMIT, LendingAnswer, LendingPlan, LentGroup, lend};
 pub use lent_cores::CoreSupply;
 pub use list_schedule::{ListSchedule, ScheduledSubtask};
 pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
-pub use task::{SubtaskWaits, Task, TaskError};
+pub use table_check::{TableCondition, TableDag, TableFault, TableTimes, check_table};
+pub use task::{SubtaskWaits, TableTerms, Task, TaskError};
 pub use whole_units::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
 pub use witness::witness;
 
@@ -203,12 +205,12 @@ texts! {
         OneCore = "response times on one core (Joseph and Pandya 1986)";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
-        /// The longest path in the order that pins and edges fix: nothing else can delay it.
-        Owner = "an order of its own on each core";
-        /// The rest of cores that owners lend, under fixed priorities.
-        Member = "what owners leave of its cores";
-        /// The multi-path bound where cores are told apart: on those that count for the DAG.
-        BesidePins = "multiple paths next to pinned subtasks";
+        /// The times of its entries in a table: nothing else can delay them.
+        Table = "its entries in a table";
+        /// The rest of cores that tables leave, under fixed priorities.
+        Member = "what tables leave of its cores";
+        /// The multi-path bound on the cores of its group.
+        InGroup = "multiple paths on a group of cores";
     }
 }
 
@@ -272,11 +274,25 @@ texts! {
             "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
              by the period; add cores or let the commit divide them, shorten what outranks it or \
              lengthen the period";
-        /// A subtask is pinned to a core, and not as an owner's are.
-        Pinned { subtask: SubtaskId } =
-            "subtask {} is pinned, and no test bounds the response time of its DAG as on one core; pin \
-             all its subtasks, to cores that no other DAG is pinned to, with an edge from each to the \
-             next one on its core, or leave the cores out", subtask.0;
+        /// An entry of its table fails a condition.
+        NotRight(fault: TableFault) =
+            "its table is not right: subtask {} of dag {}, in job {} of the first lap, {}; change the \
+             lists, or state them without times",
+            fault.subtask.0, fault.dag.0, fault.job, fault.condition;
+        /// The entries of its table end too late.
+        LateInTable { subtask: SubtaskId, bound_ns: u64 } =
+            "in its table subtask {} ends up to {:?} after the release, which is too late; start it \
+             earlier in its list, or relax the deadline",
+            subtask.0, Duration::from_nanos(*bound_ns);
+        /// Its table is of several DAGs, and something delays entries that is not charged.
+        TableOverheads =
+            "its table is of several DAGs, and no bound covers long steps, interrupts of a device or \
+             sections of locks there; give each DAG a table of its own, or leave the lists out";
+        /// A table runs on its cores.
+        BesideTable =
+            "a table runs on its cores, or has its entries, and no test bounds it there; let it have \
+             subtasks that can be preempted and do not wait, and all without a table static priorities \
+             that outrank DAG by DAG, or leave it cores without a table";
         /// A DAG of its cluster is not proven, and may release any number of jobs in a row,
         /// for a limit of its jobs is not taken into account.
         BesideBacklog { dag: DagId } =

@@ -89,7 +89,7 @@ pub(super) fn sort_largest_first(positions: &mut [usize], of: impl Fn(usize) -> 
 }
 
 /// Returns the greatest common divisor (Euclid), 0 only of 0 and 0.
-fn greatest_common_divisor(mut one: u128, mut other: u128) -> u128 {
+pub(crate) fn greatest_common_divisor(mut one: u128, mut other: u128) -> u128 {
     while other != 0 {
         (one, other) = (other, one % other);
     }

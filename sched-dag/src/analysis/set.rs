@@ -49,9 +49,6 @@ pub(super) struct EquationSet<'a> {
     pub(super) is_of_waits: bool,
     /// By DAG, whether waits enter its equations; empty: of none.
     with_waits: Vec<bool>,
-    /// By DAG, others and how long a job of each may keep instances of its group that go on with
-    /// another core; empty: no core is taken so.
-    pub(super) moves: Vec<Vec<(usize, u128)>>,
 }
 
 /// The bounds of one DAG of a set, as far as they are solved.
@@ -109,7 +106,6 @@ impl<'a> EquationSet<'a> {
             rounding: Rounding::Up,
             is_of_waits: tasks.iter().any(|task| task.has_waits()),
             with_waits: Vec::new(),
-            moves: Vec::new(),
         }
     }
 
@@ -336,32 +332,7 @@ impl<'a> EquationSet<'a> {
                 blocking_ns.extend_from_slice(&self.shapes[other].largest_ns);
             }
         }
-        Ok(DelaySources {
-            bursts: self.bursts_and_moves(dag, responses)?,
-            ..self.delays_by(dag, others, &blocking_ns)
-        })
-    }
-
-    /// Returns the time that a DAG loses by bursts, and by instances of its group that go on with
-    /// another core, as a pinned one takes theirs.
-    fn bursts_and_moves(
-        &self,
-        dag: usize,
-        responses: &[Option<u64>],
-    ) -> Result<WorkloadBursts, BoundFailure> {
-        let mut bursts = self.bursts.clone();
-        for &(other, takes) in self.moves.get(dag).into_iter().flatten() {
-            // Of its own jobs there is one.
-            let (period, response) = match other == dag {
-                true => (u128::MAX, 0),
-                false => {
-                    let response = responses[other].ok_or(BoundFailure::Other(other))?;
-                    (self.tasks[other].period_ns().into(), response.into())
-                }
-            };
-            bursts.add(period, response, takes);
-        }
-        Ok(bursts)
+        Ok(self.delays_by(dag, others, &blocking_ns))
     }
 
     /// Returns the sources of delay of a DAG: workloads, and longest segments that may block it.

@@ -8,7 +8,7 @@
 //! ```text
 //! machine CORES ORDER OVERHEAD_NS             static: by the numbers of subtasks; edf: by deadlines; any
 //! bursts READY_NS LATE                        only if it takes time to make instances ready
-//! moves MOVE_NS                               likewise to move them, where subtasks are pinned
+//! moves MOVE_NS                               likewise to move them, where cores are told apart
 //! device DEVICE_NS DISTANCE_NS                only if one interrupts a core
 //! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
@@ -17,9 +17,11 @@
 //! subtask WCET NUMBER KEEPS_ITS_CORE          (a WCET of 0 is an unknown one)
 //! edge FROM TO
 //! wait SUBTASK WCET LIMIT WCET ..             of segments and waits, likewise
-//! pin SUBTASK CORE                            of the cluster, counted from 0
-//! affinity CORE..                             of those that are not pinned; without it all
+//! grid PHASE                                  of a periodic one in a table: its first release, modulo T
+//! affinity CORE..                             of the cluster, counted from 0; without it all
 //! due SUBTASK DEADLINE                        of a sink that is due before its job
+//! table LAP                                   after the dags; then the list of each of its cores
+//! list CORE {DAG JOB SUBTASK START FINISH DEPTH}..
 //! hash FNV_1A                                 of all above
 //!
 //! graph DAG LENGTH VOLUME
@@ -44,9 +46,9 @@
 //! demand BUSY TIME..                          before all bounds, if it proves some
 //! bound DAG R demand
 //!
-//! bound DAG R owner FINISH..                  by subtask, from the release on
+//! bound DAG R table                           of a DAG in a table
 //! bound DAG R sequence OWNED                  of a member, on one core
-//! bound DAG R lent CHAINS CLIPPED LEFT OWNED  of a member, on several; OWNED: by their owners
+//! bound DAG R lent CHAINS CLIPPED LEFT OWNED  of a member, on several; OWNED: by their tables
 //! chain SUBTASK.. / other DAG R WORK          as above
 //!
 //! bound DAG R priorities CORES
@@ -60,6 +62,7 @@
 //! all cores. `part` lines are disjoint chains, for the clipped form.
 
 use alloc::string::String;
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::AnalysisSettings;
@@ -71,8 +74,9 @@ use super::schedulability::{write_certificates, write_terms};
 use super::witness_text::WitnessText;
 use super::workload::waiting_rooms;
 use crate::fnv::{EMPTY, fnv_1a};
-use crate::ids::to_u32;
+use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::Preemption;
+use crate::table::Table;
 use crate::task_set::{Dag, Subtask, TaskSet};
 
 /// Writes a witness for the bounds that [`answer()`](super::answer()) gives; where the cores
@@ -84,24 +88,53 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let place = task_set.is_divided().then_some(cluster);
         let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
         let dags = task_set.part(cluster);
+        let tables = part_of_tables(task_set, cluster);
         let settings = of_cluster(settings, cores, &mut dags.iter());
-        whole(&dags, place, &settings)
+        whole(
+            (&dags, &tables.iter().collect::<Vec<_>>()),
+            place,
+            &settings,
+        )
     });
     parts.collect()
 }
 
-fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &AnalysisSettings) -> String {
+/// Returns copies of the tables of a cluster, whose DAGs are counted from 0.
+fn part_of_tables(task_set: &TaskSet, cluster: ClusterId) -> Vec<Table> {
+    let mut numbers = vec![DagId(0); task_set.dags().len()];
+    let of_cluster = |dag: &usize| task_set.dags()[*dag].cluster() == cluster;
+    for (dag, number) in (0..numbers.len()).filter(of_cluster).zip(0..) {
+        numbers[dag] = DagId(number);
+    }
+    let tables = task_set.tables().iter();
+    let mut tables: Vec<Table> = tables
+        .filter(|table| table.cluster == cluster)
+        .cloned()
+        .collect();
+    for list in tables.iter_mut().flat_map(|table| &mut table.lists) {
+        for entry in &mut list.entries {
+            entry.dag = numbers[entry.dag.index()];
+        }
+    }
+    tables
+}
+
+fn whole(
+    (dags, tables): (&[Dag], &[&Table]),
+    place: Option<(u32, usize)>,
+    settings: &AnalysisSettings,
+) -> String {
     let mut text = WitnessText(String::new());
     let all: Vec<usize> = (0..dags.len()).collect();
-    let mut reasons = alloc::vec![None; dags.len()];
+    let mut reasons = vec![None; dags.len()];
     with_case(
-        dags,
+        (dags, tables),
         &all,
         settings,
         &mut reasons,
         |case, verdict, reasons| {
             text.machine(place, case);
-            text.statement(dags, case);
+            text.statement((dags, tables), case);
             text.hash("hash");
             let bounds = verdict.bounds;
             for dag in 0..case.members.len() {
@@ -149,7 +182,7 @@ impl WitnessText {
             let ready_ns = settings.overheads.ready_ns;
             self.line(format_args!("bursts {ready_ns} {}", bursts.late_ns));
         }
-        if case.is_pinned() && bursts.move_ns > 0 {
+        if case.tells_cores() && bursts.move_ns > 0 {
             self.line(format_args!("moves {}", bursts.move_ns));
         }
         let Overheads {
@@ -165,7 +198,7 @@ impl WitnessText {
         }
     }
 
-    fn statement(&mut self, dags: &[Dag], case: &AnalysisInput<'_>) {
+    fn statement(&mut self, (dags, tables): (&[Dag], &[&Table]), case: &AnalysisInput<'_>) {
         let (settings, bursts) = (case.settings, &case.set.bursts);
         for (id, dag) in dags.iter().enumerate() {
             let edges = dag.graph.successors.edges();
@@ -198,10 +231,9 @@ impl WitnessText {
             for (id, subtask) in dag.subtasks().iter().enumerate() {
                 self.waits(id, subtask);
             }
-            for (id, subtask) in dag.subtasks().iter().enumerate() {
-                if let Some(core) = subtask.core() {
-                    self.line(format_args!("pin {id} {core}"));
-                }
+            let own = DagId(to_u32(id));
+            if !dag.is_sporadic() && tables.iter().any(|table| table.dags().contains(&own)) {
+                self.line(format_args!("grid {}", dag.offset_ns() % dag.period_ns()));
             }
             if !dag.affinity().is_empty() {
                 let cores = dag.affinity().iter().map(|&core| core.into());
@@ -215,6 +247,24 @@ impl WitnessText {
                 }
             }
         }
+        tables.iter().for_each(|table| self.table(dags, table));
+    }
+
+    fn table(&mut self, dags: &[Dag], table: &Table) {
+        let is_alone = table.dags().len() == 1;
+        self.line(format_args!("table {}", table.lap_ns));
+        for list in &table.lists {
+            let entries = list.entries.iter().flat_map(|of| {
+                let finish_ns = i128::from(of.start_ns) + i128::from(of.length_ns);
+                let (dag, subtask) = (of.dag.0.into(), of.subtask.0.into());
+                let model = &dags[of.dag.index()];
+                // Counted from the first release in lap 0 on, as that of `grid`.
+                let before = model.offset_ns() / model.period_ns() * u64::from(!is_alone);
+                let (job, depth) = (i128::from(of.job) + i128::from(before), of.depth.into());
+                [dag, job, subtask, of.start_ns.into(), finish_ns, depth]
+            });
+            self.list("list", core::iter::once(list.core.into()).chain(entries));
+        }
     }
 
     fn waits(&mut self, id: usize, subtask: &Subtask) {
@@ -223,7 +273,7 @@ impl WitnessText {
             return;
         }
         let segments_ns = subtask.locking_segments_ns();
-        let segments_ns = segments_ns.unwrap_or(alloc::vec![0; limits_ns.len() + 1]);
+        let segments_ns = segments_ns.unwrap_or(vec![0; limits_ns.len() + 1]);
         let later = limits_ns.zip(&segments_ns[1..]);
         let later = later.flat_map(|(limit_ns, &segment_ns)| [limit_ns, segment_ns]);
         let times = core::iter::once(segments_ns[0]).chain(later);

@@ -1,7 +1,7 @@
 //! Clusters: each is bounded as if it were alone on a machine of its own. (That it runs so, each
 //! scenario tells, event by event.)
 
-use sched_dag::analysis::{self, AnalysisResult, NotProvenReason, SchedulabilityTest};
+use sched_dag::analysis::{self, AnalysisResult, NotProvenReason};
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy, Preemption,
     SubtaskId, verify,
@@ -61,45 +61,6 @@ fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
     );
     let begins = |line: &&str| line.starts_with("machine 1 ");
     assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
-}
-
-#[test]
-fn bounds_of_pinned_subtasks_need_an_order_on_cores_of_their_own() {
-    let mut specs = three();
-    specs[2].subtasks[0].wcet_ns = Some(1);
-    let before = answer(&specs).0;
-    assert!(before.is_proven());
-    // On its core it goes first, whatever the deadlines.
-    specs[2].subtasks[0].core = Some(0);
-    let owned = answer(&specs).0;
-    let bounds = owned.bounds.iter().map(|bound| {
-        let bound = bound.as_ref().unwrap();
-        (bound.bound_ns, bound.test)
-    });
-    let (first, other) = (before.bounds[0].unwrap(), before.bounds[1].unwrap());
-    let expected = [
-        (first.bound_ns, first.test),
-        (other.bound_ns, SchedulabilityTest::Member),
-        (1, SchedulabilityTest::Owner),
-    ];
-    assert_eq!(bounds.collect::<Vec<_>>(), expected);
-    // No edge says which of two goes first.
-    let again = specs[2].subtasks[0].clone();
-    specs[2].subtasks.push(again);
-    let (unordered, _) = answer(&specs);
-    let pinned = |subtask| NotProvenReason::Pinned {
-        subtask: SubtaskId(subtask),
-    };
-    let behind = NotProvenReason::DelayedBy { dag: DagId(2) };
-    assert_eq!(unordered.reasons, [None, Some(behind), Some(pinned(1))]);
-    assert_eq!(unordered.first_failing.unwrap().dag, DagId(2));
-    // Of two DAGs on one core neither has it to itself, and each counts for the other.
-    specs[2].subtasks.pop();
-    specs[1].subtasks[0].core = Some(0);
-    let (shared, _) = answer(&specs);
-    let beside = SchedulabilityTest::BesidePins;
-    let tests = shared.bounds.iter().map(|bound| bound.unwrap().test);
-    assert_eq!(tests.collect::<Vec<_>>(), [first.test, beside, beside]);
 }
 
 #[test]

@@ -83,7 +83,7 @@ macro_rules! tests {
 
 // Those on whose bounds others rest stand before these. A DAG with a bound has none by `multiple_paths`,
 // so none before that may be longer than its own.
-tests!(response priorities pinned multiple_paths demand sink_paths);
+tests!(response priorities tables members multiple_paths demand sink_paths);
 
 /// The bounds of jobs, as far as tests have found them.
 pub(super) struct JobBounds {
@@ -138,13 +138,16 @@ pub(super) fn bound_jobs(case: &AnalysisInput<'_>) -> JobBounds {
         }
     }
     for &dag in &case.order {
-        let mut tests = TESTS.iter().filter(|test| !test.names.is_empty());
         if found.bounds[dag].is_some() {
             found.reasons[dag] = None;
-        } else if !tests.any(|test| test.is_for(case, dag)) {
-            found.reasons[dag] = Some(NotProvenReason::NoBound);
-            found.first_failing.get_or_insert(dag);
+            continue;
         }
+        let other = match case.entering[dag].cover(Features::TABLE) {
+            true => NotProvenReason::BesideTable,
+            false => NotProvenReason::NoBound,
+        };
+        found.reasons[dag].get_or_insert(other);
+        found.first_failing.get_or_insert(dag);
     }
     found
 }

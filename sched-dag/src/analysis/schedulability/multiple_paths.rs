@@ -29,20 +29,12 @@
 //! others, jobs must not overlap: a bound beyond the period does not count as proven, the DAG's
 //! own or that of another in its equation.
 //!
-//! Where cores are told apart (P1 to P4 of `scheduler/pins.rs`), fewer of them *count* for a DAG: one
-//! if a subtask of it is pinned, else those of its group. While a segment of it is eligible and does not
-//! execute, as many cores as count execute something else:
-//!
-//! - A pinned one waits for its core, and there another pinned one executes, or what keeps the core.
-//! - Another one waits for a core of its group, and each of these executes a pinned one, or one of the
-//!   group that wins or keeps its core.
-//!
-//! The equations ask no more of a machine than that. Which cores count may change from one instant to
-//! the next. On those that do, a job of another DAG executes its volume at most, within its bound, and
-//! on no more of them at once than there are or than it is wide. So such a DAG has the bounds of a
-//! machine of as many cores, on which all DAGs with pinned subtasks count in full, and those of its group
-//! that may outrank it; where cores are kept all do. Under EDF no deadline limits what
-//! counts, and jobs must not overlap, as where subtasks wait.
+//! Where DAGs are confined to groups of cores (T4 of `table`), those of the group *count*: while a segment
+//! is eligible and does not execute, each of them executes another one of the group that wins or keeps
+//! its core. So such a DAG has the bounds of a machine of as many cores, on which those of its group
+//! that may outrank it count; where cores are kept all of them do. Under EDF no deadline limits what
+//! counts, and jobs must not overlap, as where subtasks wait. A group with a core that has a table is
+//! no matter of this test (`members`).
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -68,11 +60,11 @@ pub(super) const TEST: BoundTest = BoundTest {
         SchedulabilityTest::NonPreemptive,
         SchedulabilityTest::Pipelined,
         SchedulabilityTest::AnyOrder,
-        SchedulabilityTest::BesidePins,
+        SchedulabilityTest::InGroup,
     ],
     covers: covers!(
         RANKED BY_DEADLINE ANY_ORDER ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES
-        INTERLEAVED PINS WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS DEVICE SPORADIC
+        INTERLEAVED GROUPS WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS DEVICE SPORADIC
     ),
     jobs,
     ..BoundTest::NONE
@@ -89,11 +81,10 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let known: Vec<Option<u64>> = known.collect();
     let may_outrank = |other, dag| case.may_outrank(other, dag);
     let solution = case.set.solve(&known, &case.order, may_outrank);
-    for dag in (0..known.len()).filter(|&dag| known[dag].is_none()) {
+    let is_asked = |dag: usize| TEST.is_for(case, dag);
+    for dag in (0..known.len()).filter(|&dag| known[dag].is_none() && is_asked(dag)) {
         match solution.responses[dag] {
             Some(bound_ns) => found.offer(dag, bound_ns, form(case, dag, bound_ns)),
-            // It has a shorter bound as an owner, so why it is none is what to see to.
-            None if matches!(found.reasons[dag], Some(NotProvenReason::Pinned { .. })) => {}
             None => {
                 // Numbers that overflow alone are no failure of an equation.
                 let limit = BoundFailure::Own(SolverFailure::Limit);
@@ -102,13 +93,14 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
             }
         }
     }
-    found.first_failing = solution.first_failing.map(|(dag, _)| dag);
+    let first = solution.first_failing.map(|(dag, _)| dag);
+    found.first_failing = first.filter(|&dag| is_asked(dag));
 }
 
 /// Names the form of a response time.
 fn form(case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) -> SchedulabilityTest {
-    if case.is_pinned() {
-        SchedulabilityTest::BesidePins
+    if case.tells_cores() {
+        SchedulabilityTest::InGroup
     } else if bound_ns > case.tasks[dag].period_ns() {
         SchedulabilityTest::Pipelined
     } else if case.is_alone(dag) {

@@ -52,13 +52,13 @@ pub(crate) fn refused(file: &str) -> [usize; 3] {
 }
 
 /// Returns the text with each number one more, one less, and 0; and with all WCETs, priorities
-/// or marks of keeping the core alike; and with a subtask that is pinned.
+/// or marks of keeping the core alike; and with a table more.
 fn altered(text: &str) -> Vec<String> {
     let mut all: Vec<String> = (1..=3)
         .flat_map(|column| ["0", "1"].map(|value| with_column(text, column, value)))
         .collect();
     // A feature that its bounds may not cover.
-    all.push(text.replacen("\nhash ", "\npin 0 0\nhash ", 1));
+    all.push(text.replacen("\nhash ", "\ntable 1\nlist 0 0 0 0 0 1 0\nhash ", 1));
     let mut at = 0;
     for word in text.split_inclusive([' ', '\n']) {
         let (before, after) = (&text[..at], &text[at + word.trim_end().len()..]);
@@ -139,10 +139,32 @@ fn ranks(text: &str) -> impl Fn(&str) -> u32 {
     }
 }
 
+/// Returns the list of a core as a commit takes it.
+fn list(words: &[&str]) -> String {
+    let (mut text, mut depth) = (format!("core {}:", words[0]), 0);
+    for entry in words[1..].chunks(6) {
+        let numbers: Vec<i64> = entry
+            .iter()
+            .map(|word| word.parse().expect("a number"))
+            .collect();
+        let deeper = usize::try_from(numbers[5]).expect("a depth");
+        text += &" (".repeat(deeper.saturating_sub(depth));
+        text += &" )".repeat(depth.saturating_sub(deeper));
+        depth = deeper;
+        let length = numbers[4] - numbers[3];
+        text += &format!(
+            " {}.{}#{}@{}+{length}",
+            numbers[0], numbers[2], numbers[1], numbers[3]
+        );
+    }
+    text + &" )".repeat(depth)
+}
+
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
 fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let (rank, mut dags) = (ranks(text), Vec::<DagSpec>::new());
     let (mut machine, mut costs) = ((0, Policy::Edf), Overheads::default());
+    let mut lists = Vec::new();
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
@@ -178,7 +200,9 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
                 });
                 dag.subtasks[index(1)].waits = waits.collect();
             }
-            ("pin", Some(dag)) => dag.subtasks[index(1)].core = Some(small(2)),
+            ("grid", Some(dag)) => dag.offset_ns = number(1),
+            ("table", _) => {}
+            ("list", _) => lists.push(list(&words[1..])),
             ("affinity", Some(dag)) => dag.affinity = (1..words.len()).map(small).collect(),
             ("due", Some(dag)) => {
                 dag.subtasks[index(1)].relative_deadline_ns = Some(number(2));
@@ -193,6 +217,7 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
         cores: machine.0,
         clusters: sched_dag::CoreDivision::Undivided,
         is_lent: false,
+        lists,
         dispatch_ns: 0,
     };
     // Only a shared state makes a sink precede another subtask.

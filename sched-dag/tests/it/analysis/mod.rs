@@ -15,12 +15,12 @@ mod worked;
 
 use ::random::Random;
 use sched_dag::analysis::{
-    AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError,
-    answer, fix_orders,
+    AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest,
+    TableCondition, TableFault, TaskError, answer,
 };
 use sched_dag::{
-    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, OverrunPolicy,
-    Policy, Preemption, SchedulerOptions, SubtaskId, SubtaskOrder, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, OverrunPolicy, Policy, Preemption,
+    SchedulerOptions, SubtaskId, verify,
 };
 
 use self::random::sample_with;
@@ -41,6 +41,21 @@ pub(crate) fn settings((policy, preemption): (Policy, Preemption), cores: u32) -
 /// Commits DAGs of any shape, and analyses them.
 fn answered(specs: &[DagSpec], settings: &AnalysisSettings) -> AnalysisResult {
     answer(&commit(specs, settings.policy, settings.cores), settings)
+}
+
+/// Does so with lists of cores, whose times follow from the WCETs with their charges, if they are
+/// not stated.
+fn listed(specs: &[DagSpec], lists: &[&str], settings: &AnalysisSettings) -> AnalysisResult {
+    let options = CommitOptions::new(settings.policy, settings.cores)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_lists(lists);
+    let mut task_set = verify(specs, &options)
+        .expect("the lists are right")
+        .task_set;
+    if !lists.concat().contains('@') {
+        task_set.charge_tables(settings);
+    }
+    answer(&task_set, settings)
 }
 
 /// Returns the bounds of all DAGs.
@@ -219,14 +234,17 @@ fn what_falls_behind_is_charged_for_all_that_it_releases_late() {
 }
 
 #[test]
-fn overheads_beside_pinned_subtasks_count_in_each_bound() {
-    let mut owner = spec(10, 10, &[3], &[], 0);
-    owner.subtasks[0].core = Some(0);
+fn overheads_next_to_a_table_count_in_each_bound() {
+    let owner = spec(10, 10, &[3], &[], 0);
     let mut member = spec(20, 20, &[5], &[], 1);
     let both = |member: &DagSpec, ready_ns, interrupt_ns| {
         let mut with = settings(FP, 2);
         (with.overheads.ready_ns, with.overheads.interrupt_ns) = (ready_ns, interrupt_ns);
-        bounds(&answered(&[owner.clone(), member.clone()], &with))
+        bounds(&listed(
+            &[owner.clone(), member.clone()],
+            &["core 0: 0.0"],
+            &with,
+        ))
     };
     // It has both cores: one is always free, and a whole unit is halved and rounded up.
     assert_eq!(both(&member, 0, 0), [3, 6].map(Some));
@@ -272,12 +290,97 @@ fn a_device_counts_in_each_window_and_is_not_divided_among_cores() {
     let of_demand = |takes| on(Policy::Edf, 1, &by_demand, [takes, 300]);
     assert_eq!(of_demand(10), [Some(340), Some(900)]);
     assert_eq!(of_demand(11), [None, None]);
-    // An owner is late by it, and so its member.
+    // A table of one DAG is late by it, and so its member.
     let mut owned = [spec(20, 20, &[3], &[], 0), spec(40, 40, &[5], &[], 1)];
-    owned[0].subtasks[0].core = Some(0);
     owned[1].affinity = vec![0];
-    assert_eq!(on(FP.0, 2, &owned, [0, 9]), [Some(3), Some(8)]);
-    assert_eq!(on(FP.0, 2, &owned, [1, 9]), [Some(4), Some(10)]);
+    let beside = |takes| {
+        let with = with_device(settings(FP, 2), takes, 9);
+        bounds(&listed(&owned, &["core 0: 0.0"], &with))
+    };
+    assert_eq!(beside(0), [Some(3), Some(8)]);
+    assert_eq!(beside(1), [Some(4), Some(10)]);
+}
+
+/// Two DAGs of periods 10 and 20 on two cores; the second one's last subtask is nested.
+#[test]
+fn each_dag_of_a_table_has_its_bound_or_the_entry_that_fails() {
+    let fast = spec(10, 10, &[2, 3], &[(0, 1)], 0);
+    let slow = spec(20, 30, &[9, 4], &[(0, 1)], 0);
+    let lists = ["core 0: 0.0 1.0 ( 0.0#1 )", "core 1: 0.1 0.1#1 1.1"];
+    let on = |specs: &[DagSpec], lists: &[&str], kind| listed(specs, lists, &settings(kind, 2));
+    let both = [fast.clone(), slow.clone()];
+    for kind in [FP, (Policy::Edf, Preemption::Enabled)] {
+        let answer = on(&both, &lists, kind);
+        assert_eq!(bounds(&answer), [Some(5), Some(19)], "{answer:?}");
+    }
+    // Whatever keeps its core has nothing nested in it.
+    let kept = on(&both, &lists, (Policy::Edf, Preemption::Disabled));
+    let fails = |dag, job, subtask, condition| {
+        let (dag, subtask) = (DagId(dag), SubtaskId(subtask));
+        Some(NotProvenReason::NotRight(TableFault {
+            dag,
+            subtask,
+            job,
+            condition,
+        }))
+    };
+    let at_first = fails(1, 0, 0, TableCondition::Kept);
+    assert_eq!(kept.reasons, [at_first, at_first]);
+    let stated = ["core 0: 0.0@0+2 1.0@2+11 ( 0.0#1@9+2 )", lists[1]];
+    let times = ["0.1@2+3", "0.1#1@12+3", "1.1@15+4"];
+    let early = [stated[0], &format!("core 1: {}", times.join(" "))];
+    let at_first = fails(0, 1, 0, TableCondition::Released);
+    assert_eq!(on(&both, &early, FP).reasons, [at_first, at_first]);
+    // A bound of one DAG says nothing of the other's deadline.
+    let mut late = both.clone();
+    late[1].relative_deadline_ns = Some(18);
+    let (subtask, bound_ns) = (SubtaskId(1), 19);
+    let reason = NotProvenReason::LateInTable { subtask, bound_ns };
+    assert_eq!(on(&late, &lists, FP).reasons, [None, Some(reason)]);
+    // Jobs that find no room make all late.
+    let mut overlapping = slow;
+    let later = ["core 0: 0.0 0.0#1 1.1#-1", "core 1: 0.1 1.0 ( 0.1#1 )"];
+    overlapping.subtasks[0].wcet_ns = Some(13);
+    let in_time = [Some(5), Some(27)];
+    overlapping.in_flight = Some(2);
+    let both = [fast, overlapping];
+    assert_eq!(bounds(&on(&both, &later, FP)), in_time);
+    let few = both.clone().map(|spec| DagSpec {
+        in_flight: Some(1),
+        ..spec
+    });
+    let (in_flight, dag) = (1, DagId(1));
+    assert_eq!(
+        on(&few, &later, FP).reasons,
+        [
+            Some(NotProvenReason::DelayedBy { dag }),
+            Some(NotProvenReason::InFlightTooFew { in_flight })
+        ]
+    );
+    // Delays would be handed on.
+    let with = with_device(settings(FP, 2), 1, 100);
+    let uncovered = Some(NotProvenReason::TableOverheads);
+    assert_eq!(listed(&both, &later, &with).reasons, [uncovered, uncovered]);
+}
+
+/// A member needs a rank of its own, and an end of what the table takes.
+#[test]
+fn members_beside_a_table_need_static_priorities() {
+    let specs = [0, 1].map(|priority| spec(20, 20, &[4], &[], priority));
+    let on = |kind| listed(&specs, &["core 0: 0.0"], &settings(kind, 1));
+    assert_eq!(bounds(&on(FP)), [Some(4), Some(8)]);
+    // One has no other to win over.
+    let edf = on((Policy::Edf, Preemption::Enabled));
+    assert_eq!(bounds(&edf), [Some(4), Some(8)]);
+    let kept = on((Policy::Edf, Preemption::Disabled));
+    assert_eq!(kept.reasons, [Some(NotProvenReason::BesideTable); 2]);
+    let mut unknown = specs.clone();
+    unknown[0].subtasks[0].wcet_ns = None;
+    let answer = listed(&unknown, &["core 0: 0.0"], &settings(FP, 1));
+    assert_eq!(
+        answer.reasons[1],
+        Some(NotProvenReason::DelayedBy { dag: DagId(0) })
+    );
 }
 
 #[test]
@@ -322,36 +425,4 @@ fn more_of_a_device_makes_no_bound_shorter_and_too_much_leaves_none() {
     let [first, .., most, full, without_distance] = proven;
     assert!(first > 1_000 && most > 0, "{proven:?}");
     assert_eq!([full, without_distance], [0, 0]);
-}
-
-#[test]
-fn a_fixed_order_is_taken_where_it_proves_more() {
-    let on = |cores, clusters: &[u32], order: SubtaskOrder, wcets: &[u64]| {
-        let mut spec = spec(100, 100, wcets, &[], 0);
-        spec.order = order;
-        spec.cluster = (!clusters.is_empty()).then_some(ClusterId(0));
-        // Under EDF, so that no priorities within the DAG help.
-        let options = CommitOptions::new(Policy::Edf, cores)
-            .with_construction(ConstructionPolicy::any_graph())
-            .with_clusters(CoreDivision::Of(clusters.to_vec()));
-        let mut task_set = verify(&[spec], &options).unwrap().task_set;
-        let settings = settings((Policy::Edf, Preemption::Enabled), cores);
-        fix_orders(&mut task_set, &settings);
-        let added: usize = (0..)
-            .map(SubtaskId)
-            .take(wcets.len())
-            .map(|subtask| task_set.dags()[0].successors(subtask).len())
-            .sum();
-        let bound = answer(&task_set, &settings).bounds[0].unwrap();
-        (bound.bound_ns, added)
-    };
-    let bound = |order, wcets: &[u64]| on(2, &[], order, wcets);
-    // Three of 2 after two of 3, on two cores: 3 + 2 + 2, in whatever order they are taken.
-    let wcets = [3, 3, 2, 2, 2];
-    assert_eq!(bound(SubtaskOrder::Free, &wcets), (8, 0));
-    assert_eq!(bound(SubtaskOrder::Fixed, &wcets), (7, 3));
-    // Made for the cores of its cluster, be there more on the machine.
-    assert_eq!(on(8, &[2, 6], SubtaskOrder::Fixed, &wcets), (7, 3));
-    // Here one job alone takes no longer anyway.
-    assert_eq!(bound(SubtaskOrder::Fixed, &[5, 5]), (5, 0));
 }

@@ -1,12 +1,14 @@
 //! Random task sets from a seed.
 
+use std::ops::Range;
+
 use random::Random;
 use random::sets::set;
 use sched_dag::analysis::{AnalysisSettings, Overheads, assign};
 use sched_dag::{
     Activation, AssignmentReason, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, Dag,
-    DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, StateSpec,
-    StateUser, SubtaskId, SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
+    DagId, DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, StateSpec,
+    StateUser, SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use super::simulate::spec;
@@ -21,6 +23,8 @@ pub(crate) struct Sample {
     pub(crate) clusters: CoreDivision,
     /// Whether the commit assigns cores, which DAGs may lend.
     pub(crate) is_lent: bool,
+    /// The lists of cores.
+    pub(crate) lists: Vec<String>,
     pub(crate) dispatch_ns: u64,
 }
 
@@ -41,10 +45,20 @@ impl Sample {
     pub(crate) fn task_set(&self) -> Option<TaskSet> {
         let options = CommitOptions::new(self.policy, self.cores)
             .with_construction(ConstructionPolicy::any_graph())
-            .with_clusters(self.clusters.clone());
+            .with_clusters(self.clusters.clone())
+            .with_lists(&self.lists);
         let mut task_set = verify(&self.specs, &options).ok()?.task_set;
         if self.is_lent {
             assign(&mut task_set, &self.settings()).ok()?;
+        }
+        Some(task_set)
+    }
+
+    /// Returns that, with the times of tables by what executions are charged.
+    pub(crate) fn charged(&self, settings: &AnalysisSettings) -> Option<TaskSet> {
+        let mut task_set = self.task_set()?;
+        if !self.is_lent {
+            task_set.charge_tables(settings);
         }
         Some(task_set)
     }
@@ -66,19 +80,23 @@ impl Sample {
                 ("one core", cores == 1),
                 ("clusters", task_set.is_divided()),
             ]);
-            let dags = self.specs.iter().zip(task_set.dags());
-            let here = dags.filter(|(_, dag)| dag.cluster() == cluster);
-            here.fold(of_machine, |all, (spec, dag)| all | of_dag(spec, dag))
+            let ids = (0..).map(DagId);
+            let dags = ids.zip(self.specs.iter().zip(task_set.dags()));
+            let here = dags.filter(|(_, (_, dag))| dag.cluster() == cluster);
+            here.fold(of_machine, |all, (id, (spec, dag))| {
+                let in_table = task_set.table_of(id).is_some();
+                all | of_dag(spec, dag) | mask(&[("tables", in_table)])
+            })
         });
         clusters.collect()
     }
 }
 
 /// The features that a set or a run may have, which a test of schedulability may model or not.
-pub(crate) const FEATURES: [&str; 21] = [
-    "static", "edf", "any", "preempt", "keep", "somekeep", "one core", "clusters", "pins",
-    "groups", "lent", "sinks", "waits", "overlap", "few", "sporadic", "order", "states", "faults",
-    "pauses", "modes",
+pub(crate) const FEATURES: [&str; 20] = [
+    "static", "edf", "any", "preempt", "keep", "somekeep", "one core", "clusters", "tables",
+    "groups", "lent", "sinks", "waits", "overlap", "few", "sporadic", "states", "faults", "pauses",
+    "modes",
 ];
 
 /// The policies that have tests of their own; they are drawn more often.
@@ -103,7 +121,6 @@ fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
     let deadline_ns = dag.relative_deadline_ns();
     let is_tighter = |sink: &SubtaskId| dag.subtask(*sink).relative_deadline_ns() < deadline_ns;
     mask(&[
-        ("pins", any(|of| of.core.is_some())),
         ("groups", !spec.affinity.is_empty()),
         (
             "lent",
@@ -114,7 +131,6 @@ fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
         ("overlap", deadline_ns > dag.period_ns()),
         ("few", spec.in_flight.is_some()),
         ("sporadic", dag.is_sporadic()),
-        ("order", spec.order == SubtaskOrder::Fixed),
         ("states", !spec.states.is_empty()),
     ])
 }
@@ -163,9 +179,9 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
     if is_lent || !is_divided && !has_one && random.chance(30) {
         (specs, sizes[0]) = heavy_set(random);
     }
-    // Less load than a set is drawn for leaves more to prove, the more so next to what is pinned,
-    // where each core counts for itself.
-    let most = [16, 48][usize::from(all & bit("pins") != 0)];
+    // Less load than a set is drawn for leaves more to prove, the more so where each core
+    // counts for itself.
+    let most = [16, 48][usize::from(all & bit("tables") != 0)];
     let slack = random.within(4..=if is_lent { 4 } else { most });
     for (spec, number) in specs.iter_mut().zip(0..) {
         spec.cluster = is_divided.then_some(ClusterId(number % 2));
@@ -183,9 +199,10 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
         };
         add(spec, all & others, random);
     }
-    if !is_lent {
-        confine(&mut specs, &sizes, all, random);
-    }
+    let lists = match is_lent {
+        true => Vec::new(),
+        false => confine(&mut specs, &sizes, all, random),
+    };
     Sample {
         specs,
         policy,
@@ -199,6 +216,7 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
             false => CoreDivision::Undivided,
         },
         is_lent,
+        lists,
         dispatch_ns: random.within(0..=5_u64).saturating_sub(3),
     }
 }
@@ -213,9 +231,6 @@ fn add(spec: &mut DagSpec, own: u32, random: &mut Random) {
     spec.in_flight = has("few").then(|| random.within(1..=2));
     if has("sporadic") {
         spec.activation = Activation::Sporadic;
-    }
-    if has("order") {
-        spec.order = SubtaskOrder::Fixed;
     }
     if has("states") && spec.subtasks.len() > 1 {
         let later = random.within(1..=spec.subtasks.len() - 1);
@@ -270,44 +285,102 @@ fn heavy_set(random: &mut Random) -> (Vec<DagSpec>, u32) {
     (specs, cores)
 }
 
-/// Pins subtasks: of some DAGs all, in an order that edges fix, of others some in none; and leaves
-/// parts of clusters to what is not pinned.
-fn confine(specs: &mut [DagSpec], sizes: &[u32], all: u32, random: &mut Random) {
+/// Gives some DAGs tables, of their own or of a family with periods on a grid, and leaves parts of
+/// clusters to the others; returns the lists.
+fn confine(specs: &mut [DagSpec], sizes: &[u32], all: u32, random: &mut Random) -> Vec<String> {
     let mut owned = vec![0; sizes.len()];
-    let splits = sizes.iter().map(|&cores| random.within(0..=cores - 1));
-    let splits: Vec<u32> = splits.collect();
-    // In every other set all that is pinned has its order.
-    let kinds = random.one_of(&[3, 6]) * usize::from(all & bit("pins") != 0);
-    for spec in specs {
-        let cluster = spec.cluster.unwrap_or_default().index();
-        let (cores, first, split) = (sizes[cluster], owned[cluster], splits[cluster]);
+    let mut families: Vec<(Vec<usize>, Range<u32>)> = Vec::new();
+    let kinds = random.one_of(&[3, 5]) * usize::from(all & bit("tables") != 0);
+    for dag in 0..specs.len() {
+        let cluster = specs[dag].cluster.unwrap_or_default().index();
+        let first: u32 = sizes[..cluster].iter().sum();
+        let (cores, taken) = (first..first + sizes[cluster], first + owned[cluster]);
+        let waits = specs[dag].subtasks.iter().any(|of| !of.waits.is_empty());
+        let is_sporadic = specs[dag].activation == Activation::Sporadic;
+        let here = |family: &&mut (Vec<usize>, Range<u32>)| cores.contains(&family.1.start);
         match random.index(kinds.max(1)) {
-            1 | 2 | 5 if first < cores => {
-                owned[cluster] = random.within(first + 1..=cores);
-                let mut latest = vec![None; cores as usize];
-                for (number, subtask) in spec.subtasks.iter_mut().enumerate() {
-                    let core = random.within(first..=owned[cluster] - 1);
-                    subtask.core = Some(core);
-                    let before = latest[core as usize].replace(number);
-                    spec.edges.extend(before.map(|before| (before, number)));
-                }
-                spec.edges.sort_unstable();
-                spec.edges.dedup();
+            1 | 2
+                if !waits
+                    && !is_sporadic
+                    && let Some(family) = families.iter_mut().find(here) =>
+            {
+                // So many jobs at most in a lap, and no shorter periods, if these are not far longer.
+                let base_ns = specs[family.0[0]].period_ns.unwrap_or(1);
+                let own_ns = specs[dag].period_ns.unwrap_or(1);
+                let times = [1, 2, 4]
+                    .into_iter()
+                    .find(|times| base_ns * times >= own_ns);
+                specs[dag].period_ns = Some(base_ns * times.unwrap_or(4));
+                family.0.push(dag);
             }
-            3 => {
-                for subtask in &mut spec.subtasks {
-                    let core = random.within(0..=cores - 1);
-                    subtask.core = random.chance(40).then_some(core);
-                }
+            1..=4 if !waits && taken < cores.end => {
+                let end = random.within(taken + 1..=cores.end);
+                owned[cluster] = end - first;
+                families.push((vec![dag], taken..end));
+            }
+            _ if all & bit("groups") != 0 => {
+                let split = owned[cluster].max(1).min(sizes[cluster] - 1);
+                let groups = [0..split.max(1), split..sizes[cluster]];
+                let group = random.index(2) * usize::from(split > 0);
+                specs[dag].affinity = groups[group].clone().collect();
             }
             _ => {}
         }
-        if all & bit("groups") != 0 {
-            let groups = [0..split.max(1), split..cores];
-            let group = random.index(2) * usize::from(split > 0);
-            spec.affinity = groups[group].clone().collect();
+    }
+    let lists = families.into_iter();
+    let lists = lists.flat_map(|(dags, cores)| lists_of(specs, &dags, cores, random));
+    lists.collect()
+}
+
+/// Returns lists of DAGs, a subtask about when it could start if there were no others.
+fn lists_of(
+    specs: &[DagSpec],
+    dags: &[usize],
+    cores: Range<u32>,
+    random: &mut Random,
+) -> Vec<String> {
+    let period_ns = |dag: usize| specs[dag].period_ns.unwrap_or(1);
+    let lap_ns = dags.iter().map(|&dag| period_ns(dag)).max().unwrap_or(1);
+    // Of a sporadic one it does not begin.
+    let mut entries = Vec::new();
+    for &dag in dags {
+        let spec = &specs[dag];
+        let mut earliest_ns = vec![0; spec.subtasks.len()];
+        let shared = spec
+            .states
+            .iter()
+            .map(|of| (of.users[0].subtask, of.users[1].subtask));
+        let mut edges: Vec<_> = spec.edges.iter().copied().chain(shared).collect();
+        edges.sort_unstable();
+        for (from, to) in edges {
+            let end_ns = earliest_ns[from] + spec.subtasks[from].wcet_ns.unwrap_or(0);
+            earliest_ns[to] = end_ns.max(earliest_ns[to]);
+        }
+        let phase_ns = spec.offset_ns % period_ns(dag) * u64::from(dags.len() > 1);
+        for job in 0..lap_ns / period_ns(dag) {
+            let release_ns = phase_ns + job * period_ns(dag);
+            let subtasks = earliest_ns.iter().enumerate();
+            entries.extend(subtasks.map(|(of, ns)| (release_ns + ns, dag, of, job)));
         }
     }
+    entries.sort_unstable();
+    let nests = random.one_of(&[0, 30]);
+    let mut lists: Vec<(String, usize)> = cores.map(|core| (format!("core {core}:"), 0)).collect();
+    for (_, dag, subtask, job) in entries {
+        let at = random.index(lists.len());
+        let (list, depth) = &mut lists[at];
+        if !list.ends_with(':') && random.chance(nests) {
+            *list += " (";
+            *depth += 1;
+        } else if *depth > 0 && random.once_in(2) {
+            *list += " )";
+            *depth -= 1;
+        }
+        *list += &format!(" {dag}.{subtask}#{job}");
+    }
+    let lists = lists.into_iter().filter(|(list, _)| !list.ends_with(':'));
+    let close = |(list, depth): (String, usize)| list + &" )".repeat(depth);
+    lists.map(close).collect()
 }
 
 /// Gives most sinks a deadline of their own.

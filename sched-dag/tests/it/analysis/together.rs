@@ -20,12 +20,9 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 
 use random::Random;
-use sched_dag::analysis::{
-    AnalysisResult, NotProvenReason, SchedulabilityTest, TaskError, answer, fix_orders,
-};
+use sched_dag::analysis::{AnalysisResult, NotProvenReason, SchedulabilityTest, TaskError, answer};
 use sched_dag::{Activation, AssignmentReason, LendingAttempt, SubtaskId, TaskSet};
 
-use super::bounds;
 use super::climb::{Case, Climbed};
 use super::random::{FEATURES, Sample, bit, sample_with};
 use crate::support::number;
@@ -53,9 +50,8 @@ struct Coverage {
     by_test: BTreeMap<String, u64>,
     /// Jobs of DAGs with a bound, by two features that their cluster or their run has.
     of_pairs: [[u64; COUNT]; COUNT],
-    /// Sinks with a smaller bound than their job, and sets of which a fixed order shortens one.
+    /// Sinks with a smaller bound than their job.
     tighter_sinks: u64,
-    shortened: u64,
     /// Divided sets by how cores are lent, those with groups, and those that are refused.
     by_attempt: [u64; LendingAttempt::ALL.len()],
     with_groups: u64,
@@ -77,9 +73,8 @@ impl Coverage {
         has_enough || self.breaches.len() > 9
     }
 
-    fn add(&mut self, task_set: &TaskSet, answer: &AnalysisResult, is_shorter: bool) {
+    fn add(&mut self, task_set: &TaskSet, answer: &AnalysisResult) {
         self.dags += answer.bounds.len() as u64;
-        self.shortened += u64::from(is_shorter);
         self.tighter_sinks += tighter(answer);
         for bound in answer.bounds.iter().flatten() {
             self.bounds += 1;
@@ -127,21 +122,19 @@ fn climb(seed: u64, runs: [u64; 2], all: &Mutex<Coverage>) {
         for spec in sample.specs.iter_mut().filter(|_| is_sporadic) {
             spec.activation = Activation::Sporadic;
         }
-        let Some(mut task_set) = sample.task_set() else {
+        let settings = sample.settings();
+        let Some(task_set) = sample.charged(&settings) else {
             all().refused += u64::from(sample.is_lent);
             return;
         };
-        let (features, settings) = (sample.features(&task_set), sample.settings());
-        let free = answer(&task_set, &settings);
-        fix_orders(&mut task_set, &settings);
+        let features = sample.features(&task_set);
         let answer = answer(&task_set, &settings);
-        let order = is_no_longer(&answer, &free);
-        if order.is_none() || !is_consistent(&sample, &task_set, &answer) {
-            let found = format!("seed {seed}: {free:?}, {answer:?} of {sample:?}");
+        if !is_consistent(&sample, &task_set, &answer) {
+            let found = format!("seed {seed}: {answer:?} of {sample:?}");
             all().breaches.push(found);
         }
         if !is_sporadic {
-            all().add(&task_set, &answer, order == Some(true));
+            all().add(&task_set, &answer);
         }
         let task_set = Arc::new(task_set);
         let case = Case {
@@ -213,8 +206,8 @@ fn bounds_hold_whatever_features_come_together() {
         all.bounds, all.dags, all.by_test
     );
     println!(
-        "{} jobs, {} sinks with a smaller bound than their job, {} sets that a fixed order shortens",
-        all.jobs, all.tighter_sinks, all.shortened
+        "{} jobs, {} sinks with a smaller bound than their job",
+        all.jobs, all.tighter_sinks
     );
     println!("divided by attempts: {:?}", all.by_attempt);
     println!("jobs with a bound, in thousands, by pairs of features:");
@@ -226,7 +219,7 @@ fn bounds_hold_whatever_features_come_together() {
     if only == 0 {
         assert!(all.by_test.len() >= 9, "some test was never used");
         assert!(4 * all.bounds > all.dags, "too few bounds say little");
-        assert!(all.tighter_sinks > 0 && all.shortened > 0, "too few");
+        assert!(all.tighter_sinks > 0, "too few");
         let alone = (0..COUNT).map(|feature| all.of_pairs[feature][feature]);
         assert!(alone.min() > Some(wanted / 500), "some feature is rare");
         let (_, least) = all.rarest();
@@ -237,9 +230,9 @@ fn bounds_hold_whatever_features_come_together() {
 
 /// Sets of what few have by chance, each with fewer runs.
 #[test]
-fn bounds_hold_where_cores_are_lent_or_pinned() {
+fn bounds_hold_where_cores_are_lent_or_have_tables() {
     let all = Mutex::new(Coverage::default());
-    for names in [["lent", "preempt"], ["pins", "pins"]] {
+    for names in [["lent", "preempt"], ["tables", "tables"]] {
         let [one, other] = names.map(|name| bit(name).trailing_zeros());
         let pair = u64::from(one) * COUNT as u64 + u64::from(other);
         (1..=3_000).for_each(|number| climb(number * PAIRS + pair, [1, 1], &all));
@@ -254,9 +247,9 @@ fn bounds_hold_where_cores_are_lent_or_pinned() {
     // The last attempt alone accepts one set in 1,200.
     assert!(!attempts[..4].contains(&0) && groups > 20 && refused > 20);
     for (test, least) in [
-        (SchedulabilityTest::Owner, 100),
+        (SchedulabilityTest::Table, 100),
         (SchedulabilityTest::Member, 200),
-        (SchedulabilityTest::BesidePins, 500),
+        (SchedulabilityTest::InGroup, 100),
     ] {
         assert!(all.by_test[&test.to_string()] > least, "{test}");
     }
@@ -270,14 +263,4 @@ fn tighter(answer: &AnalysisResult) -> u64 {
         sinks_ns.iter().filter(|&&ns| ns < whole_ns).count() as u64
     });
     counts.sum()
-}
-
-/// Reports whether bounds are shorter than others; `None`: one is longer.
-fn is_no_longer(fixed: &AnalysisResult, free: &AnalysisResult) -> Option<bool> {
-    // None is longer than all.
-    let [fixed, free] = [fixed, free].map(bounds);
-    let none = |bound: &Option<u64>| bound.unwrap_or(u64::MAX);
-    let mut pairs = fixed.iter().map(none).zip(free.iter().map(none));
-    let is_longer = pairs.any(|(fixed, free)| fixed > free);
-    (!is_longer).then_some(fixed != free)
 }

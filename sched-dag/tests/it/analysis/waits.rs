@@ -2,10 +2,10 @@
 
 use std::slice;
 
-use sched_dag::analysis::{NotProvenReason, Overheads, SchedulabilityTest, answer};
-use sched_dag::{DagId, DagSpec, Policy, Preemption, SubtaskOrder, Wait};
+use sched_dag::analysis::{NotProvenReason, Overheads, SchedulabilityTest};
+use sched_dag::{DagId, DagSpec, Policy, Preemption, Wait};
 
-use super::simulate::{commit, spec};
+use super::simulate::spec;
 use super::{DIAMOND, FP, answered, bounds, settings};
 
 const EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Enabled);
@@ -112,19 +112,6 @@ fn tests_of_whole_sets_are_not_asked() {
     let [first, second] = full;
     let with_wait = [first, waiting(second, 0, 0, 1)];
     assert!(!answered(&with_wait, &settings).is_proven());
-}
-
-#[test]
-fn an_order_is_fixed_as_if_waits_were_executed() {
-    let mut spec = spec(100, 100, &[3, 3, 2, 2, 2], &[], 0);
-    spec.order = SubtaskOrder::Fixed;
-    let spec = waiting(spec, 0, 2, 1);
-    let settings = settings(EDF, 2);
-    let mut task_set = commit(&[spec], settings.policy, settings.cores);
-    let free = bounds(&answer(&task_set, &settings))[0];
-    sched_dag::analysis::fix_orders(&mut task_set, &settings);
-    let fixed = bounds(&answer(&task_set, &settings))[0];
-    assert_eq!((free, fixed), (Some(10), Some(7)));
 }
 
 #[test]

@@ -6,14 +6,12 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use random::Random;
-use sched_dag::analysis::{
-    AnalysisResult, AnalysisSettings, DagBound, NotProvenReason, answer, witness,
-};
-use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, SubtaskId, TaskSet};
+use sched_dag::analysis::{AnalysisResult, AnalysisSettings, DagBound, answer, witness};
+use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, TaskSet};
 
+use super::forged;
 use super::random::{Sample, mask, sample_with};
-use super::simulate::{commit, spec};
-use super::{forged, settings};
+use super::simulate::spec;
 use crate::support::number;
 
 pub(crate) fn output(files: &[String]) -> Output {
@@ -31,13 +29,13 @@ pub(crate) fn accepted(files: &[String]) -> String {
     said
 }
 
-/// Draws a set; of each four in turn one with waits, one with lent cores, and one with pins.
+/// Draws a set; of each four in turn one with waits, one with lent cores, and one with tables.
 fn drawn(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
     let turn = number / 4 % 4;
     let wanted = mask(&[
         ("waits", turn == 1),
         ("lent", turn == 2),
-        ("pins", turn == 3),
+        ("tables", turn == 3),
     ]);
     let sample = match number {
         0 => full_core(),
@@ -51,7 +49,7 @@ fn drawn(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
         settings.overheads.device_ns = number % 3 + 1;
         settings.overheads.device_distance_ns = 20 + number % 7;
     }
-    Some((sample.task_set()?, settings))
+    Some((sample.charged(&settings)?, settings))
 }
 
 #[test]
@@ -85,7 +83,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
         "{refused}, {same}"
     );
     assert!(sound > 100, "no statement was altered: {sound}");
-    for form in ["demand", "lent", "owner", "sequence", "reserved", "blocked"] {
+    for form in ["demand", "lent", "table", "sequence", "reserved", "blocked"] {
         assert!(seen[form] > 3, "{form} is rare");
     }
     fs::remove_dir_all(&folder).unwrap();
@@ -142,35 +140,6 @@ fn a_witness_that_lacks_a_cluster_is_refused() {
         assert!(!is_accepted(parts), "{parts:?}");
     }
     fs::remove_file(&path).unwrap();
-}
-
-/// A pinned subtask goes first, whatever its deadline, so demand by deadlines says nothing.
-#[test]
-fn demand_proves_no_deadline_of_a_sink_where_subtasks_are_pinned() {
-    let mut specs = [spec(20, 20, &[5], &[], 0), spec(20, 20, &[1, 1], &[], 0)];
-    specs[1].subtasks[0].relative_deadline_ns = Some(2);
-    let settings = settings((Policy::Edf, Preemption::Enabled), 1);
-    let free = witness(&commit(&specs, Policy::Edf, 1), &settings);
-    specs[0].subtasks[0].core = Some(0);
-    let task_set = commit(&specs, Policy::Edf, 1);
-    let answer = answer(&task_set, &settings);
-    let sink = SubtaskId(0);
-    let reasons = [None, Some(NotProvenReason::NoSinkBound { sink })];
-    assert_eq!(answer.reasons, reasons);
-    // Nor does the checker believe it: the demand of the same DAGs without the pin.
-    let demand = free.lines().find(|line| line.starts_with("demand "));
-    let demand = format!("\n{}\nbound ", demand.expect("it proves the deadlines"));
-    let pinned = witness(&task_set, &settings);
-    let forged = forged::hashed(&pinned.replacen("\nbound ", &demand, 1));
-    let file = std::env::temp_dir().join(format!("pinned-{}", std::process::id()));
-    fs::write(&file, forged).unwrap();
-    let said = output(&[file.to_string_lossy().into_owned()]);
-    let said = String::from_utf8(said.stdout).unwrap();
-    assert!(
-        said.ends_with("refused: dag 0: `due` does not cover pins\n"),
-        "{said}"
-    );
-    fs::remove_file(&file).unwrap();
 }
 
 /// Its command line is one of the family: help, and 2 for what is refused.
@@ -256,48 +225,10 @@ fn full_core() -> Sample {
         cores: 1,
         clusters: CoreDivision::Undivided,
         is_lent: false,
+        lists: Vec::new(),
         dispatch_ns: 0,
     }
 }
-
-/// `low` waits for `high`, which is pinned in part: it may be pending and leave core 0 to `low`, so that
-/// two of its jobs come close together. `low` takes 28, and without what was left before, 20.
-const PINNED_IN_PART: &str = "\
-machine 2 static 0
-dag 0 100 100 1 1 0 owner
-subtask 10 0 0
-pin 0 1
-dag 1 20 20 1 2 1 high
-subtask 1 1 0
-subtask 9 1 0
-edge 0 1
-pin 0 1
-affinity 0
-dag 2 100 100 1 1 0 low
-subtask 10 2 0
-affinity 0
-hash 0
-graph 0 10 10
-levels 10
-cover 0
-part 0
-graph 1 10 10
-levels 10 9
-cover 0 1
-part 0 1
-graph 2 10 10
-levels 10
-cover 0
-part 0
-bound 0 30 paths 1 1 0 0 20
-chain 0
-other 1 20 1 20
-bound 1 20 paths 1 1 0 0 10
-chain 0 1
-other 0 30 1 10
-bound 2 20 sequence 0
-seal 0
-";
 
 /// `low` waits for `high`, which is not of its group, but of its core.
 const GROUPS_OVERLAP: &str = "\
@@ -337,11 +268,10 @@ seal 0
 ";
 
 #[test]
-fn what_is_forged_next_to_pinned_subtasks_or_too_large_is_refused() {
+fn what_is_forged_of_groups_or_too_large_is_refused() {
     let many_cores = GROUPS_OVERLAP.replace("machine 2", "machine 1000000000000");
     let other_digits = MANY_JOBS.replace("machine 1", "machine \u{661}");
     let forged = [
-        (PINNED_IN_PART, "dag 2: pinned in part"),
         (GROUPS_OVERLAP, "groups overlap"),
         (MANY_JOBS, "dag 0: its other jobs"),
         (&many_cores, "impossible numbers of the machine"),

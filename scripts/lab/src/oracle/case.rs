@@ -208,7 +208,7 @@ pub(super) fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Cas
     };
     let mut set = Set {
         name: name.to_owned(),
-        dags: Vec::new(),
+        ..Set::default()
     };
     for number in 0..header.at_least_one(count)? {
         let mut dag = parse_dag(number, lines, &clusters)?;

@@ -109,7 +109,7 @@ impl Seen {
             // It has a WCET or a path beyond the deadline.
             return Vec::new();
         };
-        let mut task_set = verified.task_set;
+        let task_set = verified.task_set;
         let settings = costs.charged(options);
         let answer = answer(&task_set, &settings);
         if answer.bounds.iter().all(Option::is_none) {

@@ -60,7 +60,10 @@ fn affinities_overlap() -> fass::commit::CommitError {
 
 fn core_list() -> fass::commit::CommitError {
     let _machine = virtual_time::VirtualTime::new();
-    let (dags, paper) = ([sound("lidar", "points")], fass::commit::ConstructionPolicy::paper());
+    let (dags, paper) = (
+        [sound("lidar", "points")],
+        fass::commit::ConstructionPolicy::paper(),
+    );
     let refused = fass::commit::finish_create_dags_in_order(&dags, paper, &["core 0: lidar.read"]);
     refused.expect_err("a subtask is in no list")
 }
