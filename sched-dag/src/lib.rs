@@ -44,9 +44,9 @@
 //!   idles while an instance is ready. At one instant all completions come
 //!   first, then all releases, then one dispatch.
 //!
-//! A subtask may be *pinned* to a core of its cluster. On that core the pinned instance with the
-//! smallest key runs before all others, and these share the other cores as R5 says. The rules P1 to P4
-//! stand in `scheduler/pins.rs`, their scenarios in `tests/scenarios/pins.txt`.
+//! A core may have a list of a *table*: an order of subtasks over a common period of their DAGs, which
+//! the core keeps to. All other instances share what is left, as R5 says. The rules T1 to T4 stand in
+//! `table.rs`, their scenarios in `tests/scenarios/tables.txt`.
 //!
 //! A subtask may *wait*, between *segments* of its function: then its instance holds no core, and is
 //! not eligible until an answer or the wait's limit comes. The rules W1 to W7 stand in
@@ -138,7 +138,7 @@ pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
 pub use policies::{Policy, SchedulerOptions};
 pub use policy::{
-    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Preemption, Priority, SubtaskOrder,
+    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Preemption, Priority,
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,

@@ -102,18 +102,6 @@ impl FaultLimit {
     }
 }
 
-/// Whether the commit may fix an order in which a DAG's subtasks use the cores.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum SubtaskOrder {
-    /// It may not: the policy decides at every instant.
-    #[default]
-    Free,
-    /// It may: [`fix_orders`](crate::analysis::fix_orders) adds precedence edges, those of a
-    /// schedule of the WCETs on the DAG's cores, if these prove a shorter response time and none
-    /// of another DAG a longer one. All subtasks need a WCET, and no sink a deadline of its own.
-    Fixed,
-}
-
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum JobOutcome {

@@ -9,7 +9,7 @@ use core::any::TypeId;
 use core::ops::RangeInclusive;
 
 use crate::ids::ClusterId;
-use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
+use crate::policy::{Activation, OnFault, OverrunPolicy, Priority};
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
@@ -32,8 +32,6 @@ pub struct DagSpec {
     pub overrun: OverrunPolicy,
     /// The cost of a fault of an instance.
     pub on_fault: OnFault,
-    /// Whether the commit may fix an order of the subtasks.
-    pub order: SubtaskOrder,
     /// The cluster whose cores run it; `None` where they are not divided.
     pub cluster: Option<ClusterId>,
     /// The cores of its cluster that execute it, counted from 0; empty: all. DAGs of a cluster

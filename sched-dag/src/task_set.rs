@@ -23,7 +23,7 @@ use core::ops::Range;
 use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
-use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
+use crate::policy::{Activation, OnFault, OverrunPolicy, Priority};
 use crate::spec::{LockUse, Wait};
 use crate::table::Table;
 use crate::topic::Topic;
@@ -57,7 +57,6 @@ pub struct Dag {
     pub(crate) cluster: Option<ClusterId>,
     pub(crate) affinity: Box<[u32]>,
     pub(crate) why_there: Option<AssignmentReason>,
-    pub(crate) order: SubtaskOrder,
     pub(crate) first_job: u64,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
@@ -88,18 +87,11 @@ pub struct Subtask {
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) stack_bytes: Option<u64>,
-    pub(crate) core: Option<u32>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
     pub(crate) relative_deadline_ns: u64,
     /// The longest that an instance waits to enter all its sections.
     pub(crate) lock_wait_ns: u64,
-}
-
-/// The graph of a DAG, and the core of each subtask.
-pub(crate) struct FixedOrder {
-    graph: Graph,
-    cores: Vec<Option<u32>>,
 }
 
 impl TaskSet {
@@ -110,31 +102,6 @@ impl TaskSet {
         dag.overrun = OverrunPolicy::Queue;
         dag.first_job = jobs.start;
         dag.jobs = Some(dag.jobs.map_or(jobs.end, |stated| stated.min(jobs.end)));
-    }
-
-    /// Returns the order of a DAG with more edges, which close no cycle, its subtasks pinned to
-    /// these cores of its cluster; none: as they are.
-    pub(crate) fn ordered(&self, dag: DagId, edges: &[(u32, u32)], cores: &[u32]) -> FixedOrder {
-        let stated = self.dag(dag);
-        let edges = [&stated.graph.successors.edges(), edges].concat();
-        let pinned = cores.iter().copied().map(Some);
-        let cores = match cores {
-            [] => stated.subtasks.iter().map(Subtask::core).collect(),
-            _ => pinned.collect(),
-        };
-        FixedOrder {
-            graph: Graph::new(stated.subtasks.len(), &edges),
-            cores,
-        }
-    }
-
-    /// Exchanges the order of a DAG of which no sink has a deadline of its own.
-    pub(crate) fn exchange(&mut self, dag: DagId, order: &mut FixedOrder) {
-        let dag = &mut self.dags[dag.index()];
-        core::mem::swap(&mut dag.graph, &mut order.graph);
-        for (subtask, core) in dag.subtasks.iter_mut().zip(&mut order.cores) {
-            core::mem::swap(&mut subtask.core, core);
-        }
     }
 
     /// Counts the subtasks of verified DAGs.
@@ -329,14 +296,9 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
-    /// Reports whether subtasks are pinned to cores.
-    pub(crate) fn is_pinned(&self) -> bool {
-        self.subtasks.iter().any(|subtask| subtask.core().is_some())
-    }
-
-    /// Reports whether there are subtasks that not every core of the cluster may execute.
+    /// Reports whether not every core of the cluster may execute it.
     pub(crate) fn is_confined(&self) -> bool {
-        self.is_pinned() || !self.affinity().is_empty()
+        !self.affinity().is_empty()
     }
 
     /// Returns the subtasks without predecessor, ascending, never empty.
@@ -461,11 +423,6 @@ impl Subtask {
         let wcet_ns = self.wcet_ns.filter(|_| wcets > 0);
         let limit_ns = wcet_ns.map(|wcet_ns| wcet_ns.saturating_mul(wcets));
         self.budget_ns.or(limit_ns).unwrap_or(u64::MAX)
-    }
-
-    /// Returns the core of its cluster that alone executes it, counted from 0; `None`: any.
-    pub const fn core(&self) -> Option<u32> {
-        self.core
     }
 
     /// Returns the static priority, given or derived from the graph.
@@ -607,8 +564,7 @@ impl Dag {
         self.why_there
     }
 
-    /// Returns the cores of its cluster that execute those of its subtasks that are not pinned,
-    /// ascending, counted from 0; empty: all.
+    /// Returns the cores of its cluster that execute it, ascending, counted from 0; empty: all.
     pub const fn affinity(&self) -> &[u32] {
         &self.affinity
     }

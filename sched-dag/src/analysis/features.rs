@@ -176,7 +176,6 @@ impl Features {
             // Cores are told apart for all DAGs of a case: see `of_machine`.
             affinity: _,
             // An order and a shared state are edges.
-            order: _,
             state_precedences: _,
             graph: _,
             topics: _,
@@ -201,7 +200,6 @@ impl Features {
             budget_ns: _,
             stack_bytes: _,
             // What these come to depends on the settings and on the other DAGs: see `of_order`.
-            core: _,
             priority: _,
             non_preemptive: _,
             relative_deadline_ns: _,

@@ -142,7 +142,6 @@ fn build_dag(
             },
             budget_ns: subtask.budget_ns,
             stack_bytes: subtask.stack_bytes,
-            core: subtask.core,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
                 None => subtask.priority.expect("given to all subtasks of the DAG"),
@@ -173,7 +172,6 @@ fn build_dag(
         on_fault: spec.on_fault,
         cluster: spec.cluster,
         affinity: affinity(options, spec).into(),
-        order: spec.order,
         why_there: None,
         first_job: 0,
         jobs: spec.jobs,

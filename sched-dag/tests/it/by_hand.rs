@@ -8,7 +8,9 @@
 use std::panic::catch_unwind;
 
 use sched_dag::virtual_time::{ExecutionTimes, RunOutcome};
-use sched_dag::{DagSpec, OverrunPolicy, Policy};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, DagSpec, OverrunPolicy, Policy, Scheduler, verify,
+};
 
 use crate::support::hand::Hand;
 use crate::support::{
@@ -209,28 +211,29 @@ fn an_end_of_what_does_not_run_is_refused() {
     }
 }
 
-/// A chain of which subtasks are pinned to these cores, next to a less urgent DAG of four subtasks.
-fn pinned_chain(pins: [u32; 2], in_flight: u32) -> Hand {
-    let chain = dag(100, 100, 1, &[0, 0], &[(0, 1)]).with(|spec| {
-        spec.in_flight = Some(in_flight);
-        let subtasks = spec.subtasks.iter_mut().zip(pins);
-        subtasks.for_each(|(subtask, core)| subtask.core = Some(core));
-    });
+/// A chain with these lists, next to a less urgent DAG of four subtasks.
+fn listed_chain(lists: &[&str], in_flight: u32) -> Hand {
+    let chain = dag(100, 100, 1, &[0, 0], &[(0, 1)]).with(|spec| spec.in_flight = Some(in_flight));
     let others = dag(100, 100, 1, &[5, 6, 7, 8], &[]);
-    let mut hand = Hand::new(&[chain, others], TWO_CORES);
+    let options = CommitOptions::new(TWO_CORES.policy, TWO_CORES.cores).with_lists(lists);
+    let options = options.with_construction(ConstructionPolicy::any_graph());
+    let task_set = verify(&[chain, others], &options)
+        .expect("nothing is wrong")
+        .task_set;
+    let mut hand = Hand::of(Scheduler::new(task_set.into(), TWO_CORES));
     hand.must("0: released 0.0, released 1.0, start 0.0.0 on 0, start 1.0.0 on 1");
     hand
 }
 
 #[test]
-fn a_chain_that_is_pinned_to_one_core_is_handed_on_past_the_line() {
+fn a_chain_on_one_list_is_handed_on_past_the_line() {
     // With one slot, and with several.
     for in_flight in [1, 2] {
-        pinned_chain([0, 0], in_flight).must(
+        listed_chain(&["core 0: 0.0 0.1"], in_flight).must(
             "4 hand 0.0.0: start 0.0.1 on 0, done=on 0
              9 hand 0.0.1: completed 0.0 Met, start 1.0.1 on 0, done=on 0",
         );
-        pinned_chain([0, 1], in_flight).must(
+        listed_chain(&["core 0: 0.0", "core 1: 0.1"], in_flight).must(
             "4 hand 0.0.0: done=Some(Open)
              4: suspend 1.0.0 on 1, start 0.0.1 on 1, resume 1.0.0 on 0",
         );

@@ -39,7 +39,10 @@ pub(crate) struct Hand {
 
 impl Hand {
     pub(crate) fn new(specs: &[DagSpec], options: SchedulerOptions) -> Self {
-        let mut scheduler = scheduler(specs, options);
+        Self::of(scheduler(specs, options))
+    }
+
+    pub(crate) fn of(mut scheduler: Scheduler) -> Self {
         scheduler.log.journal = Journal::growing();
         Self {
             scheduler,

@@ -12,7 +12,7 @@
 //! - a device interrupts a core as soon as it may again, when a release is due, or after a step;
 //!   meanwhile an instance there stands still, and releases wait; now and then all cores do;
 //! - a resumed instance keeps its core for an interrupt more, which is charged to the one that
-//!   preempted it, or to all that a pinned one may move.
+//!   preempted it, or to all that an entry may move.
 //!
 //! Observed is the response time of each job, from its nominal release.
 
@@ -28,7 +28,7 @@ use sched_dag::analysis::{AnalysisSettings, Overheads, answer};
 use sched_dag::journal::EventKind;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, DriverNotice, Instance, Policy,
-    Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskOrder, SubtaskSpec, verify,
+    Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskSpec, verify,
 };
 
 use tool::options::{Command, Takes as Value, options};
@@ -42,7 +42,7 @@ static TABLE: Command = Command {
     options: OPTIONS,
     notes: "\
 A set has up to 4 DAGs of up to 8 subtasks on up to 5 cores, or more side by side; in some sets
-subtasks are pinned, or cores in groups. Each runs twice for 12 of its longest periods: with WCETs and
+cores are in groups. Each runs twice for 12 of its longest periods: with WCETs and
 all that is charged, and with drawn parts of both: late interrupts, decisions, switches, resumptions.
 
 Exit code: 0 no response was above its bound; 1 one was, which is printed with its seed; 2 the
@@ -173,12 +173,12 @@ impl Seen {
     }
 }
 
-/// Draws a set, a platform of up to 5 cores, and its overheads. Some subtasks keep their cores or are
-/// pinned; an overhead is up to a fifth of the least WCET.
+/// Draws a set, a platform of up to 5 cores, and its overheads. Some subtasks keep their cores, or
+/// DAGs are in groups; an overhead is up to a fifth of the least WCET.
 fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
     let cores = random.within(1..=5);
     let mut specs = set(random, 1_000, &[cores]);
-    let (mixed, pinned) = (random.once_in(6), random.once_in(2));
+    let (mixed, grouped) = (random.once_in(6), random.once_in(2));
     let first = random.within(1..=2 * cores).min(cores);
     for spec in &mut specs {
         spec.overrun = random.one_of(&[Queue, Skip, Abort]);
@@ -194,23 +194,15 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
             spec.period_ns = Some(period_ns);
             spec.relative_deadline_ns = Some(period_ns);
         }
-        let room = if pinned { random.within(1..=4) } else { 1 };
+        let room = if grouped { random.within(1..=4) } else { 1 };
         let is_slow = random.once_in(3);
         stretch(spec, if is_slow { random.within(5..=40) } else { 1 }, room);
-        let percent = random.one_of(&[0, 0, 50, 100]);
-        for subtask in spec.subtasks.iter_mut().filter(|_| pinned) {
-            let core = random.within(0..=cores - 1);
-            subtask.core = random.chance(percent).then_some(core);
-        }
-        if pinned && first < cores {
+        if grouped && first < cores {
             let (from, to) = random.one_of(&[(0, first), (first, cores)]);
             spec.affinity = (from..to).collect();
         }
         for subtask in &mut spec.subtasks {
             subtask.non_preemptive = mixed && random.once_in(2);
-        }
-        if random.once_in(4) {
-            spec.order = SubtaskOrder::Fixed;
         }
     }
     let options = SchedulerOptions {
