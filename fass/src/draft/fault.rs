@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use core::fmt::{self, Display};
 use core::time::Duration;
 
-use sched_dag::analysis::{NotProvenReason, TaskError};
+use sched_dag::analysis::{NotProvenReason, TableFault, TaskError};
 use sched_dag::wcets::WcetFault;
 use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet, Warning, worded};
 
@@ -169,7 +169,8 @@ impl UnprovenDag {
                 lacking.map(|(id, _)| id).collect()
             }
             NotProvenReason::SubtaskBeyondPeriod { subtask }
-            | NotProvenReason::Pinned { subtask }
+            | NotProvenReason::NotRight(TableFault { subtask, .. })
+            | NotProvenReason::LateInTable { subtask, .. }
             | NotProvenReason::UnboundedLock { subtask, .. } => vec![subtask],
             NotProvenReason::PathBeyondDeadline { sink, .. }
             | NotProvenReason::NoSinkBound { sink } => vec![sink],
@@ -177,9 +178,9 @@ impl UnprovenDag {
         };
         let labels = subtasks.into_iter();
         let other = match reason {
-            NotProvenReason::DelayedBy { dag } | NotProvenReason::UnboundedLock { dag, .. } => {
-                Some(dag)
-            }
+            NotProvenReason::DelayedBy { dag }
+            | NotProvenReason::NotRight(TableFault { dag, .. })
+            | NotProvenReason::UnboundedLock { dag, .. } => Some(dag),
             _ => None,
         };
         let of = other.unwrap_or(dag);
@@ -218,11 +219,17 @@ impl fmt::Display for UnprovenDag {
                  shares its cores waiting there; state one by `Lock::longest`",
                 self.lock
             ),
-            (NotProvenReason::Pinned { .. }, [subtask, ..], _) => write!(
+            (NotProvenReason::NotRight(fault), [subtask, ..], Some(dag)) => write!(
                 f,
-                "{subtask} is pinned, and no test bounds the response time of its DAG as on one \
-                 core; pin all its subtasks, to cores that no other DAG is pinned to, with an edge \
-                 from each to the next one on its core, or leave the cores out"
+                "its table is not right: {subtask} of {dag}, in job {} of the first lap, {}; change \
+                 the lists, or state them without times",
+                fault.job, fault.condition
+            ),
+            (NotProvenReason::LateInTable { bound_ns, .. }, [subtask, ..], _) => write!(
+                f,
+                "in its table {subtask} ends up to {:?} after the release, which is too late; start it \
+                 earlier in its list, or relax the deadline",
+                Duration::from_nanos(*bound_ns)
             ),
             (NotProvenReason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
                 f,

@@ -26,12 +26,12 @@
 //! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `list_schedule` | orders of a DAG on some cores | Graham 1969 |
-//! | `lending`, `lent_cores` | heavy DAGs that lend what their orders leave | derived here |
-//! | `table_check` | whether a table keeps its times | derived here |
+//! | `lending`, `lent_cores` | tables of DAGs, and what these leave to others | derived here |
+//! | `table_making`, `table_check` | tables of several DAGs; whether a table keeps its times | derived here |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
-//! uses that releases lie on a grid: their papers' model is the sporadic one, and
+//! but that of tables uses that releases lie on a grid: their papers' model is the sporadic one, and
 //! the equations count the jobs that fit into a window at that distance. That a
 //! deadline is *certain* to be missed is not said of sporadic DAGs, except by a path that
 //! is longer than the deadline, since their signals may stay away.
@@ -64,7 +64,7 @@
 //! - The cores must be identical and serve these DAGs only. Where they are divided, each
 //!   cluster is analysed by itself.
 //! - The form of overlapping jobs rests on the argument given in its module and on that
-//!   evidence, not on a reviewed proof. The multi-path bound, waits and lent cores are proven in
+//!   evidence, not on a reviewed proof. The multi-path bound, waits and tables are proven in
 //!   `docs/bounds.md`.
 
 mod assign;

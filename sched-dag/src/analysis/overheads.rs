@@ -10,8 +10,8 @@
 //!   preempts is charged. The switches back to the preempted instance are the
 //!   preempting one's second switch.
 //!
-//! A pinned instance may [move](Overheads::of_a_move_ns) another one to an idle core, which goes on
-//! there at once. That is no charge of an instance, but a term of the bounds in `set`.
+//! An entry of a table may [move](Overheads::of_a_move_ns) a member to an idle core, which goes on
+//! there at once. That is no charge of an instance, but a term of the bounds in `lent_cores`.
 //!
 //! These are of a step in which few instances become ready. For each one that does, `ready` is
 //! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
@@ -150,8 +150,8 @@ impl Overheads {
         })
     }
 
-    /// Returns how long it takes to go on with an instance on another core of its group, since a
-    /// pinned one takes its core.
+    /// Returns how long it takes to go on with an instance on another core of its group, since an
+    /// entry of a table takes its core.
     pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
         match preemption {
             Preemption::Enabled => self.sum_ns(2).unwrap_or(u64::MAX),

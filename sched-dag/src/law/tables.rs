@@ -179,22 +179,18 @@ impl<'m> TableReplay<'m> {
                 position.begun.insert(place);
                 self.innermost_but(event, place)
             }
-            EventKind::Finish | EventKind::Ended => {
+            EventKind::Finish | EventKind::Ended | EventKind::Cancelled => {
                 position.begun.remove(&place);
+                position.unstarted.remove(&place);
                 None
             }
             _ => None,
         }
     }
 
-    /// Nothing of a DAG starts any more, and a driver may take away what has.
+    /// Nothing of a DAG starts any more.
     pub(super) fn end_dag(&mut self, dag: DagId) {
         self.ended.insert(dag);
-        for (core, position) in &mut self.cores {
-            let instance = |place| self.lists.entry(*core, place).0;
-            let begun = &mut position.begun;
-            begun.retain(|(_, place)| instance(*place).is_none_or(|of| of.dag != dag));
-        }
     }
 
     /// An entry starts on its core.

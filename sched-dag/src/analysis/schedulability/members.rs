@@ -44,7 +44,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let mut bounds = alloc::vec![None; case.members.len()];
     let mut steps = STEP_LIMIT;
     let members = case.order.iter().copied();
-    for dag in members.filter(|&dag| case.table_of(dag).is_none()) {
+    for dag in members.filter(|&dag| case.table_of(dag).is_none() && TEST.is_for(case, dag)) {
         let terms = match MemberTerms::of(case, dag, &supplies, &bounds) {
             Ok(terms) => terms,
             Err(reason) => {

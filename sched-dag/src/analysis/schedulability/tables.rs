@@ -6,8 +6,8 @@
 //!
 //! A table of one DAG begins a lap with each job. Where no entry belongs to another lap's job, the
 //! DAG may be sporadic. Then long steps and a device's interrupts (bursts, in `workload`) are covered,
-//! too, as long as the job ends within its period: each entry is late by so much. In a table of several
-//! DAGs a lateness would be handed on from lap to lap, so these have no bound there.
+//! too, as long as the job ends by its deadline and the next release: each entry is late by so much.
+//! In a table of several DAGs lateness would be handed on from lap to lap, so these have no bound then.
 //!
 //! Assumes subtasks that do not wait, and members on the table's cores that can be preempted. As many
 //! jobs may be in flight as the bounds take.
@@ -120,7 +120,9 @@ pub(super) fn finishes_ns(case: &AnalysisInput<'_>, table: &CaseTable<'_>) -> Ta
             *finish_ns = after_ns.ok_or((None, NotProvenReason::Limit))?;
         }
         let (bound_ns, subtask) = latest(&finishes_ns[0]);
-        if has_bursts && bound_ns > case.tasks[dag].period_ns() {
+        let task = case.tasks[dag];
+        let limit_ns = task.period_ns().min(task.relative_deadline_ns());
+        if has_bursts && bound_ns > limit_ns {
             return Err((None, NotProvenReason::LateInTable { subtask, bound_ns }));
         }
     } else if has_bursts || case.has_locks() {
