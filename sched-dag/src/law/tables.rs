@@ -134,16 +134,13 @@ impl<'m> TableReplay<'m> {
     ) -> Option<Instance> {
         let position = self.cores.get(&core)?;
         let innermost = position.begun.last();
-        let mut ahead = (position.next?..).take(self.lists.lists[&core].len());
-        let next = ahead.find_map(|place| {
-            let (instance, depth) = self.lists.entry(core, place);
-            Some((instance.filter(|of| !self.is_void(*of))?, depth))
-        });
-        let starts = next.filter(|(instance, depth)| {
-            innermost.is_none_or(|(inner, _)| inner < depth) && is_ready(*instance)
-        });
-        match (starts, innermost) {
-            (Some((instance, _)), _) => Some(instance),
+        let ahead = (position.next?..).take(self.lists.lists[&core].len());
+        let ahead = ahead.map(|place| self.lists.entry(core, place));
+        // A void entry is passed where it might start.
+        let mut open = ahead.take_while(|(_, depth)| innermost.is_none_or(|(it, _)| it < depth));
+        let starts = open.find_map(|(of, _)| of.filter(|of| !self.is_void(*of)));
+        match (starts.filter(|of| is_ready(*of)), innermost) {
+            (Some(instance), _) => Some(instance),
             (None, inner) => self.lists.entry(core, inner?.1).0,
         }
     }
