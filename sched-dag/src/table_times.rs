@@ -1,4 +1,4 @@
-//! The times of a table: those of a run of its lists in which each entry takes its WCET.
+//! The times of a table: those of a run of its lists by WCETs.
 //!
 //! The lists run lap after lap until all entries start at the same times again. Whether an entry
 //! ever starts depends on the order alone, so lists without WCETs are tried as well.
@@ -15,7 +15,7 @@ use crate::task_set::TaskSet;
 const MOST_LAPS: u32 = 32;
 
 impl TaskSet {
-    /// Returns a table with the times that follow from such WCETs. All are 0 if a WCET is not
+    /// Returns a table with the times of a run by such WCETs. All are 0 if a WCET is not
     /// known, or if the entries do not keep to their laps.
     pub(crate) fn timed(
         &self,
@@ -45,7 +45,7 @@ impl TaskSet {
         timed
     }
 
-    /// Returns an entry that never starts, and its core: entries wait for each other.
+    /// Returns an entry without a start, and its core: entries wait for each other.
     pub(crate) fn blocked_entry(&self, table: &Table) -> Option<(u32, TableEntry)> {
         let mut run = TableRun::new(self, table);
         if run.settles() {
@@ -58,9 +58,14 @@ impl TaskSet {
         Some((*core, **of))
     }
 
-    /// Times the tables anew, by WCETs with what the analysis charges each instance.
+    /// Times tables anew, by WCETs with what the analysis charges each instance, unless their
+    /// times are not those of plain WCETs.
     pub fn charge_tables(&mut self, settings: &AnalysisSettings) {
+        let wcet_ns = |dag, subtask| self.dag(dag).subtask(subtask).locking_wcet_ns();
         let charged = |table: &Table| {
+            if self.timed(table, &wcet_ns) != *table {
+                return table.clone();
+            }
             let mut dags = self
                 .dags()
                 .iter()
@@ -75,14 +80,14 @@ impl TaskSet {
         self.set_tables(tables);
     }
 
-    /// Returns the job of a DAG that is released first in lap 0 of its table.
+    /// Returns the first job of a DAG to be released in lap 0 of its table.
     pub(crate) fn first_in_lap(&self, table: &Table, dag: DagId) -> i64 {
         let dag = self.dag(dag);
         first_in_lap(dag.offset_ns(), dag.period_ns(), table.dags().len() == 1)
     }
 }
 
-/// Returns the job that is released first in lap 0; the laps of a DAG alone begin with its jobs.
+/// Returns the first job to be released in lap 0; the laps of a DAG alone begin with its jobs.
 pub(crate) fn first_in_lap(offset_ns: u64, period_ns: u64, is_alone: bool) -> i64 {
     match is_alone {
         true => 0,
@@ -93,7 +98,7 @@ pub(crate) fn first_in_lap(offset_ns: u64, period_ns: u64, is_alone: bool) -> i6
     }
 }
 
-/// Returns the sum of the WCETs of an entry of a list, and of those nested in that one.
+/// Returns the sum of the WCETs of an entry of a list, and of all nested entries.
 fn length_ns(list: &[RunEntry<'_>], place: usize) -> u64 {
     let entry = &list[place];
     let after = list[place + 1..].iter().chain(&list[..place]);
@@ -103,13 +108,13 @@ fn length_ns(list: &[RunEntry<'_>], place: usize) -> u64 {
     })
 }
 
-/// The run of a table from the beginning of a lap before which there was none.
+/// The run of a table, from the beginning of lap 0.
 struct TableRun<'t> {
     task_set: &'t TaskSet,
     lap_ns: u64,
     now_ns: u64,
     dags: Vec<RunDag>,
-    /// The entries of all lists, one list after the other.
+    /// The entries of all lists, list after list.
     entries: Vec<RunEntry<'t>>,
     cores: Vec<RunCore>,
     /// By lap, how many entries have started as in the lap before.
@@ -134,19 +139,19 @@ struct RunEntry<'t> {
     /// The number of the job's release in lap 0.
     job: i64,
     wcet_ns: u64,
-    /// The number of laps in which the entry has finished, or was passed.
+    /// The number of laps with the entry finished, or passed.
     done: i64,
-    /// When it has started in the latest lap.
+    /// The start in the latest lap.
     start_ns: u64,
 }
 
 struct RunCore {
-    /// The first and the last of its entries, and the next one to start, in which lap.
+    /// The first entry, the end of the entries, and the next entry to start, with its lap.
     first: usize,
     end: usize,
     next: usize,
     lap: u32,
-    /// The entries that have begun and not finished, with the time that is left of each.
+    /// The begun and unfinished entries, with the time left of each.
     begun: Vec<(usize, u64)>,
 }
 
@@ -226,7 +231,7 @@ impl<'t> TableRun<'t> {
         }
     }
 
-    /// Ends the innermost entry of a core, if nothing is left of that.
+    /// Ends the innermost entry of a core, if no time is left.
     fn finish(&mut self, core: usize) -> bool {
         let finished = self.cores[core].begun.pop_if(|begun| begun.1 == 0);
         if let Some((entry, _)) = finished {
@@ -280,11 +285,17 @@ impl<'t> TableRun<'t> {
             let other = &self.entries[dag.entries[dag.place(subtask, job)]];
             other.done > i64::from(lap) + (job - other.job) / dag.jobs
         };
-        let before = self.task_set.dag(dag.id).predecessors(of.subtask);
-        before.iter().all(|&subtask| is_done(subtask, *job)) && is_done(of.subtask, job - 1)
+        let model = self.task_set.dag(dag.id);
+        let before = model.predecessors(of.subtask);
+        // A job is not released before the one that leaves it room.
+        let left = job - i64::from(model.in_flight());
+        let has_room = || model.sinks().iter().all(|&sink| is_done(sink, left));
+        before.iter().all(|&subtask| is_done(subtask, *job))
+            && is_done(of.subtask, job - 1)
+            && (!before.is_empty() || has_room())
     }
 
-    /// Lets time go on to the next finish or release, if there is one.
+    /// Lets time go on to the next finish or release, if any.
     fn elapse(&mut self) -> bool {
         let events_ns = self.cores.iter().flat_map(|core| {
             let left_ns = core.begun.last().map(|&(_, left_ns)| left_ns);

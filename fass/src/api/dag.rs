@@ -120,8 +120,8 @@ impl Dag {
         self
     }
 
-    /// Lets only these cores of its cluster, counted from 0, execute it; in any order, and none
-    /// means all, as without it.
+    /// Lets only these cores of its cluster, counted from 0, execute the DAG; in any order, and none
+    /// means all.
     ///
     /// DAGs of a cluster have the same affinity, or no core in common; anything else is a fault at
     /// commit, and so is a core that there is not. Cores that DAGs with an affinity leave idle execute

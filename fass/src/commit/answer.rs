@@ -339,7 +339,7 @@ pub struct DagAnswer {
     pub dag: DagLabel,
     /// Where it runs; `None` if the cores are not divided.
     pub cluster: Option<ClusterPlacement>,
-    /// Its table; `None` if no lists of cores have it.
+    /// Its table, if lists of cores have the DAG.
     pub table: Option<TablePlacement>,
     /// The verdict on the DAG.
     pub verdict: Verdict,
@@ -385,11 +385,11 @@ pub struct ClusterPlacement {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TablePlacement {
-    /// The numbers of the cores that have lists, ascending.
+    /// The numbers of the cores with lists, ascending.
     pub cores: Vec<u32>,
     /// How many DAGs are in the table.
     pub dags: usize,
-    /// Whether it is the first of these DAGs.
+    /// Whether the DAG is the first of these.
     pub is_first: bool,
 }
 
@@ -588,7 +588,11 @@ impl fmt::Display for DagAnswer {
         if let Some(placement) = &self.cluster {
             write!(f, "; it runs {placement}")?;
         }
-        if let Some(table) = &self.table {
+        // Of a table of its own the reason for its cores has told.
+        let is_told = self.cluster.as_ref().is_some_and(|of| of.why.is_some());
+        if let Some(table) = &self.table
+            && (table.dags > 1 || !is_told)
+        {
             write!(f, "; it is {table}")?;
         }
         // What is observed is never called proven.

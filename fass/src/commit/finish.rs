@@ -117,10 +117,10 @@ pub fn finish_create_dags_with(
     finish_create_dags_in_order(dags, construction, &[])
 }
 
-/// Works like [`finish_create_dags_with`], with the order in which cores execute subtasks: a list
-/// for each of some cores, which is kept in every lap of the DAGs' common period.
+/// Works like [`finish_create_dags_with`], with a list for each of some cores: the order of
+/// subtasks there, kept in every lap of the DAGs' common period.
 ///
-/// A word of a list is `DAG.SUBTASK`, or `DAG.SUBTASK#N` for job N of a lap; what stands in
+/// A word of a list is `DAG.SUBTASK`, or `DAG.SUBTASK#N` for job N of a lap; entries in
 /// parentheses may begin before the entry in front of them has ended. A DAG is in lists whole, and
 /// on the cores of its lists these go before everything else. `docs/dag-file.md` has the notation.
 ///
@@ -180,6 +180,7 @@ pub fn finish_create_dags_in_order(
         mut task_set,
         mut warnings,
     } = verify(&drafts, options, terms.wcets.as_deref())?;
+    task_set.charge_tables(&terms.settings());
     let is_stated = !lists.is_empty();
     if terms.assigns {
         let why = "lists of cores are stated, and the commit is to divide the cores; leave one out";
@@ -190,10 +191,6 @@ pub fn finish_create_dags_in_order(
         if let Err(error) = assigned {
             return Err(CommitError::of(Fault::NotAssigned(error), warnings));
         }
-    }
-    // Stated times are kept.
-    if is_stated && !lists.iter().any(|list| list.contains('@')) {
-        task_set.charge_tables(&terms.settings());
     }
     let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
     if demands_proof && !terms.assigns && !is_stated {

@@ -1,9 +1,9 @@
 //! The commit's own clusters: cores that heavy DAGs own and lend, or cores of its own for each DAG
 //! that needs several and single cores for the others.
 //!
-//! The cores are divided as [`lend`](super::lend()) does, if that proves all DAGs; where priorities
-//! are not static, if a table has all of them. Else this is federated scheduling (the papers are
-//! named below). A DAG is *heavy* if a job of it is more work than one core does by its deadline, or
+//! Under static priorities the cores are divided as [`lend`](super::lend()) does, if that proves all
+//! DAGs. Else this is federated scheduling (the papers are named below); under other policies
+//! that comes first, and a table for all DAGs where it proves less. A DAG is *heavy* if a job of it is more work than one core does by its deadline, or
 //! by the next release if that comes first, or if subtasks of it wait; it gets a cluster of as many
 //! cores as its multi-path bound needs, or of fewer with a table. The others are *light*: clusters
 //! of one core each take them, the densest first, each where the sum of densities is least (worst
@@ -55,8 +55,11 @@ pub struct NotAssigned {
     pub reason: AssignmentFailure,
     /// Why the [attempts](crate::LendingAttempt) to lend cores failed, and for which DAG, if there
     /// is a first one; `None` where those do not apply.
-    pub attempts: Option<Vec<(Option<DagId>, AttemptFailure)>>,
+    pub attempts: Option<FailedAttempts>,
 }
+
+/// Why attempts failed, and of which DAG.
+pub type FailedAttempts = Vec<(Option<DagId>, AttemptFailure)>;
 
 texts! {
     /// Why a DAG gets no cores.
@@ -116,12 +119,20 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);
     }
     let bursts = WorkloadBursts::of(task_set.dags().iter().map(|dag| (dag, false)), &all);
-    let attempts = match lend_cores(task_set, &bursts, &tasks, settings) {
+    let mut federated = task_set.clone();
+    let outcome = federate(&mut federated, &bursts, &tasks, settings);
+    // A table fixes what a policy by releases would decide, so that one goes last.
+    let is_proven = settings.policy.adds_release()
+        && outcome.is_ok()
+        && answer(&federated, settings).is_proven();
+    let lent = (!is_proven).then(|| lend_cores(task_set, &bursts, &tasks, settings));
+    let attempts = match lent.flatten() {
         None => None,
         Some(Ok(())) => return Ok(()),
         Some(Err(failed)) => Some(failed),
     };
-    let Err(refused) = federate(task_set, &bursts, &tasks, settings) else {
+    let Err(refused) = outcome else {
+        *task_set = federated;
         return Ok(());
     };
     // Lending has tried that, where it applies; it knows neither waits nor EDF.
@@ -159,7 +170,7 @@ fn lend_cores(
     bursts: &WorkloadBursts,
     tasks: &[Task],
     settings: &AnalysisSettings,
-) -> Option<Result<(), Vec<(Option<DagId>, AttemptFailure)>>> {
+) -> Option<Result<(), FailedAttempts>> {
     if settings.preemption == Preemption::Disabled {
         return None;
     }
@@ -177,7 +188,7 @@ fn lend_cores(
     let Some(plan) = plan else {
         let id = |dag| DagId(to_u32(dag));
         let failed = failed.into_iter().map(|(dag, why)| (dag.map(id), why));
-        return Some(Err(failed.collect()));
+        return (terms.has_members).then(|| Err(failed.collect()));
     };
     // Priorities that the app states may rank DAGs in another way than by deadline.
     take_if_proven(task_set, &plan, &tasks, settings).then_some(Ok(()))

@@ -93,14 +93,14 @@ impl<'a> CorePlaces<'a> {
         affinity.is_empty() || lists.any(|list| affinity.contains(&list.core))
     }
 
-    /// Reports whether a DAG in a table, or one that keeps its core, may delay another because of
-    /// the table; `None`: it is no matter of a table.
-    fn by_table(&self, other: usize, dag: usize, keep_cores: bool) -> Option<bool> {
+    /// Reports whether a DAG may delay another one, if it may in a group of both; what keeps its
+    /// core may delay a table as well.
+    fn delays(&self, other: usize, dag: usize, in_group: bool, keep_cores: bool) -> bool {
         match (self.table_of[other], self.table_of[dag]) {
-            (Some(one), Some(two)) => Some(one == two),
-            (Some(table), None) => Some(self.meets(dag, table)),
-            (None, Some(table)) => Some(keep_cores && self.meets(other, table)),
-            (None, None) => None,
+            (Some(one), Some(two)) => one == two,
+            (Some(table), None) => self.meets(dag, table),
+            (None, Some(table)) => keep_cores && self.meets(other, table),
+            (None, None) => in_group && self.share(other, dag),
         }
     }
 }
@@ -256,20 +256,13 @@ impl<'a> AnalysisInput<'a> {
         });
         // What a table leaves does not depend on more than that it is right.
         let in_table = |dag: usize| self.table_of(dag).is_some();
+        let keep_cores = relation.preemption != PreemptionMix::All;
         Features::spread(own.collect(), |other, dag| {
-            (in_table(dag) || !in_table(other)) && self.may_delay(other, dag)
+            let [one, two] = [other, dag].map(|dag| self.members[dag]);
+            let in_group = relation.may_delay(other, dag);
+            (in_table(dag) || !in_table(other))
+                && self.places.delays(one, two, in_group, keep_cores)
         })
-    }
-
-    /// Reports whether a DAG may have to wait for another one.
-    fn may_delay(&self, other: usize, dag: usize) -> bool {
-        let [one, two] = [other, dag].map(|dag| self.members[dag]);
-        let keep_cores = self.relation.preemption != PreemptionMix::All;
-        let by_table = self.places.by_table(one, two, keep_cores);
-        other != dag
-            && by_table.unwrap_or_else(|| {
-                self.places.share(one, two) && self.relation.may_delay(other, dag)
-            })
     }
 
     /// Reports whether an instance of `other` may go before one of `dag` on a core that counts for
@@ -393,9 +386,8 @@ fn analysable(
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
         known.retain(|&dag| {
-            let by_table = places.by_table(other, dag, keep_cores);
-            let is_delayed = by_table
-                .unwrap_or_else(|| places.share(other, dag) && relation.may_delay(other, dag));
+            let in_group = relation.may_delay(other, dag);
+            let is_delayed = places.delays(other, dag, in_group, keep_cores);
             if is_delayed {
                 reasons[dag] = Some(NotProvenReason::DelayedBy { dag: dag_id(other) });
                 unknown.push(dag);

@@ -103,7 +103,7 @@ use crate::policies::{Policy, SchedulerOptions};
 use crate::policy::Preemption;
 use crate::worded::texts;
 
-pub use assign::{AssignmentFailure, Federation, NotAssigned, assign, federated};
+pub use assign::{AssignmentFailure, FailedAttempts, Federation, NotAssigned, assign, federated};
 pub use cover::{covers, parallelism, width};
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};

@@ -30,7 +30,7 @@ const TRIES: u32 = 8;
 const CLOSINGS: u32 = 4;
 
 /// How much may be looked at to make the tables of a commit, in entries times cores: 2 s or less.
-const WORK_LIMIT: u64 = 1 << 27;
+const WORK_LIMIT: u64 = 1 << 25;
 
 /// The longest period and deadline in a family, so that sums of a lap's times fit into 63 bits.
 const LONGEST_NS: u64 = 1 << 46;
@@ -221,7 +221,8 @@ impl<'a> TableFamily<'a> {
                 assume(held_ns, finishes_ns.max().unwrap_or(0) - lap_ns);
             }
             for (place, (first, places)) in self.places.iter().enumerate() {
-                let last = first + (self.jobs(place) as usize - 1) * places.len();
+                let end = self.places.get(place + 1).map_or(self.count, |next| next.0);
+                let last = end - places.len();
                 for subtask in 0..places.len() {
                     let found_ns = lap.finishes_ns[last + subtask] - lap_ns;
                     assume(&mut after_ns[first + subtask], found_ns);
@@ -308,7 +309,8 @@ impl<'a> TableFamily<'a> {
     fn after(&self, entry: usize) -> impl Iterator<Item = usize> {
         let of = &self.entries[entry];
         let (first, places) = &self.places[of.dag];
-        let job = first + of.job as usize * places.len();
+        // The entries of a job follow one another.
+        let job = entry - (entry - first) % places.len();
         let successors = self.task(of.dag).successors(of.subtask);
         let next_job = of.job + 1 < self.jobs(of.dag);
         let next = next_job.then_some(entry + places.len());

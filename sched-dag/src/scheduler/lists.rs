@@ -215,13 +215,13 @@ impl ListState {
             let (before, entry) = (&stated[place.checked_sub(1)?], &stated[place]);
             let after = &stated[(place + 1) % stated.len()];
             let of = |entry: &TableEntry| (entry.dag, entry.job, entry.depth);
-            if of(before) != of(entry) {
-                return None;
-            }
-            let dag = task_set.dag(entry.dag);
-            let is_next = dag.successors(before.subtask) == [entry.subtask]
-                && dag.predecessors(entry.subtask) == [before.subtask];
-            (is_next && after.depth <= entry.depth).then_some(())
+            let (dag, [from, to]) = (task_set.dag(entry.dag), [before.subtask, entry.subtask]);
+            // Of one DAG, before it is asked for the neighbours.
+            let is_link = of(before) == of(entry)
+                && after.depth <= entry.depth
+                && dag.successors(from) == [to]
+                && dag.predecessors(to) == [from];
+            is_link.then_some(())
         };
         let entries = (0..).zip(stated).map(|(place, entry)| {
             let vertex = task_set.first_vertex(entry.dag) + entry.subtask.0;

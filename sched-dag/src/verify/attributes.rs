@@ -16,7 +16,7 @@ use crate::order::sorted;
 use crate::policy::{OnFault, Priority};
 use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
-/// Checks the attributes of the whole commit; `tables` says for each DAG in which table it is.
+/// Checks the attributes of the whole commit; `tables` has the table of each DAG.
 pub(super) fn check(
     options: &CommitOptions,
     tables: &[Option<usize>],

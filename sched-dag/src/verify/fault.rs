@@ -187,12 +187,12 @@ worded! {
         /// More waits of a subtask than are told apart.
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
             "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
-        /// A list of a core that cannot be enforced; `list` names the core.
+        /// A list of a core cannot be enforced; `list` names the core.
         CoreList { list: String, why: ListFault } = "core_list", "the list of {list}: {why}";
         /// A DAG with an affinity to a core which its cluster does not have.
         AffinityOutOfRange { dag: DagLabel, core: u32, cores: u32 } = "affinity_out_of_range",
             "{dag} has an affinity to core {core}, and {}", counted_from_0(*cores);
-        /// Two DAGs of a cluster that may share some of their cores, and not all of them.
+        /// Two DAGs of a cluster share some of their cores, and not all.
         AffinitiesOverlap { dag: DagLabel, other: DagLabel, core: u32 } = "affinities_overlap",
             "{other} and {dag} share core {core} and not all others (without an affinity a DAG has \
              every core); give both the same affinity, or no core in common";
@@ -309,10 +309,10 @@ worded! {
 }
 
 texts! {
-    /// Why a list of a core cannot be enforced. `word` is a subtask as lists name it.
+    /// Why a list of a core cannot be enforced. `word` is a subtask, as in lists.
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub enum ListFault {
-        /// It is no list.
+        /// The text is no list.
         Malformed { word: String } =
             "`{word}` has no place there; write `core 2: dag.a ( dag.b#1 ) dag.a#1`, with blanks \
              between words and parentheses";
@@ -325,10 +325,10 @@ texts! {
             "`{word}` may be several subtasks; name one by numbers, as 0.1, or rename one";
         /// Another list is of the same core.
         CoreTwice = "another one is of that core; join both";
-        /// The core is not one of the DAG's cluster.
+        /// The core is not in the DAG's cluster.
         OutOfRange { dag: DagLabel, first: u32, cores: u32 } =
             "{dag} has {cores} cores, from core {first} on; state one of these";
-        /// A DAG of the list has a subtask that waits.
+        /// A subtask of the list waits.
         Waits { word: String, dag: DagLabel } =
             "`{word}` waits, and a list does not go on meanwhile; leave {dag} out of the lists, and \
              state an affinity";
@@ -356,7 +356,7 @@ texts! {
         /// A subtask has no entry for a job.
         EntryMissing { dag: DagLabel, word: String, job: usize } =
             "`{word}#{job}` is in none; add it, or leave all of {dag} out of the lists";
-        /// Entries of one subtask are on several cores, without a number.
+        /// Entries of a subtask are on several cores, without a number.
         NotNumbered { word: String } =
             "`{word}` stands on several cores; number its jobs, as in `{word}#1`";
         /// Some entries have times, and others not.
@@ -365,7 +365,8 @@ texts! {
              to none";
         /// An entry would never start.
         Blocked { word: String } =
-            "`{word}` would wait for ever, for what comes after it; change the order";
+            "`{word}` would wait for ever, for what comes after it; change the order, or allow more \
+             jobs in flight";
     }
 }
 

@@ -1,13 +1,13 @@
-//! Lists of cores that are stated as text, and the tables that follow.
+//! Lists of cores, stated as text, and the tables of these.
 //!
-//! A list is one line: `core 0: sense.read control.steer ( log.write#1 ) sense.read#1`. The number is
-//! that of a core of the machine, as in answers and pictures; the cluster follows. Each other word
+//! A list is a line: `core 0: sense.read control.steer ( log.write#1 ) sense.read#1`. The number is
+//! a core's of the machine, as in answers and pictures; the cluster follows. Each other word
 //! is an *entry*: `DAG.SUBTASK`, by names or by numbers. `#N` says the job, counted from the first
 //! release of a lap on (`#-1`: of the lap before); without, the entries of a subtask are those of
 //! jobs 0, 1, .. in turn. Entries in parentheses are nested in the entry before these. `@START+LENGTH`
 //! says the times in nanoseconds; without, [timed](TaskSet::timed) finds them.
 //!
-//! Lists that have DAGs in common are one table. A DAG is in a table whole.
+//! Lists with DAGs in common are a table. A DAG is in a table whole.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -32,10 +32,10 @@ use crate::task_set::TaskSet;
 /// The most entries of a table.
 pub(super) const MOST_ENTRIES: u64 = 1 << 12;
 
-/// The longest lap, 9 years, of which some are run to find times.
+/// The longest lap, 9 years: some laps are run to find times.
 const LONGEST_LAP_NS: u64 = 1 << 58;
 
-/// The most laps by which an entry may come after its job's release.
+/// The most laps from a job's release to its entry.
 const MOST_LAPS_BACK: i64 = 8;
 
 /// A list as stated.
@@ -60,11 +60,11 @@ struct StatedEntry {
 /// The tables of a commit, and the DAGs in them.
 pub(super) struct StatedTables {
     pub(super) tables: Vec<Table>,
-    /// By DAG, the number of its table among those that were stated.
+    /// By DAG, the number of its table.
     pub(super) of_dags: Vec<Option<usize>>,
 }
 
-/// Reads the lists and makes tables of them, without times but those that are stated.
+/// Reads the lists and makes tables of them, with stated times only.
 #[inline(never)]
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) -> StatedTables {
     let specs = findings.specs;
@@ -213,7 +213,7 @@ fn read_entry(word: &str, depth: u32, specs: &[&DagSpec]) -> Result<StatedEntry,
     }
 }
 
-/// Returns a subtask as lists name it.
+/// Returns the word for a subtask.
 fn word(specs: &[&DagSpec], dag: usize, subtask: usize) -> String {
     let named = |name: &str, number: usize| match name {
         "" => number.to_string(),
@@ -223,7 +223,7 @@ fn word(specs: &[&DagSpec], dag: usize, subtask: usize) -> String {
     named(&spec.name, dag) + "." + &named(&spec.subtasks[subtask].name, subtask)
 }
 
-/// Makes the table of lists that have these DAGs; none if a period is missing, a fault of its own.
+/// Makes the table of the lists of these DAGs; none if a period is missing, a fault of its own.
 fn table(
     options: &CommitOptions,
     specs: &[&DagSpec],
@@ -298,7 +298,7 @@ fn lap_ns(specs: &[&DagSpec], dags: &[usize]) -> Result<Option<u64>, ListFault> 
     Ok(Some(lap_ns))
 }
 
-/// Returns the cores that a DAG's cluster has.
+/// Returns the cores of a DAG's cluster.
 fn cores_of(options: &CommitOptions, spec: &DagSpec) -> Range<u32> {
     let sizes = options.clusters.sizes();
     let (before, from_it_on) =
@@ -315,7 +315,8 @@ struct LapJobs<'s> {
     specs: &'s [&'s DagSpec],
     lap_ns: u64,
     is_alone: bool,
-    /// By DAG, and by subtask: how many entries there were on which core, and which jobs have one.
+    /// By DAG, and by subtask: the core of the latest entry, the number of entries, and for each
+    /// job whether there is an entry.
     of_dags: Vec<Vec<(u32, i64, Vec<bool>)>>,
 }
 
@@ -526,6 +527,15 @@ mod tests {
             let found = lists(&dags, &both).unwrap_err();
             found.split_once(": ").unwrap().1.to_string()
         };
+        let mut crowded = dags();
+        let list = ["core 0: sense.read sense.read sense.steer sense.steer log.write"];
+        assert!(lists(&crowded, &list).is_ok());
+        crowded[0].in_flight = Some(1);
+        let found = lists(&crowded, &list).unwrap_err();
+        assert!(
+            found.contains("`sense.read` would wait for ever"),
+            "{found}"
+        );
         let found = refused(|dags| dags[0].activation = Activation::Sporadic);
         assert!(
             found.starts_with("dag `sense` is sporadic, and other DAGs"),

@@ -243,7 +243,7 @@ pub struct CommitOptions {
     pub cores: u32,
     /// How these are divided.
     pub clusters: CoreDivision,
-    /// The lists of cores that are to be enforced, a text each, as `core 0: dag.a dag.b#1`;
+    /// The lists of cores, a text each, as `core 0: dag.a dag.b#1`;
     /// `docs/dag-file.md` has the notation.
     pub lists: Vec<String>,
     /// Which shapes of graph are wanted.

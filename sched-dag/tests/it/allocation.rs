@@ -1,11 +1,10 @@
-//! From the first release to the last completion nothing is allocated: in random sets with pins and
+//! From the first release to the last completion nothing is allocated: in random sets with tables and
 //! groups of cores, whose jobs overrun and fail.
 
 use crate::counting::allocated;
-use crate::support::driver;
 use crate::support::set::{self, Set};
 use random::Random;
-use sched_dag::virtual_time::{RunOutcome, Workload};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{DagId, Instance};
 
 /// Executes and fails as its set says.
@@ -27,9 +26,9 @@ fn nothing_is_allocated_from_first_release_to_last_completion() {
     for seed in 1..=2_000 {
         let mut random = Random::new(seed);
         let set = set::draw(&mut random, set::Overruns::Often);
-        let set = set::with_pins(set, &mut random);
+        let set = set::with_tables(set, &mut random);
         let none = allocated().0;
-        let mut run = driver(&set.specs(), set.options);
+        let mut run = VirtualTime::new(&set.commit(), set.options);
         let before = allocated().0;
         assert!(before > none, "the counter counts");
         assert_eq!(run.run(&mut Work(&set)), RunOutcome::Finished);

@@ -22,7 +22,7 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
         let mut random = Random::new(seed);
         let overruns = random.one_of(&[Overruns::Often, Overruns::Never]);
         let set = set::draw(&mut random, overruns);
-        let driver = driver(&set.specs(), set.options);
+        let driver = driver(&set.specs, set.options);
         let run = Script::new(|instance| set.execution_ns(instance)).run(driver);
         with(seed, &mut random, &set, &run);
     }

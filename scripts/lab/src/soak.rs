@@ -38,7 +38,7 @@ static SOAK: Command = Command {
     notes: "\
 A round draws 3 to 8 DAGs of 3 to 12 subtasks with random graphs and execution
 times, for a load of 60 to 140 percent, and runs them twice. Drawn are, too: the
-policy, what becomes of jobs that overrun, clusters, pins, deadlines of sinks,
+policy, what becomes of jobs that overrun, clusters, tables, deadlines of sinks,
 waits, signals, faults, pauses, modes, and whether instances hold their cores or
 compute. Checked are: values; rules R1 to R5, by the guest from its record and by
 the host from the trace; every job completed, skipped or aborted, as the overrun

@@ -87,7 +87,7 @@ fn a_divided_set_is_recorded_replayed_and_judged() {
             panic!("one commit")
         };
         let told = &committed.told;
-        assert_eq!((&told.clusters[..], told.pins.len()), (&[2, 1][..], 4));
+        assert_eq!((&told.clusters[..], told.lists.len()), (&[2, 1][..], 2));
         assert_eq!(told.affinities, [(1, 1)]);
         let bounds = told.dags.iter().map(|dag| dag.bound_ns);
         let expected = DAGS.map(|(_, _, ms)| Some(ms * 1_000_000));

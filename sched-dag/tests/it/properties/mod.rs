@@ -1,7 +1,7 @@
 //! The scheduler against its rules, on random sets of DAGs and in every order of events.
 //!
 //! The rules are judged by the law ([`sched_dag::law`]), which shares no code with the scheduler,
-//! and where that does not judge by `releases.rs` and `waits.rs`; which instances run, by `pins.rs`, too.
+//! and where that does not judge by `releases.rs` and `waits.rs`; which instances run, by `tables.rs`, too.
 //! `walk.rs` is the driver. That the
 //! law finds what is wrong is shown in `tests/it/journal.rs`.
 //!
@@ -9,8 +9,8 @@
 //! test -p sched-dag --test it properties`.
 
 mod explore;
-mod pins;
 mod releases;
+mod tables;
 mod waits;
 mod walk;
 

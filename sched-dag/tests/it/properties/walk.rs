@@ -23,11 +23,11 @@ use sched_dag::{
     CoreId, DagId, DagPhase, Decision, HandOff, Instance, JobOutcome, Journal, Scheduler, TurnEnd,
 };
 
-use super::pins::{Eligible, cores_of, keeps_its_core};
 use super::releases::{Releases, SAID};
+use super::tables::{Eligible, cores_of, keeps_its_core};
 use super::waits::Waits;
+use crate::support::pass_on;
 use crate::support::set::Set;
-use crate::support::{pass_on, scheduler};
 
 /// A step at an instant before its releases.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,7 @@ pub(crate) struct Walk<'s> {
 
 impl<'s> Walk<'s> {
     pub(crate) fn new(set: &'s Set) -> Self {
-        let mut scheduler = scheduler(&set.specs(), set.options);
+        let mut scheduler = Scheduler::new(set.commit(), set.options);
         scheduler.log.journal = Journal::growing();
         scheduler.hear(SAID.into_iter().chain([EventKind::Cancelled]));
         let cores = set.options.cores;
@@ -74,7 +74,7 @@ impl<'s> Walk<'s> {
             idle: (0..cores).rev().map(CoreId).collect(),
             releases: set.specs.iter().map(Releases::new).collect(),
             waits: Waits::default(),
-            eligible: Eligible::default(),
+            eligible: Eligible::new(set),
             is_late: false,
         }
     }

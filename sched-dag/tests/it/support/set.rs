@@ -1,19 +1,23 @@
 //! Random sets of DAGs: all that a run depends on comes from one seed.
 
+use std::sync::Arc;
+
 use random::Random;
 use sched_dag::lifecycle::WaitId;
 use sched_dag::{
-    Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
-    Priority, SchedulerOptions, SubtaskSpec, Wait,
+    Activation, ClusterId, CoreList, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy,
+    Policy, Preemption, Priority, SchedulerOptions, SubtaskId, SubtaskSpec, Table, TableEntry,
+    TaskSet, Wait,
 };
 
-use super::shuffled_edges;
+use super::{commit, shuffled_edges};
 
 /// One set with all that a run depends on.
 #[derive(Clone, Debug)]
 pub(crate) struct Set {
     pub(crate) options: SchedulerOptions,
     pub(crate) specs: Vec<DagSpec>,
+    pub(crate) table: Option<Table>,
     /// The seed of execution times, of faults, and of what a driver is free to choose.
     pub(crate) choices: u64,
 }
@@ -85,8 +89,8 @@ fn draw_in_phase(random: &mut Random) -> Set {
     set
 }
 
-/// Draws a set with sporadic DAGs, too, and every other one with waits, or pins, or both; some are
-/// of many DAGs in phase.
+/// Draws a set with sporadic DAGs, too, and every other one with waits, or a table or groups, or
+/// both; some are of many DAGs in phase.
 pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
     if random.chance(4) {
         return draw_in_phase(random);
@@ -97,7 +101,7 @@ pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
     };
     let mut set = with_sporadic(draw(random, overruns), random);
     if random.chance(50) {
-        set = with_pins(set, random);
+        set = with_tables(set, random);
     }
     match random.chance(50) {
         true => with_waits(set, random),
@@ -112,13 +116,13 @@ pub(crate) fn draw_tiny(random: &mut Random) -> Set {
         let subtasks = set.specs.iter().map(|spec| spec.subtasks.len());
         if subtasks.sum::<usize>() <= 3 {
             let mut set = with_sporadic(set, random);
+            if random.chance(50) {
+                set = with_tables(set, random);
+            }
             // Of every third one the first subtask waits, once.
-            if random.once_in(3) {
+            if random.once_in(3) && !set.has_table(DagId(0)) {
                 let limit_ns = random.within(0..=1);
                 set.specs[0].subtasks[0].waits.push(wait(limit_ns));
-            }
-            if random.chance(50) {
-                set = with_pins(set, random);
             }
             return set;
         }
@@ -135,8 +139,9 @@ const fn wait(limit_ns: u64) -> Wait {
 
 /// Gives 40 of 100 subtasks up to three waits, every fifth of which has a limit of 0.
 fn with_waits(mut set: Set, random: &mut Random) -> Set {
-    let subtasks = set.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
-    for subtask in subtasks {
+    let tabled = set.table.as_ref().map_or(0, |table| table.dags().len());
+    let specs = set.specs.iter_mut().skip(tabled);
+    for subtask in specs.flat_map(|spec| &mut spec.subtasks) {
         let waits = random.within(1..=3) * u64::from(random.chance(40));
         let draw = |_| match random.once_in(5) {
             true => wait(0),
@@ -147,20 +152,84 @@ fn with_waits(mut set: Set, random: &mut Random) -> Set {
     set
 }
 
-/// Pins subtasks to cores: some in four of five sets, all in the others; every other set has
-/// affinities, too.
-pub(crate) fn with_pins(mut set: Set, random: &mut Random) -> Set {
-    let percent = random.one_of(&[0, 20, 50, 80, 100]);
+/// Has a table run the first DAGs of a set, in most sets; every other set has affinities, too.
+pub(crate) fn with_tables(mut set: Set, random: &mut Random) -> Set {
     if random.chance(50) {
         with_affinities(&mut set.specs, set.options.cores, random);
     }
-    let cores = set.options.cores.min(4);
-    let subtasks = set.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
-    for subtask in subtasks {
-        let core = random.within(0..=cores - 1);
-        subtask.core = random.chance(percent).then_some(core);
+    if random.chance(80) {
+        let cores = set.options.cores.min(4);
+        let dags = 1 + random.index(set.specs.len());
+        set.table = Some(draw_table(&mut set.specs[..dags], cores, random));
     }
     set
+}
+
+/// Draws a table of DAGs, which get periods and offsets for it.
+///
+/// Entries are in an order in which each comes after what it waits for, so no core waits for ever,
+/// however deep they are; the lap begins anywhere in that.
+pub(crate) fn draw_table(specs: &mut [DagSpec], cores: u32, random: &mut Random) -> Table {
+    let period_ns = specs[0].period_ns.unwrap_or(1);
+    let is_family = specs.len() > 1;
+    let mut jobs = Vec::new();
+    for spec in &mut *specs {
+        jobs.push(if is_family {
+            random.within(1..=2_u32)
+        } else {
+            1
+        });
+        if is_family {
+            spec.activation = Activation::Periodic;
+            spec.period_ns = Some(period_ns * 2 / u64::from(jobs[jobs.len() - 1]));
+        }
+    }
+    let mut left = Vec::new();
+    for (dag, spec) in specs.iter().enumerate() {
+        for job in 0..jobs[dag] {
+            left.extend((0..spec.subtasks.len()).map(|subtask| (dag, job, subtask)));
+        }
+    }
+    let mut order = Vec::new();
+    while !left.is_empty() {
+        let waits = |of: &(usize, u32, usize), other: &(usize, u32, usize)| {
+            let is_edge = specs[of.0].edges.contains(&(other.2, of.2)) && other.1 == of.1;
+            // A job is not released before those end that are in flight.
+            let is_before = other.1 + specs[of.0].in_flight.unwrap_or(1) <= of.1;
+            other.0 == of.0 && (is_edge || is_before || other.2 == of.2 && other.1 < of.1)
+        };
+        let ready = |of: &usize| !left.iter().any(|other| waits(&left[*of], other));
+        let ready: Vec<usize> = (0..left.len()).filter(ready).collect();
+        order.push(left.swap_remove(ready[random.index(ready.len())]));
+    }
+    let first = random.index(order.len());
+    let mut lists = vec![Vec::<TableEntry>::new(); cores as usize];
+    let most = random.within(0..=3);
+    for (place, &(dag, job, subtask)) in (0..).zip(&order).cycle().skip(first).take(order.len()) {
+        let list = &mut lists[random.index(cores as usize)];
+        let deepest = list.last().map_or(0, |last| last.depth + 1).min(most);
+        let of_lap_before = if place < first {
+            0
+        } else {
+            i64::from(jobs[dag])
+        };
+        list.push(TableEntry {
+            dag: DagId(u32::try_from(dag).expect("few DAGs")),
+            subtask: SubtaskId(u32::try_from(subtask).expect("few subtasks")),
+            job: i64::from(job) - of_lap_before,
+            depth: random.within(0..=deepest),
+            start_ns: 0,
+            length_ns: 0,
+        });
+    }
+    let lists = (0..).zip(lists).filter(|(_, entries)| !entries.is_empty());
+    Table {
+        cluster: ClusterId(0),
+        lap_ns: if is_family { 2 * period_ns } else { period_ns },
+        lists: (lists.map(|(core, entries)| (core, entries.into())))
+            .map(|(core, entries)| CoreList { core, entries })
+            .collect(),
+    }
 }
 
 /// Gives each DAG the cores of one of up to three groups, in any order, some of them twice.
@@ -171,7 +240,7 @@ pub(crate) fn with_affinities(specs: &mut [DagSpec], cores: u32, random: &mut Ra
         groups[group].insert(0, core);
         groups[group].extend(random.once_in(4).then_some(core));
     }
-    // The cores of the last one are left to what is pinned to them.
+    // The cores of the last one are left to a table.
     groups.swap_remove(3);
     groups.retain(|group| !group.is_empty());
     if !groups.is_empty() {
@@ -204,6 +273,7 @@ fn draw_within(random: &mut Random, limits: &Limits, overruns: Overruns) -> Set 
     Set {
         options,
         specs: specs.collect(),
+        table: None,
         choices: random.number(),
     }
 }
@@ -260,8 +330,34 @@ fn draw_dag(random: &mut Random, limits: &Limits, overruns: Overruns) -> DagSpec
 }
 
 impl Set {
-    pub(crate) fn specs(&self) -> Vec<DagSpec> {
-        self.specs.clone()
+    /// Commits it.
+    pub(crate) fn commit(&self) -> Arc<TaskSet> {
+        let mut task_set = commit(&self.specs, self.options);
+        Arc::make_mut(&mut task_set).set_tables(self.table.iter().cloned().collect());
+        task_set
+    }
+
+    /// Reports whether a table has a DAG.
+    pub(crate) fn has_table(&self, dag: DagId) -> bool {
+        let table = self.table.as_ref();
+        table.is_some_and(|table| table.dags().contains(&dag))
+    }
+
+    /// Returns the core of an instance's entry, if it has one.
+    pub(crate) fn core_of_entry(&self, of: Instance) -> Option<u32> {
+        let table = self.table.as_ref()?;
+        let jobs = table.lap_ns / self.specs[of.dag.index()].period_ns?;
+        let is_it = |entry: &TableEntry| {
+            let is_in = (entry.job - of.job.cast_signed())
+                .unsigned_abs()
+                .is_multiple_of(jobs);
+            (entry.dag, entry.subtask) == (of.dag, of.subtask) && is_in
+        };
+        let list = table
+            .lists
+            .iter()
+            .find(|list| list.entries.iter().any(is_it))?;
+        Some(list.core)
     }
 
     /// Reports whether a DAG takes signals.
