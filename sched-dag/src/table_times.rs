@@ -29,6 +29,7 @@ impl TaskSet {
             are_known &= known.is_some();
             entry.wcet_ns = known.unwrap_or(0);
         }
+        run.add_nested();
         let is_timed = are_known && run.settles();
         let mut timed = table.clone();
         let mut first = 0;
@@ -37,7 +38,7 @@ impl TaskSet {
             first += all.len();
             for (place, entry) in list.entries.iter_mut().enumerate() {
                 (entry.start_ns, entry.length_ns) = match is_timed {
-                    true => (all[place].start_ns, length_ns(all, place)),
+                    true => (all[place].start_ns, all[place].length_ns),
                     false => (0, 0),
                 };
             }
@@ -98,7 +99,7 @@ pub(crate) fn first_in_lap(offset_ns: u64, period_ns: u64, is_alone: bool) -> i6
     }
 }
 
-/// Returns the sum of the WCETs of an entry of a list, and of all nested entries.
+/// Returns the WCETs of an entry of a list, and of all nested entries.
 fn length_ns(list: &[RunEntry<'_>], place: usize) -> u64 {
     let entry = &list[place];
     let after = list[place + 1..].iter().chain(&list[..place]);
@@ -139,6 +140,8 @@ struct RunEntry<'t> {
     /// The number of the job's release in lap 0.
     job: i64,
     wcet_ns: u64,
+    /// From the start to the finish: the WCETs of the entry, and of all nested entries.
+    length_ns: u64,
     /// The number of laps with the entry finished, or passed.
     done: i64,
     /// The start in the latest lap.
@@ -151,7 +154,7 @@ struct RunCore {
     end: usize,
     next: usize,
     lap: u32,
-    /// The begun and unfinished entries, with the time left of each.
+    /// The begun and unfinished entries, with the end of each.
     begun: Vec<(usize, u64)>,
 }
 
@@ -194,6 +197,7 @@ impl<'t> TableRun<'t> {
                     dag,
                     job,
                     wcet_ns: 0,
+                    length_ns: 0,
                     done: 0,
                     start_ns: u64::MAX,
                 });
@@ -207,6 +211,19 @@ impl<'t> TableRun<'t> {
             });
         }
         run
+    }
+
+    /// Adds the WCETs of nested entries to those that they are in: nothing relies on an earlier
+    /// finish.
+    fn add_nested(&mut self) {
+        for core in &self.cores {
+            let list = &self.entries[core.first..core.end];
+            let lengths_ns = (0..list.len()).map(|place| length_ns(list, place));
+            let lengths_ns: Vec<u64> = lengths_ns.collect();
+            for (entry, length_ns) in self.entries[core.first..].iter_mut().zip(lengths_ns) {
+                entry.length_ns = length_ns;
+            }
+        }
     }
 
     /// Runs until all entries start as in the lap before, and reports whether they do, each in its
@@ -231,9 +248,11 @@ impl<'t> TableRun<'t> {
         }
     }
 
-    /// Ends the innermost entry of a core, if no time is left.
+    /// Ends the innermost entry of a core, if the time has come.
     fn finish(&mut self, core: usize) -> bool {
-        let finished = self.cores[core].begun.pop_if(|begun| begun.1 == 0);
+        let finished = self.cores[core]
+            .begun
+            .pop_if(|begun| begun.1 <= self.now_ns);
         if let Some((entry, _)) = finished {
             self.entries[entry].done += 1;
         }
@@ -257,7 +276,8 @@ impl<'t> TableRun<'t> {
                 let start_ns = self.now_ns - begin_ns;
                 self.repeated[lap as usize] += usize::from(entry.start_ns == start_ns);
                 entry.start_ns = start_ns;
-                self.cores[number].begun.push((next, entry.wcet_ns));
+                let end_ns = self.now_ns.saturating_add(entry.length_ns);
+                self.cores[number].begun.push((next, end_ns));
             }
         }
         let core = &mut self.cores[number];
@@ -298,21 +318,13 @@ impl<'t> TableRun<'t> {
     /// Lets time go on to the next finish or release, if any.
     fn elapse(&mut self) -> bool {
         let events_ns = self.cores.iter().flat_map(|core| {
-            let left_ns = core.begun.last().map(|&(_, left_ns)| left_ns);
+            let end_ns = core.begun.last().map(|&(_, end_ns)| end_ns);
             let release_ns = self.release_ns(core.next, core.lap);
-            let to_release_ns = release_ns.and_then(|ns| ns.checked_sub(self.now_ns));
-            [left_ns, to_release_ns.filter(|&ns| ns > 0)]
+            [end_ns, release_ns.filter(|&ns| ns > self.now_ns)]
         });
-        let Some(ns) = events_ns.flatten().min() else {
-            return false;
-        };
-        self.now_ns += ns;
-        for core in &mut self.cores {
-            if let Some((_, left_ns)) = core.begun.last_mut() {
-                *left_ns -= ns;
-            }
-        }
-        true
+        let next_ns = events_ns.flatten().min();
+        self.now_ns = next_ns.unwrap_or(self.now_ns);
+        next_ns.is_some()
     }
 }
 

@@ -106,7 +106,8 @@ struct ListPosition {
 impl<'m> TableReplay<'m> {
     /// Begins with a journal, which may be a whole one.
     pub(super) fn new(task_set: &'m TaskSet, lists: &'m CoreLists<'m>, is_whole: bool) -> Self {
-        let of_list = |(core, list): (&CoreId, &Box<[(&TableEntry, u64)]>)| {
+        let of_core = |core: &CoreId| {
+            let list = &lists.lists[core];
             let laps = list
                 .iter()
                 .map(|(entry, jobs)| task_set.dag(entry.dag).first_job() / jobs);
@@ -120,7 +121,7 @@ impl<'m> TableReplay<'m> {
         Self {
             task_set,
             lists,
-            cores: lists.lists.iter().map(of_list).collect(),
+            cores: lists.lists.keys().map(of_core).collect(),
             voids: BTreeSet::new(),
             ended: BTreeSet::new(),
         }

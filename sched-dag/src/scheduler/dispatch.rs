@@ -132,7 +132,7 @@ impl Scheduler {
     #[inline]
     pub(super) fn give(&mut self, core: CoreId, key: DispatchKey) -> Decision {
         let vertex = self.vertices.get_mut(key.vertex());
-        (self.cores).run(core, key, vertex.yields_to_members());
+        (self.cores).run(core, key, vertex.is_preemptible);
         vertex.run(core)
     }
 
@@ -202,8 +202,7 @@ impl Scheduler {
             return (self.end_later(now_ns, core, vertex), Unwritten::Nothing);
         }
         let mut unwritten = Unwritten::Nothing;
-        let ends = ending.ends;
-        if ends == EndKind::PassesOn && is_quiet {
+        if ending.ends == EndKind::PassesOn && is_quiet {
             let (ready, others) = self.vertices.pass_on(vertex.0);
             match ready {
                 // The end made nothing ready, so only what was in line before can take the core.
@@ -221,12 +220,12 @@ impl Scheduler {
                 // Several, or others in line: only their keys tell which is first.
                 Some(next) => self.line_up_all((core, vertex, now_ns), next, others),
             }
-        } else if ends == EndKind::PassesOnInTable
+        } else if ending.ends == EndKind::PassesOnInTable
             && is_quiet
-            && let Some(next) = self.ready.lists.hop(core)
+            && let Some((next, instance)) = self.hop_in_list(core, vertex.0)
         {
-            self.vertices.hand_over(vertex.0, next, core);
-            let done = self.hand_off(core, (next, EventKind::Start));
+            let decision = Decision::new(EventKind::Start, core, instance);
+            let done = HandOff::To(Vertex(next), decision);
             return (done, Unwritten::FinishAndReady);
         } else {
             self.write_finish(core, vertex, now_ns);
@@ -307,7 +306,7 @@ impl Scheduler {
             self.dags[next.dag.index()].jobs.job(next.progress)
         });
         next.phase = InstancePhase::Running(core);
-        (self.cores).run(core, key, next.yields_to_members());
+        (self.cores).run(core, key, next.is_preemptible);
     }
 
     /// Writes down that a core has finished the instance of a vertex, and puts an instance in line

@@ -35,7 +35,7 @@ use super::bits::BitSet;
 use super::dispatch::ENTRY;
 use super::vertices::InstancePhase;
 use super::{OWED, Scheduler};
-use crate::ids::{ClusterId, CoreId, DagId, to_u32};
+use crate::ids::{ClusterId, CoreId, DagId, Instance, to_u32};
 use crate::scheduler::key::DispatchKey;
 use crate::table::{CoreList, Table, TableEntry};
 use crate::task_set::TaskSet;
@@ -55,7 +55,9 @@ pub(super) struct ListTable {
     touched: BitSet,
 }
 
+/// In one cache line.
 #[derive(Clone, Debug, Default, Hash)]
+#[repr(align(64))]
 struct ListState {
     entries: Box<[ListEntry]>,
     /// The place of the next entry, or behind the last one; beyond that if the list is over.
@@ -190,21 +192,17 @@ impl ListTable {
         self.end(core, vertex);
     }
 
-    /// Begins the next entry of a core in the place of the innermost one, which has ended, if both
-    /// are linked. Returns the vertex.
+    /// Returns the list of a core, and the vertex of its next entry, if that is linked to the
+    /// innermost one, which ends.
     ///
     /// The depths say that the innermost one is the entry before: else it would have been in the
     /// way of that.
     #[inline(always)]
-    pub(super) fn hop(&mut self, core: CoreId) -> Option<u32> {
+    fn linked(&mut self, core: CoreId) -> Option<(&mut ListState, u32)> {
         let list = self.lists.get_mut(core.index())?;
         let entry = list.entries.get(list.position)?;
-        if entry.link != list.open {
-            return None;
-        }
-        list.position += 1;
-        list.innermost = entry.vertex;
-        Some(entry.vertex)
+        let vertex = entry.vertex;
+        (entry.link == list.open).then_some((list, vertex))
     }
 }
 
@@ -295,6 +293,18 @@ impl ListEntry {
 }
 
 impl Scheduler {
+    /// Ends an instance of one slot on a core, and begins the next entry there, if both are linked.
+    /// Returns its vertex, and the instance.
+    #[inline(always)]
+    pub(super) fn hop_in_list(&mut self, core: CoreId, vertex: u32) -> Option<(u32, Instance)> {
+        let (list, next) = self.ready.lists.linked(core)?;
+        // All is found before anything is written, so that nothing has to be found again.
+        let instance = self.vertices.hand_over(vertex, next, core)?;
+        list.position += 1;
+        list.innermost = next;
+        Some((next, instance))
+    }
+
     /// Touches all cores with lists, as jobs have been skipped or cut.
     #[inline]
     pub(super) fn touch_lists(&mut self) {
@@ -369,6 +379,7 @@ impl Scheduler {
             let (own, model) = jobs(vertex.dag);
             if vertex.phase == InstancePhase::Ready && vertex.job.cast_signed() == job {
                 list.begin(entry);
+                vertices.begin_entry(entry.vertex);
                 top = Some(entry.vertex);
             } else if own.may_start(model, job, vertex.progress) {
                 break;

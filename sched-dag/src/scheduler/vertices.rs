@@ -98,7 +98,7 @@ pub(super) struct Vertex {
     pub(super) rank: u32,
     pub(super) dag: DagId,
     pub(super) subtask: SubtaskId,
-    /// Whether a started instance may lose its core.
+    /// Whether a started instance may lose its core; a member does so also to a more urgent one.
     pub(super) is_preemptible: bool,
     pub(super) ends: EndKind,
     pub(super) line: LineId,
@@ -251,18 +251,25 @@ impl VertexTable {
         (self.next_ready(&mut successors), successors)
     }
 
-    /// Ends the instance of a vertex that [only passes on](EndKind::PassesOn), to one that waits
-    /// for it alone and takes its core.
+    /// Ends the instance of a vertex that [passes on in a table](EndKind::PassesOnInTable), to one
+    /// that waits for it alone and takes its core, and returns that instance. `None`: there are no
+    /// such two vertices.
     #[inline(always)]
-    pub(super) fn hand_over(&mut self, vertex: u32, next: u32, core: CoreId) {
-        let own = &mut self.vertices[vertex as usize];
-        let job = own.job;
+    pub(super) fn hand_over(&mut self, vertex: u32, next: u32, core: CoreId) -> Option<Instance> {
+        let pair = [vertex as usize, next as usize];
+        let [own, next] = self.vertices.get_disjoint_mut(pair).ok()?;
         own.phase = InstancePhase::Absent;
         own.progress += 1;
+        // The counter of the one has been reset, that of the other would be counted down and reset.
+        (next.phase, next.job) = (InstancePhase::Running(core), own.job);
+        Some(next.present_instance())
+    }
+
+    /// Resets the counter of an entry that begins, which its end would do, too.
+    #[inline]
+    pub(super) fn begin_entry(&mut self, vertex: u32) {
+        let own = &mut self.vertices[vertex as usize];
         own.counter = own.initial;
-        // Its counter would be counted down and set again.
-        let next = &mut self.vertices[next as usize];
-        (next.phase, next.job) = (InstancePhase::Running(core), job);
     }
 
     /// Tells successors, of one slot each, up to the first that is ready by that.
@@ -319,14 +326,8 @@ impl VertexTable {
 }
 
 impl Vertex {
-    /// Reports whether an instance of a group may take its core from it.
-    #[inline]
-    pub(super) fn yields_to_members(&self) -> bool {
-        self.is_preemptible && !self.line.is_table()
-    }
-
     /// Has a core begin or continue its instance.
-    #[inline]
+    #[inline(always)]
     pub(super) fn run(&mut self, core: CoreId) -> Decision {
         // The phase still tells whether the instance has started.
         let what = match self.phase {

@@ -48,6 +48,7 @@ fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
 fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     measure::woken_cores(machine, plan.jobs)?;
     measure::joins(machine, plan.jobs)?;
+    measure::hops_elsewhere(machine, plan.jobs)?;
     measure::preemption(machine, plan.jobs)?;
     wake_ups(machine, plan)
 }

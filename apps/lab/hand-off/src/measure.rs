@@ -10,11 +10,12 @@
 //! see.
 
 use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::commit::{ConstructionPolicy, finish_create_dags_with};
-use fass::{Dag, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::commit::{ConstructionPolicy, finish_create_dags_in_order, finish_create_dags_with};
+use fass::{Dag, Policy, Preemption, SubtaskAttributes, create_dag};
 use hand_off::{Pen, Shape, Stamping, Stamps, Workload, build};
 use kernel::report::Distribution;
 use kernel::{AppError, Machine, Run, json};
@@ -65,10 +66,34 @@ pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(
     let ends = Measured::run(machine, workload)?;
     emit_hop(&format!("chain-{subtasks} with budgets"), &ends);
     workload.wcet = None;
+    in_a_table(machine, workload, 1)?;
     machine.configure(Policy::Edf, Preemption::Enabled);
     let ends = Measured::run(machine, workload)?;
     emit_hop(&format!("chain-{subtasks} by deadlines"), &ends);
     Ok(())
+}
+
+/// A chain in a table of so many cores, which take its subtasks in turn.
+pub(crate) fn in_a_table(
+    machine: &Machine,
+    workload: Workload,
+    cores: usize,
+) -> Result<(), AppError> {
+    let subtasks = workload.shape.subtasks();
+    let words = |core| {
+        (core..subtasks)
+            .step_by(cores)
+            .map(|of| format!(" chain.s{of}"))
+    };
+    let lists = (0..cores).map(|core| format!("core {core}:{}", words(core).collect::<String>()));
+    let ends = Measured::run_in_order(machine, workload, &lists.collect::<Vec<_>>())?;
+    emit_hop(&format!("chain-{subtasks} in a table of {cores}"), &ends);
+    Ok(())
+}
+
+/// The same on two cores: each hop wakes the other one.
+pub(crate) fn hops_elsewhere(machine: &Machine, jobs: u64) -> Result<(), AppError> {
+    in_a_table(machine, workload(Shape::Chain(64), jobs, Stamping::Ends), 2)
 }
 
 fn emit_hop(name: &str, ends: &Measured) {
@@ -325,10 +350,19 @@ struct Measured {
 impl Measured {
     /// Commits and runs.
     fn run(machine: &Machine, workload: Workload) -> Result<Self, AppError> {
+        Self::run_in_order(machine, workload, &[])
+    }
+
+    fn run_in_order(
+        machine: &Machine,
+        workload: Workload,
+        lists: &[String],
+    ) -> Result<Self, AppError> {
         let (dag, stamps) = build(&workload);
         let before_ns = fass::now_ns();
         let dags = [dag];
-        finish_create_dags(&dags)?;
+        let lists: Vec<&str> = lists.iter().map(String::as_str).collect();
+        finish_create_dags_in_order(&dags, ConstructionPolicy::paper(), &lists)?;
         let commit_ns = fass::now_ns() - before_ns;
         let run = run(machine)?;
         Ok(Self {

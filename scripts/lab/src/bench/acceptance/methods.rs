@@ -395,21 +395,29 @@ mod tests {
             // On two cores the lists of 4, 3 and 4 leave what the light DAG needs if they are
             // squeezed, and a budget of 10 and 1 leaves it, too. With three cores the heavy one gets
             // two, the light one the third.
-            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0]),
-            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1]),
-            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1]),
+            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0, 0]),
+            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1, 1]),
+            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1, 1]),
             // Two paths of 9 leave a core for the 3: Graham's bound counts one path, and needs
             // ceil(12 / 3) cores.
-            (vec![free(20, 12, vec![9, 9, 3])], 2, [0, 1, 0, 1, 1]),
-            (vec![free(20, 12, vec![9, 9, 3])], 4, [1, 1, 1, 1, 1]),
+            (vec![free(20, 12, vec![9, 9, 3])], 2, [0, 1, 0, 1, 1, 1]),
+            (vec![free(20, 12, vec![9, 9, 3])], 4, [1, 1, 1, 1, 1, 1]),
             // Only an order of the subtasks is done by 7: 3, 2 and 2 next to 3 and 2.
-            (vec![free(20, 7, vec![3, 3, 2, 2, 2])], 2, [0, 0, 0, 1, 1]),
-            (vec![free(20, 7, vec![3, 3, 2, 2, 2])], 3, [1, 1, 1, 1, 1]),
+            (
+                vec![free(20, 7, vec![3, 3, 2, 2, 2])],
+                2,
+                [0, 0, 0, 1, 1, 1],
+            ),
+            (
+                vec![free(20, 7, vec![3, 3, 2, 2, 2])],
+                3,
+                [1, 1, 1, 1, 1, 1],
+            ),
             // Two of three light ones would be on one core, with 12 in 10; side by side on both the
             // third has 1 + ceil((5 + 12) / 2) = 10.
-            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 1, 1]),
+            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 1, 1, 1]),
             // The volume of four is 24 in 10, more than two cores do.
-            (vec![wide(), wide(), wide(), wide()], 2, [0, 0, 0, 0, 0]),
+            (vec![wide(), wide(), wide(), wide()], 2, [0, 0, 0, 0, 0, 0]),
         ] {
             let of: Vec<&Task> = tasks.iter().collect();
             let accepted = METHODS.map(|method| u8::from((method.accepts)(&of, cores)));

@@ -273,8 +273,8 @@ mod tests {
         assert_eq!(ends(curves[1]), [[left, y(0)], [right, y(15)]]);
         assert_eq!(ends(curves[3]), [[left, y(100)], [right, y(100)]]);
         // Then come the constrained ones of 2 cores, below, and those of 4 cores, on the right.
-        let below = ends(curves[METHODS.len() + 4]);
-        let beside = ends(curves[2 * METHODS.len() + 4]);
+        let below = ends(curves[METHODS.len() + 5]);
+        let beside = ends(curves[2 * METHODS.len() + 5]);
         assert_eq!(
             below,
             [[left, top], [right, top]].map(|[x, y]| [x, y + picture::STEP.1])
