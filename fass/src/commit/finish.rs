@@ -181,20 +181,8 @@ pub fn finish_create_dags_in_order(
         mut warnings,
     } = verify(&drafts, options, terms.wcets.as_deref())?;
     task_set.charge_tables(&terms.settings());
-    let is_stated = !lists.is_empty();
-    if terms.assigns {
-        let why = "lists of cores are stated, and the commit is to divide the cores; leave one out";
-        let assigned = match is_stated {
-            true => Err(LaunchError::new(why.to_string())),
-            false => assign_clusters(&mut task_set, &terms),
-        };
-        if let Err(error) = assigned {
-            return Err(CommitError::of(Fault::NotAssigned(error), warnings));
-        }
-    }
-    let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
-    if demands_proof && !terms.assigns && !is_stated {
-        divide_to_prove(&mut task_set, &terms, &drafts);
+    if let Err(error) = divide(&mut task_set, &terms, &drafts, !lists.is_empty()) {
+        return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
     let answers = CommitAnswers::new(&task_set, &terms);
     let certain = answers.certain_misses();
@@ -222,6 +210,28 @@ pub fn finish_create_dags_in_order(
         }),
         Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
     }
+}
+
+/// Divides the cores if the commit is to, or if that alone gives a proof that is demanded. Stated
+/// lists stand for a division.
+fn divide(
+    task_set: &mut TaskSet,
+    terms: &RunConfig,
+    drafts: &Drafts,
+    is_stated: bool,
+) -> Result<(), LaunchError> {
+    let demands_proof = || drafts.iter().any(|draft| draft.borrow().demands_proof);
+    match (terms.assigns, is_stated) {
+        (true, true) => {
+            let why =
+                "lists of cores are stated, and the commit is to divide the cores; leave one out";
+            return Err(LaunchError::new(why.to_string()));
+        }
+        (true, false) => assign_clusters(task_set, terms)?,
+        (false, false) if demands_proof() => divide_to_prove(task_set, terms, drafts),
+        _ => {}
+    }
+    Ok(())
 }
 
 /// Divides cores that are not, where a proof is demanded that only a division gives. DAGs that are

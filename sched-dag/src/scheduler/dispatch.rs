@@ -131,16 +131,26 @@ impl Scheduler {
     /// Gives a core an instance that is ready.
     #[inline]
     pub(super) fn give(&mut self, core: CoreId, key: DispatchKey) -> Decision {
+        let what = self.seat(core, key);
+        let instance = self.vertices.get(key.vertex()).present_instance();
+        Decision::new(what, core, instance)
+    }
+
+    /// Likewise, and returns whether that starts or goes on.
+    #[inline(always)]
+    fn seat(&mut self, core: CoreId, key: DispatchKey) -> EventKind {
         let vertex = self.vertices.get_mut(key.vertex());
+        let what = vertex.run(core);
         (self.cores).run(core, key, vertex.is_preemptible);
-        vertex.run(core)
+        what
     }
 
     /// Gives a core to the innermost entry that has begun there.
     #[inline]
     pub(super) fn give_to_entry(&mut self, core: CoreId, entry: u32) -> Decision {
         self.cores.run(core, ENTRY, false);
-        self.vertices.get_mut(entry).run(core)
+        let vertex = self.vertices.get_mut(entry);
+        Decision::new(vertex.run(core), core, vertex.present_instance())
     }
 
     /// Puts the instance that runs on a core back in line.
@@ -353,7 +363,7 @@ impl Scheduler {
             return self.give_first_apart(core, ended);
         }
         let key = self.ready.pop()?;
-        Some((key.vertex(), self.give(core, key).what))
+        Some((key.vertex(), self.seat(core, key)))
     }
 
     /// Not a part of its callers, as most sets have one line.
@@ -364,7 +374,7 @@ impl Scheduler {
             return Some((entry, self.give_to_entry(core, entry).what));
         }
         let key = self.ready.pop_for(core)?;
-        Some((key.vertex(), self.give(core, key).what))
+        Some((key.vertex(), self.seat(core, key)))
     }
 }
 

@@ -24,7 +24,6 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::Decision;
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
 use crate::journal::EventKind;
@@ -326,16 +325,16 @@ impl VertexTable {
 }
 
 impl Vertex {
-    /// Has a core begin or continue its instance.
+    /// Has a core begin or continue its instance, and returns which of both.
     #[inline(always)]
-    pub(super) fn run(&mut self, core: CoreId) -> Decision {
+    pub(super) fn run(&mut self, core: CoreId) -> EventKind {
         // The phase still tells whether the instance has started.
         let what = match self.phase {
             InstancePhase::Preempted => EventKind::Resume,
             _ => EventKind::Start,
         };
         self.phase = InstancePhase::Running(core);
-        Decision::new(what, core, self.present_instance())
+        what
     }
 
     /// Returns the vertex's part of a job.

@@ -124,7 +124,11 @@ fn lists(dags: &[DagText], cores: u32, random: &mut Random) -> Vec<String> {
     listed.truncate(4);
     let periods_ns: Vec<u128> = listed.iter().map(|dag| dag.period.as_nanos()).collect();
     let longest_ns = periods_ns.iter().max().copied().unwrap_or(1);
-    let divides_all = |lap_ns: &u128| periods_ns.iter().all(|period_ns| lap_ns % period_ns == 0);
+    let divides_all = |lap_ns: &u128| {
+        periods_ns
+            .iter()
+            .all(|period_ns| lap_ns.is_multiple_of(*period_ns))
+    };
     let lap_ns = (1..).map(|n| n * longest_ns).find(divides_all).unwrap_or(0);
     let mut entries = vec![];
     for (dag, period_ns) in listed.iter().zip(&periods_ns) {

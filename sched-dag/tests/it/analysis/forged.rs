@@ -204,9 +204,7 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
             ("table", _) => {}
             ("list", _) => lists.push(list(&words[1..])),
             ("affinity", Some(dag)) => dag.affinity = (1..words.len()).map(small).collect(),
-            ("due", Some(dag)) => {
-                dag.subtasks[index(1)].relative_deadline_ns = Some(number(2));
-            }
+            ("due", Some(dag)) => dag.subtasks[index(1)].relative_deadline_ns = Some(number(2)),
             _ => panic!("{line}"),
         }
     }

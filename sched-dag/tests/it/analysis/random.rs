@@ -192,11 +192,8 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
             subtask.non_preemptive = keeps == "somekeep" && (first || random.once_in(2));
         }
         let own = [(); 3].map(|()| u32::try_from(random.number() >> 32).unwrap_or(0));
-        let others = if number == 0 {
-            all
-        } else {
-            own[0] & (own[1] | own[2])
-        };
+        let rest = own[0] & (own[1] | own[2]);
+        let others = if number == 0 { all } else { rest };
         add(spec, all & others, random);
     }
     let lists = match is_lent {
