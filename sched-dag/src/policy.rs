@@ -189,15 +189,15 @@ texts! {
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
         /// All DAGs share all cores.
         Whole { left_percent: u32 } = "all, with {left_percent} % of them left (attempt 0)";
-        /// It is heavy and owns cores, on each of which its subtasks have a fixed order.
+        /// It is heavy and has a table of its own.
         Owner { attempt: LendingAttempt, volume_ns: u64, within_ns: u64, left_percent: u32 } =
-            "its own in a fixed order, as a job is {:?} of work within {:?}, with {left_percent} % of \
+            "its own by a table, as a job is {:?} of work within {:?}, with {left_percent} % of \
              them left ({attempt})",
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
         /// It has a table with others: each of the cores runs a list of entries.
         Table { attempt: LendingAttempt, left_percent: u32 } =
             "those of its table, with {left_percent} % of them left ({attempt})";
-        /// It shares what the owners of some cores leave.
+        /// It shares what the tables of some cores leave.
         Member { attempt: LendingAttempt, left_percent: u32 } =
             "the first with room for it, with {left_percent} % of them left \
              ({attempt})";

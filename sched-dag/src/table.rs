@@ -87,6 +87,13 @@ impl Table {
         self.lists.iter().flat_map(|list| &list.entries)
     }
 
+    /// Reports whether there is only one DAG.
+    pub fn is_of_one_dag(&self) -> bool {
+        let mut entries = self.lists.iter().flat_map(|list| &list.entries);
+        let first = entries.next().map(|entry| entry.dag);
+        entries.all(|entry| Some(entry.dag) == first)
+    }
+
     /// Returns the list of a core of the cluster.
     pub fn list(&self, core: u32) -> Option<&CoreList> {
         self.lists.iter().find(|list| list.core == core)

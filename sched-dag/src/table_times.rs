@@ -84,7 +84,7 @@ impl TaskSet {
     /// Returns the first job of a DAG to be released in lap 0 of its table.
     pub(crate) fn first_in_lap(&self, table: &Table, dag: DagId) -> i64 {
         let dag = self.dag(dag);
-        first_in_lap(dag.offset_ns(), dag.period_ns(), table.dags().len() == 1)
+        first_in_lap(dag.offset_ns(), dag.period_ns(), table.is_of_one_dag())
     }
 }
 

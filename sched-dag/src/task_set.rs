@@ -135,7 +135,7 @@ impl TaskSet {
     /// Returns the table of a DAG, which is in one or in none.
     pub fn table_of(&self, dag: DagId) -> Option<&Table> {
         let mut tables = self.tables.iter();
-        tables.find(|table| table.dags().contains(&dag))
+        tables.find(|table| table.entries().any(|entry| entry.dag == dag))
     }
 
     /// Returns the number of jobs of a DAG in one lap of its table.

@@ -81,7 +81,7 @@ function showGraph() {
   const subtasks = dag => dag.subtasks.map(({ name, notes }) => ({ name: `${dag.name}/${name}`, notes }));
   const noted = dags.flatMap(dag => [dag, ...subtasks(dag)]).filter(({ notes }) => notes.length);
   const list = noted.flatMap(({ name, notes }) => [element("dt", {}, name), element("dd", {}, notes.join("; "))]);
-  unfold("notes", list.length ? "Topics, types, pins and what else is stated" : "", list);
+  unfold("notes", list.length ? "Topics, types, tables and what else is stated" : "", list);
 }
 
 // Lists faults, modes, skips and breaches of the rules; each leads to its place in the timeline.

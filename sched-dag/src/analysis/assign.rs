@@ -69,8 +69,7 @@ texts! {
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
         /// It states cores of a cluster that is not made yet.
         Confined =
-            "it states cores of a cluster, and the commit is to make the clusters; leave its affinity \
-             and the cores of its subtasks out";
+            "it states cores of a cluster, and the commit is to make the clusters; leave its affinity out";
         /// It enters a lock without a longest section.
         UnboundedLock =
             "it enters a lock without a longest section, in which it keeps what shares its cores \

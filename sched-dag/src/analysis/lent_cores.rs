@@ -105,7 +105,12 @@ impl CoreSupply {
             of.start_ns
                 .saturating_add_signed(of.release_ns.saturating_neg())
         };
-        let waiting_ns = list.iter().map(waits).max().unwrap_or(0);
+        // A start is late by no more than its charge, which the WCET has.
+        let waiting_ns = list
+            .iter()
+            .map(|of| waits(of) + of.wcet_ns)
+            .max()
+            .unwrap_or(0);
         let mut supply = Self {
             lap_ns,
             work_ns: list.iter().map(|of| of.wcet_ns).sum(),

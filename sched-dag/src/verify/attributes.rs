@@ -334,8 +334,8 @@ fn cores_of(options: &CommitOptions, spec: &DagSpec) -> u32 {
 /// Checks the cores that a DAG states.
 fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     let cores = cores_of(options, page.spec);
-    // The scheduler has two lines for each, and one more, in 16 bits.
-    let most = cores.min(0x7fff);
+    // The scheduler has a line for each, and two more, in 16 bits.
+    let most = cores.min(0xfffe);
     let largest = page.spec.affinity.iter().copied().max();
     if let Some(core) = largest.filter(|&core| core >= most) {
         page.fault(|dag| DagFault::AffinityOutOfRange { dag, core, cores });

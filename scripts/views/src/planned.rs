@@ -34,7 +34,7 @@ impl Planned {
 pub fn entries(view: &View<'_>) -> Vec<Planned> {
     let (task_set, mut all) = (&view.run.task_set, Vec::new());
     for table in task_set.tables() {
-        let (is_alone, cores) = (table.dags().len() == 1, view.run.options.cores);
+        let (is_alone, cores) = (table.is_of_one_dag(), view.run.options.cores);
         let first = task_set.cores_of(table.cluster, cores).start;
         let entries = table.lists.iter().flat_map(|list| {
             let of_core = move |entry| (CoreId(first + list.core), entry);
@@ -50,10 +50,11 @@ pub fn entries(view: &View<'_>) -> Vec<Planned> {
                 if ahead % jobs != 0 {
                     continue;
                 }
-                // A lap of one DAG begins with its job.
+                // A lap of one DAG begins with the release of its job in lap 0.
+                let lap_ns = i128::from(table.lap_ns);
                 let from_ns = match is_alone {
-                    true => i128::from(view.release_ns(dag, job)),
-                    false => ahead / jobs * i128::from(table.lap_ns),
+                    true => i128::from(view.release_ns(dag, job)) - i128::from(entry.job) * lap_ns,
+                    false => ahead / jobs * lap_ns,
                 };
                 let from_ns = u64::try_from(from_ns).unwrap_or(0) + entry.start_ns;
                 all.push(Planned {

@@ -43,7 +43,7 @@ static ORACLE: Menu = Menu {
     word: "KIND",
     about: "Compares reference cases with what this project computes.",
     choices: choices! {
-        "assignment": "attempts, owners, orders, busy times, groups and bounds of lent cores",
+        "assignment": "attempts, tables, busy times, groups and bounds of divided cores",
             |words| assignment::ORACLE.run(words);
         "bounds": "lengths, widths, response-time bounds and verdicts",
             |words| bounds::ORACLE.run(words);
