@@ -168,7 +168,9 @@ texts! {
         /// Some DAG can execute in a table only.
         Excluded = "some dag needs a table";
         /// No DAG can have a table with others.
-        Nothing = "no dag for a table";
+        Nothing =
+            "no table, as none is proven next to a lock, a card or measured overheads, or the \
+             periods have no short common multiple";
         /// The DAG neither fits into the table nor may execute in what that leaves.
         Member = "no room in the table";
         /// The DAG is late in the table, or no table closes.

@@ -164,9 +164,6 @@ pub struct SubtaskSpec {
     pub budget_ns: Option<u64>,
     /// The stack that it needs, in bytes, of [`STACK_BYTES`]; `None`: the driver's choice.
     pub stack_bytes: Option<u64>,
-    /// To be removed.
-    #[doc(hidden)]
-    pub core: Option<u32>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.

@@ -231,7 +231,12 @@ pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     // With a core for each subtask nothing delays the longest path.
     settings.cores = u32::try_from(own.subtasks.len()).unwrap_or(u32::MAX).max(1);
     let length = bound(&[own], &settings, 0);
-    let part = |whole: Option<u64>, rest: Option<u64>| Some(whole?.saturating_sub(rest?));
+    // What a table gives its DAGs, and leaves to others, is of no such parts.
+    let has_table = task_set.tables().iter().any(|of| of.cluster == cluster);
+    let part = |whole: Option<u64>, rest: Option<u64>| match has_table {
+        true => None,
+        false => Some(whole?.saturating_sub(rest?)),
+    };
     [
         length,
         part(alone, length),
