@@ -89,7 +89,7 @@ impl Table {
 
     /// Reports whether there is only one DAG.
     pub fn is_of_one_dag(&self) -> bool {
-        let mut entries = self.lists.iter().flat_map(|list| &list.entries);
+        let mut entries = self.entries();
         let first = entries.next().map(|entry| entry.dag);
         entries.all(|entry| Some(entry.dag) == first)
     }

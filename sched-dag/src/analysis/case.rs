@@ -32,19 +32,14 @@ pub(super) fn with_case(
     work: impl FnOnce(&AnalysisInput<'_>, AnalysisResult, &mut [Option<NotProvenReason>]),
 ) {
     let places = CorePlaces::of(dags, tables, own);
-    let free = own
-        .iter()
-        .copied()
-        .filter(|&dag| places.table_of[dag].is_none());
-    let free: Vec<usize> = free.collect();
+    let is_free = |dag: &usize| places.table_of[*dag].is_none();
+    let free: Vec<usize> = own.iter().copied().filter(is_free).collect();
     let relation = RankRelation::new(dags, &free, settings.policy, settings.preemption);
     let tasks = analysable(&places, own, &relation, settings, reasons);
     let can_be = |dag: &usize| reasons[*dag].is_none();
     let members: Vec<usize> = own.iter().copied().filter(can_be).collect();
-    let tasks: Vec<&Task> = members
-        .iter()
-        .filter_map(|&dag| tasks[dag].as_ref())
-        .collect();
+    let known = members.iter().filter_map(|&dag| tasks[dag].as_ref());
+    let tasks: Vec<&Task> = known.collect();
     let relation = relation.among(&members);
     let mut case = AnalysisInput::new(places, own, (&members, &tasks), relation, settings);
     let verdict = case.settle();
@@ -169,12 +164,8 @@ impl<'a> AnalysisInput<'a> {
             tables: Vec::new(),
             entering: Vec::new(),
         };
-        case.tables = case
-            .places
-            .tables
-            .iter()
-            .map(|table| case.checked(table))
-            .collect();
+        let tables = case.places.tables.iter();
+        case.tables = tables.map(|table| case.checked(table)).collect();
         case.set.bursts = case.bursts(|_| false);
         case.entering = case.features();
         case.complete();

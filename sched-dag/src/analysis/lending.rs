@@ -36,7 +36,7 @@ use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT, parts_per_million};
 use super::list_schedule::ListSchedule;
 use super::ratio::sort_largest_first;
 use super::set::constrained;
-use super::table_making::{TableFamily, TableMethod, may_be_member};
+use super::table_making::{TableFamily, may_be_member};
 use super::task::Task;
 use super::workload::WorkloadBursts;
 use crate::ids::{ClusterId, DagId, to_u32};
@@ -176,20 +176,14 @@ impl LendingPlan {
             let (met, mut apart): (Vec<_>, Vec<_>) = (clusters.into_iter())
                 .partition(|cluster| cluster.iter().any(|core| cores.contains(core)));
             let mut all: Vec<usize> = met.concat();
-            all.extend(
-                cores
-                    .iter()
-                    .filter(|&core| !all.contains(core))
-                    .collect::<Vec<_>>(),
-            );
+            all.extend(cores);
             all.sort_unstable();
+            all.dedup();
             apart.push(all);
             clusters = apart;
         }
-        sorted_by_key(clusters.len(), |place| clusters[place][0])
-            .into_iter()
-            .map(|place| clusters[place].clone())
-            .collect()
+        clusters.sort_unstable();
+        clusters
     }
 
     /// Returns how much of the time of some cores, in hundredths, is left by their owners and by
@@ -205,11 +199,8 @@ impl LendingPlan {
         };
         let mut taken: u64 = cores.iter().filter_map(of_list).sum();
         for group in &self.groups {
-            let shared = group
-                .cores
-                .iter()
-                .filter(|core| cores.contains(core))
-                .count() as u64;
+            let own = group.cores.iter();
+            let shared = own.filter(|core| cores.contains(core)).count() as u64;
             let members = group.members.iter().map(|&(dag, _)| tasks[dag]);
             let load = members.map(|task| parts_per_million(task.volume_ns(), task.period_ns()));
             // Members take from their cores alike.
@@ -257,9 +248,8 @@ impl LendingTerms<'_> {
         if cores == 0 || tasks.iter().any(|task| task.has_waits()) {
             return None;
         }
-        let members = tasks
-            .iter()
-            .map(|task| MemberTask::of(task, cores, self.bursts));
+        let members = tasks.iter();
+        let members = members.map(|task| MemberTask::of(task, cores, self.bursts));
         let members: Vec<MemberTask<'_>> = members.collect();
         let are_plain = self.has_members
             && constrained(tasks, cores)
@@ -278,13 +268,10 @@ impl LendingTerms<'_> {
                 _ => {}
             }
             let placed = match attempt {
-                LendingAttempt::Nest => {
-                    let family = family.get_or_insert(TableFamily::of(tasks, self.entry_limit));
-                    self.with_family(family, &members, count, TableMethod::Nest)
-                }
-                LendingAttempt::Lazy => {
-                    let family = family.get_or_insert(TableFamily::of(tasks, self.entry_limit));
-                    self.with_family(family, &members, count, TableMethod::Lazy)
+                LendingAttempt::Nest | LendingAttempt::Lazy => {
+                    let make = || TableFamily::of(tasks, self.entry_limit);
+                    let family = family.get_or_insert_with(make);
+                    self.with_family(family, &members, count, attempt)
                 }
                 _ if !are_plain => Err((None, AttemptFailure::Excluded)),
                 _ => {
@@ -321,15 +308,14 @@ impl LendingTerms<'_> {
         family: &mut TableFamily<'_>,
         members: &[MemberTask<'_>],
         cores: usize,
-        method: TableMethod,
+        method: LendingAttempt,
     ) -> Result<(Vec<CoreOwner>, Vec<LentGroup>), Failed> {
         let tasks: Vec<&Task> = members.iter().map(|of| of.task).collect();
         if family.dags.is_empty() {
             return Err((None, AttemptFailure::Nothing));
         }
-        let mut rest: Vec<usize> = (0..tasks.len())
-            .filter(|dag| !family.dags.contains(dag))
-            .collect();
+        let is_left = |dag: &usize| !family.dags.contains(dag);
+        let mut rest: Vec<usize> = (0..tasks.len()).filter(is_left).collect();
         if let Some(&dag) = rest.iter().find(|&&dag| !may_be_member(tasks[dag])) {
             return Err((Some(dag), AttemptFailure::Member));
         }
@@ -339,11 +325,8 @@ impl LendingTerms<'_> {
             return Err((Some(dag), AttemptFailure::Member));
         }
         // The table has the first cores.
-        let left = cores
-            - heavy
-                .iter()
-                .map(|owner| owner.schedule.cores.len())
-                .sum::<usize>();
+        let owned = heavy.iter().map(|owner| owner.schedule.cores.len());
+        let left = cores - owned.sum::<usize>();
         heavy.iter_mut().for_each(|owner| owner.first_core += left);
         let light = LendingAttempt::Nest.light(&tasks, &rest);
         let order: Vec<usize> = late.into_iter().chain(light).collect();
@@ -378,11 +361,8 @@ impl LendingTerms<'_> {
         dags: &[usize],
         cores: Range<usize>,
     ) -> (Vec<HeavyOwner<'t>>, Vec<usize>) {
-        let mut heavy: Vec<usize> = dags
-            .iter()
-            .copied()
-            .filter(|&dag| is_heavy(tasks[dag]))
-            .collect();
+        let heavy = dags.iter().copied().filter(|&dag| is_heavy(tasks[dag]));
+        let mut heavy: Vec<usize> = heavy.collect();
         sort_by_key(&mut heavy, |dag| {
             i128::from(tasks[dag].within_ns()) - i128::from(tasks[dag].length_ns())
         });
@@ -460,11 +440,8 @@ impl LendingAttempt {
 
     /// Returns the light ones of some DAGs in the order in which they are placed.
     fn light(self, tasks: &[&Task], dags: &[usize]) -> Vec<usize> {
-        let mut light: Vec<usize> = dags
-            .iter()
-            .copied()
-            .filter(|&dag| !is_heavy(tasks[dag]))
-            .collect();
+        let light = dags.iter().copied().filter(|&dag| !is_heavy(tasks[dag]));
+        let mut light: Vec<usize> = light.collect();
         let within_ns = |dag: usize| tasks[dag].within_ns();
         match self {
             Self::ByDeadline | Self::SqueezedByDeadline => sort_by_key(&mut light, within_ns),

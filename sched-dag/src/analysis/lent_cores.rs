@@ -38,7 +38,7 @@ use super::cover::parallelism_covers_and_parts;
 use super::task::Task;
 use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
 use crate::ids::{DagId, to_u32};
-use crate::order::sorted_by_key;
+use crate::order::sorted;
 use crate::table::{CoreList, Table};
 
 /// The time that one core supplies besides the entries of its table.
@@ -87,7 +87,7 @@ impl CoreSupply {
         task: impl Fn(DagId) -> &'a Task,
         late_ns: u64,
     ) -> Self {
-        let is_alone = table.dags().len() == 1;
+        let is_alone = table.is_of_one_dag();
         let entries = list.entries.iter().map(|entry| {
             let task = task(entry.dag);
             SuppliedEntry {
@@ -102,15 +102,12 @@ impl CoreSupply {
     /// Describes a core with a list, in its order.
     pub(super) fn of(lap_ns: u64, list: &[SuppliedEntry], late_ns: u64) -> Self {
         let waits = |of: &SuppliedEntry| {
-            of.start_ns
-                .saturating_add_signed(of.release_ns.saturating_neg())
+            let before_ns = of.release_ns.saturating_neg();
+            of.start_ns.saturating_add_signed(before_ns)
         };
         // A start is late by no more than its charge, which the WCET has.
-        let waiting_ns = list
-            .iter()
-            .map(|of| waits(of) + of.wcet_ns)
-            .max()
-            .unwrap_or(0);
+        let until_late = |of: &SuppliedEntry| waits(of) + of.wcet_ns;
+        let waiting_ns = list.iter().map(until_late).max().unwrap_or(0);
         let mut supply = Self {
             lap_ns,
             work_ns: list.iter().map(|of| of.wcet_ns).sum(),
@@ -119,25 +116,18 @@ impl CoreSupply {
             ..Self::FREE
         };
         // No sum of these times overflows.
-        let is_small = [lap_ns, supply.work_ns, supply.waiting_ns]
-            .iter()
-            .all(|&ns| ns < 1 << 60);
+        let times_ns = [lap_ns, supply.work_ns, supply.waiting_ns];
+        let is_small = times_ns.iter().all(|&ns| ns < 1 << 60);
         if !is_small || supply.work_ns >= lap_ns && !list.is_empty() {
             supply.full_ns = u64::MAX;
             return supply;
         }
-        let releases_ns: Vec<u64> = list
-            .iter()
-            .map(|of| {
-                of.release_ns
-                    .rem_euclid(lap_ns.cast_signed())
-                    .cast_unsigned()
-            })
-            .collect();
-        let arrivals: Vec<(u64, u64)> = sorted_by_key(list.len(), |place| releases_ns[place])
-            .into_iter()
-            .map(|place| (releases_ns[place], list[place].wcet_ns))
-            .collect();
+        let lap = lap_ns.cast_signed();
+        let arrivals = list.iter().map(|of| {
+            let release_ns = of.release_ns.rem_euclid(lap).cast_unsigned();
+            (release_ns, of.wcet_ns)
+        });
+        let arrivals: Vec<(u64, u64)> = sorted(&arrivals.collect::<Vec<_>>());
         let mut idle_at: Vec<(u64, u64)> = Vec::new();
         for start_ns in stretches(lap_ns, list) {
             let origin_ns = start_ns + late_ns;
@@ -176,9 +166,8 @@ impl CoreSupply {
         let gain_ns = self.lap_ns - self.work_ns;
         let laps = open_ns.saturating_sub(room_ns).div_ceil(gain_ns);
         let left_ns = open_ns - laps * gain_ns;
-        let gap = gaps
-            .iter()
-            .find(|&&(after_ns, came_ns)| left_ns + came_ns <= after_ns);
+        let is_idle = |&&(after_ns, came_ns): &&(u64, u64)| left_ns + came_ns <= after_ns;
+        let gap = gaps.iter().find(is_idle);
         laps * self.lap_ns + left_ns + gap.map_or(0, |&(_, came_ns)| came_ns)
     }
 
@@ -231,19 +220,15 @@ impl CoreSupply {
         };
         let laps = after_ns / self.lap_ns;
         let within_ns = window_ns - laps * self.lap_ns;
-        let next = self
-            .ramps
-            .partition_point(|ramp| ramp.0 + ramp.1 <= within_ns);
+        let is_past = |ramp: &(u64, u64)| ramp.0 + ramp.1 <= within_ns;
+        let next = self.ramps.partition_point(is_past);
         let flat_ns = self.ramps[..next].last().map_or(0, |ramp| ramp.1);
-        let rising = self.ramps.get(next).map(|ramp| {
-            (
-                within_ns.saturating_sub(ramp.0),
-                ramp.0 + ramp.1 - within_ns,
-            )
+        let rising = self.ramps.get(next).map(|&(idle_ns, top_ns)| {
+            let busy_ns = within_ns.saturating_sub(idle_ns);
+            (busy_ns, idle_ns + top_ns - within_ns)
         });
-        let (busy_ns, more_ns) = rising
-            .filter(|&(busy_ns, _)| busy_ns >= flat_ns)
-            .unwrap_or((flat_ns, 0));
+        let rising = rising.filter(|&(busy_ns, _)| busy_ns >= flat_ns);
+        let (busy_ns, more_ns) = rising.unwrap_or((flat_ns, 0));
         (laps * self.work_ns + busy_ns, more_ns)
     }
 

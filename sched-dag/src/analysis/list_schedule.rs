@@ -153,29 +153,23 @@ impl ListSchedule {
 
     /// Returns the schedule as a table of one DAG on cores from a first one on.
     pub(super) fn table(&self, dag: usize, period_ns: u64, first_core: usize) -> Table {
-        let lists = self
-            .cores
-            .iter()
-            .zip(first_core..)
-            .filter(|(list, _)| !list.is_empty());
+        let entry = |of: &ScheduledSubtask| TableEntry {
+            dag: DagId(to_u32(dag)),
+            subtask: SubtaskId(to_u32(of.subtask)),
+            job: 0,
+            depth: 0,
+            start_ns: of.start_ns,
+            length_ns: of.finish_ns - of.start_ns,
+        };
+        let lists = self.cores.iter().zip(first_core..);
         let lists = lists.map(|(list, core)| CoreList {
             core: to_u32(core),
-            entries: list
-                .iter()
-                .map(|of| TableEntry {
-                    dag: DagId(to_u32(dag)),
-                    subtask: SubtaskId(to_u32(of.subtask)),
-                    job: 0,
-                    depth: 0,
-                    start_ns: of.start_ns,
-                    length_ns: of.finish_ns - of.start_ns,
-                })
-                .collect(),
+            entries: list.iter().map(entry).collect(),
         });
         Table {
             cluster: ClusterId(0),
             lap_ns: period_ns,
-            lists: lists.collect(),
+            lists: lists.filter(|list| !list.entries.is_empty()).collect(),
         }
     }
 }

@@ -83,6 +83,7 @@ mod overheads;
 mod pipelined;
 mod ranks;
 mod ratio;
+pub(crate) use ratio::greatest_common_divisor;
 mod schedulability;
 mod set;
 mod table_check;

@@ -23,6 +23,7 @@ use super::ratio::{greatest_common_divisor, sort_largest_first};
 use super::task::Task;
 use crate::ids::{ClusterId, DagId, SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
+use crate::policy::LendingAttempt;
 use crate::table::{CoreList, Table, TableEntry};
 
 /// The most tries for a number of cores, and how often a lap is simulated again to close.
@@ -60,13 +61,6 @@ struct FamilyEntry {
     due_ns: i64,
     wcet_ns: i64,
     keeps_core: bool,
-}
-
-/// The tables' methods.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum TableMethod {
-    Nest,
-    Lazy,
 }
 
 /// The outcome of a lap that has not made a table.
@@ -135,16 +129,16 @@ impl<'a> TableFamily<'a> {
         self.places.push((self.entries.len(), places));
         for job in 0..self.jobs(place) {
             let release_ns = (phase_ns(task) + job * task.period_ns()).cast_signed();
-            self.entries
-                .extend(order.iter().map(|&subtask| FamilyEntry {
-                    dag: place,
-                    subtask,
-                    job,
-                    release_ns,
-                    due_ns: release_ns + due_ns[subtask],
-                    wcet_ns: task.wcets_ns()[subtask].cast_signed(),
-                    keeps_core: task.table_terms().non_preemptive.contains(&subtask),
-                }));
+            let entry = |&subtask: &usize| FamilyEntry {
+                dag: place,
+                subtask,
+                job,
+                release_ns,
+                due_ns: release_ns + due_ns[subtask],
+                wcet_ns: task.wcets_ns()[subtask].cast_signed(),
+                keeps_core: task.table_terms().non_preemptive.contains(&subtask),
+            };
+            self.entries.extend(order.iter().map(entry));
         }
     }
 
@@ -169,7 +163,7 @@ impl<'a> TableFamily<'a> {
     pub(super) fn make(
         &mut self,
         cores: usize,
-        method: TableMethod,
+        method: LendingAttempt,
     ) -> Result<(Table, u32), Option<usize>> {
         let mut boosts_ns = vec![0; self.dags.len()];
         let mut first_late = None;
@@ -326,12 +320,11 @@ impl<'a> TableFamily<'a> {
             if !at.stack.is_empty() || at.held_until_ns > now_ns {
                 continue;
             }
+            let before = self.predecessors(of);
             let last = at.last.filter(|&last| {
                 let last = &self.entries[last];
-                (last.dag, last.job) == (of.dag, of.job)
-                    && self
-                        .predecessors(of)
-                        .contains(&SubtaskId(to_u32(last.subtask)))
+                let is_before = before.contains(&SubtaskId(to_u32(last.subtask)));
+                is_before && (last.dag, last.job) == (of.dag, of.job)
             });
             // Without one, as if it had ended before all others.
             let ended_ns = last.map_or(-1, |last| lap.finishes_ns[last]);
@@ -345,7 +338,7 @@ impl<'a> TableFamily<'a> {
     /// Returns the core with the most slack on which an entry may preempt.
     fn preempted_core(&self, lap: &Lap, by: &LapOrder, entry: usize, now_ns: i64) -> Option<usize> {
         let soonest_ns = lap.running().map(|(_, top)| lap.left_ns[top]).min()?;
-        if by.method == TableMethod::Lazy && now_ns + soonest_ns <= by.keys_ns[entry] {
+        if by.method == LendingAttempt::Lazy && now_ns + soonest_ns <= by.keys_ns[entry] {
             return None;
         }
         let mut best: Option<(usize, i64)> = None;
@@ -376,9 +369,10 @@ impl<'a> TableFamily<'a> {
                 let task = self.task(of.dag);
                 let first = task.table_terms().offset_ns.unwrap_or(0) / task.period_ns();
                 // Of one DAG, times are from its release on.
-                let (origin_ns, first) = match is_alone {
-                    true => (phase_ns(task), 0),
-                    false => (0, first),
+                let (origin_ns, first) = if is_alone {
+                    (phase_ns(task), 0)
+                } else {
+                    (0, first)
                 };
                 let start_ns = lap.starts_ns[entry] - origin_ns.cast_signed();
                 let later = start_ns.div_euclid(lap_ns);
@@ -419,7 +413,7 @@ struct LapOrder {
     /// By entry, its place in that.
     ranks: Vec<usize>,
     keys_ns: Vec<i64>,
-    method: TableMethod,
+    method: LendingAttempt,
 }
 
 /// A lap, as far as it is simulated.

@@ -90,11 +90,8 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let dags = task_set.part(cluster);
         let tables = part_of_tables(task_set, cluster);
         let settings = of_cluster(settings, cores, &mut dags.iter());
-        whole(
-            (&dags, &tables.iter().collect::<Vec<_>>()),
-            place,
-            &settings,
-        )
+        let tables: Vec<&Table> = tables.iter().collect();
+        whole((&dags, &tables), place, &settings)
     });
     parts.collect()
 }
@@ -106,11 +103,8 @@ fn part_of_tables(task_set: &TaskSet, cluster: ClusterId) -> Vec<Table> {
     for (dag, number) in (0..numbers.len()).filter(of_cluster).zip(0..) {
         numbers[dag] = DagId(number);
     }
-    let tables = task_set.tables().iter();
-    let mut tables: Vec<Table> = tables
-        .filter(|table| table.cluster == cluster)
-        .cloned()
-        .collect();
+    let mut tables = task_set.tables().to_vec();
+    tables.retain(|table| table.cluster == cluster);
     for list in tables.iter_mut().flat_map(|table| &mut table.lists) {
         for entry in &mut list.entries {
             entry.dag = numbers[entry.dag.index()];
@@ -251,7 +245,7 @@ impl WitnessText {
     }
 
     fn table(&mut self, dags: &[Dag], table: &Table) {
-        let is_alone = table.dags().len() == 1;
+        let is_alone = table.is_of_one_dag();
         self.line(format_args!("table {}", table.lap_ns));
         for list in &table.lists {
             let entries = list.entries.iter().flat_map(|of| {

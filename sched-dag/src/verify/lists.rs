@@ -20,6 +20,7 @@ use core::ops::Range;
 use super::fault::ListFault;
 use super::label::DagLabel;
 use super::{CommitOptions, VerifyFindings};
+use crate::analysis::greatest_common_divisor;
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::nearest::nearest_of;
 use crate::order::sorted_by_key;
@@ -76,11 +77,9 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
     for text in &options.lists {
         let title = text.split(':').next().unwrap_or(text);
         let list = read(text, specs).and_then(|list| {
-            let is_twice = lists.iter().any(|other| other.core == list.core);
-            if is_twice {
-                Err(ListFault::CoreTwice)
-            } else {
-                Ok(list)
+            match lists.iter().any(|other| other.core == list.core) {
+                true => Err(ListFault::CoreTwice),
+                false => Ok(list),
             }
         });
         match list {
@@ -287,12 +286,9 @@ fn lap_ns(specs: &[&DagSpec], dags: &[usize]) -> Result<Option<u64>, ListFault> 
         let Some(period_ns @ 1..) = spec.period_ns else {
             return Ok(None);
         };
-        let (mut divisor, mut rest) = (lap_ns, period_ns);
-        while rest > 0 {
-            (divisor, rest) = (rest, divisor % rest);
-        }
-        let lap = (lap_ns / divisor).checked_mul(period_ns);
-        let lap = lap.filter(|lap_ns| *lap_ns <= LONGEST_LAP_NS);
+        let (lap, period) = (u128::from(lap_ns), u128::from(period_ns));
+        let lap = u64::try_from(lap / greatest_common_divisor(lap, period) * period);
+        let lap = lap.ok().filter(|lap_ns| *lap_ns <= LONGEST_LAP_NS);
         lap_ns = lap.ok_or(ListFault::LapTooLong { dag })?;
     }
     Ok(Some(lap_ns))
@@ -301,13 +297,10 @@ fn lap_ns(specs: &[&DagSpec], dags: &[usize]) -> Result<Option<u64>, ListFault> 
 /// Returns the cores of a DAG's cluster.
 fn cores_of(options: &CommitOptions, spec: &DagSpec) -> Range<u32> {
     let sizes = options.clusters.sizes();
-    let (before, from_it_on) =
-        sizes.split_at(spec.cluster.unwrap_or_default().index().min(sizes.len()));
+    let cluster = spec.cluster.unwrap_or_default().index();
+    let (before, rest) = sizes.split_at(cluster.min(sizes.len()));
     let first: u32 = before.iter().sum();
-    first
-        ..from_it_on
-            .first()
-            .map_or(options.cores, |size| first + size)
+    first..rest.first().map_or(options.cores, |size| first + size)
 }
 
 /// The jobs of the subtasks of a table's DAGs in a lap.
@@ -328,11 +321,10 @@ impl<'s> LapJobs<'s> {
             is_alone: dags.len() == 1,
             of_dags: vec![vec![]; specs.len()],
         };
-        let of = |&dag: &usize| {
-            jobs.count(dag)
-                .saturating_mul(specs[dag].subtasks.len() as u64)
-        };
-        let count = dags.iter().map(of).fold(0, u64::saturating_add);
+        let count = dags.iter().fold(0, |sum: u64, &dag| {
+            let subtasks = specs[dag].subtasks.len() as u64;
+            sum.saturating_add(jobs.count(dag).saturating_mul(subtasks))
+        });
         if count > MOST_ENTRIES {
             return Err(ListFault::TooManyEntries { count });
         }
@@ -350,12 +342,7 @@ impl<'s> LapJobs<'s> {
 
     /// Makes the next entry of a core.
     fn entry(&mut self, core: u32, of: &StatedEntry) -> Result<TableEntry, ListFault> {
-        let StatedEntry {
-            dag,
-            subtask,
-            depth,
-            ..
-        } = *of;
+        let (dag, subtask) = (of.dag, of.subtask);
         let word = || word(self.specs, dag, subtask);
         let (latest_core, count, taken) = &mut self.of_dags[dag][subtask];
         let jobs = i64::try_from(taken.len()).unwrap_or(0);
@@ -383,7 +370,7 @@ impl<'s> LapJobs<'s> {
             dag: DagId(to_u32(dag)),
             subtask: SubtaskId(to_u32(subtask)),
             job: job + first,
-            depth,
+            depth: of.depth,
             start_ns,
             length_ns,
         })
@@ -407,12 +394,10 @@ impl TaskSet {
     /// Returns the lists of the tables as text, by the numbers of DAGs and subtasks, with their
     /// times where there are any.
     pub fn core_lists(&self) -> Vec<String> {
-        let lists = self
-            .tables()
-            .iter()
-            .flat_map(|table| table.lists.iter().map(move |list| (table, list)));
-        lists
-            .map(|(table, list)| self.list_text(table, list))
+        let of = |table| move |list| self.list_text(table, list);
+        let tables = self.tables().iter();
+        tables
+            .flat_map(|table| table.lists.iter().map(of(table)))
             .collect()
     }
 

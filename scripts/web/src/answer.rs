@@ -11,9 +11,10 @@ use sched_dag::law::{self, Distribution};
 use sched_dag::{Dag, DagId, Instance, Preemption, SubtaskId};
 use views::chains::{self, MeasuredChain};
 use views::json::{Object, quoted};
+use views::planned::{self, Planned};
 use views::record::Committed;
 use views::view::{Slice, View};
-use views::{links, marks, notes, picture, planned};
+use views::{links, marks, notes, picture};
 
 use crate::opened::Opened;
 use crate::request::{Faults, Request};
@@ -212,10 +213,8 @@ fn plan(view: &View<'_>, columns: &mut Columns) {
     let subtask = |of: Instance| before[of.dag.index()] + u64::from(of.subtask.0);
     columns.numbers("plan_subtask", each().map(|of| subtask(of.instance)));
     columns.numbers("plan_core", each().map(|of| of.core.0.into()));
-    columns.bytes(
-        "plan_late",
-        each().map(|of| u8::from(late == Some(of.instance))),
-    );
+    let is_late = |of: &Planned| u8::from(late == Some(of.instance));
+    columns.bytes("plan_late", each().map(is_late));
 }
 
 /// Returns the number of the subtasks of the DAGs before each one.

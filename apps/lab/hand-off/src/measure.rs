@@ -80,12 +80,11 @@ pub(crate) fn in_a_table(
     cores: usize,
 ) -> Result<(), AppError> {
     let subtasks = workload.shape.subtasks();
-    let words = |core| {
-        (core..subtasks)
-            .step_by(cores)
-            .map(|of| format!(" chain.s{of}"))
-    };
-    let lists = (0..cores).map(|core| format!("core {core}:{}", words(core).collect::<String>()));
+    let lists = (0..cores).map(|core| {
+        let words = (core..subtasks).step_by(cores);
+        let words: String = words.map(|of| format!(" chain.s{of}")).collect();
+        format!("core {core}:{words}")
+    });
     let ends = Measured::run_in_order(machine, workload, &lists.collect::<Vec<_>>())?;
     emit_hop(&format!("chain-{subtasks} in a table of {cores}"), &ends);
     Ok(())

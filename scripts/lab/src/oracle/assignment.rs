@@ -29,7 +29,7 @@
 //! ```
 
 use sched_dag::analysis::{CoreOwner, CoreSupply, LendingAnswer, TableTerms, Task, lend};
-use sched_dag::{Table, TableEntry};
+use sched_dag::{CoreList, Table, TableEntry};
 use text::{Line, Lines, Malformed, cases};
 
 use super::FileOracle;
@@ -102,17 +102,8 @@ fn parse_case(
         for kind in ["attempt", "failed"] {
             records.push(record(&lines.expect(kind)?, limit.is_some())?);
         }
-        let kinds = [
-            "table",
-            "list",
-            "bound",
-            "sinkbound",
-            "own",
-            "order",
-            "busy",
-            "guest",
-        ];
-        let kinds = &kinds[if limit.is_some() { 0 } else { 4 }..];
+        let kinds = "table list bound sinkbound own order busy guest".split(' ');
+        let kinds: Vec<_> = kinds.skip(if limit.is_some() { 0 } else { 4 }).collect();
         while let Some(line) = kinds.iter().find_map(|kind| lines.next_if(kind)) {
             records.push(record(&line, limit.is_some())?);
         }
@@ -130,16 +121,8 @@ fn parse_case(
 /// Reads a DAG with its offset, whether it is sporadic or non-preemptive, and deadlines of sinks.
 fn parse_attributes(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
     let header = lines.expect("dag")?;
-    let [
-        period,
-        deadline,
-        offset,
-        kind,
-        keeps,
-        subtasks,
-        edges,
-        sinks,
-    ] = header.fixed()?;
+    let [period, deadline, terms @ ..] = header.fixed::<8>()?;
+    let [offset, kind, keeps, subtasks, edges, sinks] = terms;
     let subtasks = header.at_least_one(subtasks)? as usize;
     let (sinks, offset_ns) = (header.number::<usize>(sinks)?, header.number(offset)?);
     let wcets_ns = lines.expect("wcet")?.numbers(subtasks)?;
@@ -236,17 +219,13 @@ fn records(tasks: &[&Task], answer: &LendingAnswer, has_tables: bool) -> Vec<Str
     let attempt = attempt.map_or("-".to_owned(), |attempt| attempt.to_string());
     let words = answer.failed.iter().flat_map(|(dag, why)| {
         let dag = dag.map_or("-".to_owned(), |dag| dag.to_string());
-        [
-            Some(dag),
-            has_tables.then(|| format!("{why:?}").to_lowercase()),
-        ]
+        let why = has_tables.then(|| format!("{why:?}").to_lowercase());
+        [Some(dag), why]
     });
     // Without tables there are five attempts.
     let words = words.flatten().take(if has_tables { 14 } else { 5 });
-    let mut records = vec![
-        format!("attempt {attempt}"),
-        failed(&words.collect::<Vec<_>>()),
-    ];
+    let words: Vec<String> = words.collect();
+    let mut records = vec![format!("attempt {attempt}"), failed(&words)];
     if let Some(plan) = &answer.plan {
         let mut owners: Vec<&CoreOwner> = plan.owners.iter().collect();
         if plan.attempt as u64 >= 5 {
@@ -263,8 +242,8 @@ fn records(tasks: &[&Task], answer: &LendingAnswer, has_tables: bool) -> Vec<Str
         members.sort_by_key(|((dag, _), _)| *dag);
         for (&(dag, bound_ns), cores) in members {
             let cores = cores.iter().map(|&core| core as i128);
-            let numbers = [dag as i128, bound_ns.into()].into_iter().chain(cores);
-            records.push(shown("guest", &numbers.collect::<Vec<_>>()));
+            let numbers = [bound_ns.into()].into_iter().chain(cores);
+            records.push(counted("guest", dag, numbers));
         }
     }
     records
@@ -273,23 +252,16 @@ fn records(tasks: &[&Task], answer: &LendingAnswer, has_tables: bool) -> Vec<Str
 fn of_owner(owner: &CoreOwner, tasks: &[&Task]) -> Vec<String> {
     let (first, table) = (owner.first_core, &owner.table);
     let (dag, period_ns) = (owner.dags[0], table.lap_ns);
-    let entries = || table.lists.iter().flat_map(|list| &list.entries);
-    let bound_ns = entries()
-        .map(|entry| entry.start_ns + entry.length_ns)
-        .max();
-    let own = [
-        dag as i128,
-        bound_ns.unwrap_or(0).into(),
-        first as i128,
-        owner.cores as i128,
-    ];
+    let finishes_ns = table.entries().map(|of| of.start_ns + of.length_ns);
+    let bound_ns = i128::from(finishes_ns.max().unwrap_or(0));
+    let own = [dag as i128, bound_ns, first as i128, owner.cores as i128];
     let mut records = vec![shown("own", &own)];
     let windows_ns = [period_ns.div_ceil(3), period_ns, period_ns + period_ns / 2];
     for core in first..first + owner.cores {
-        let entries = list(table, core).iter();
-        let starts = entries.flat_map(|of| [of.subtask.0.into(), i128::from(of.start_ns)]);
-        let numbers: Vec<i128> = [core as i128].into_iter().chain(starts).collect();
-        records.push(shown("order", &numbers));
+        let entries = list(table, core).map_or(&[][..], |list| &list.entries);
+        let starts = entries.iter();
+        let starts = starts.flat_map(|of| [of.subtask.0.into(), of.start_ns.into()]);
+        records.push(counted("order", core, starts));
         records.push(busy(table, core, tasks, &windows_ns));
     }
     records
@@ -297,101 +269,82 @@ fn of_owner(owner: &CoreOwner, tasks: &[&Task]) -> Vec<String> {
 
 fn of_family(owner: &CoreOwner, tasks: &[&Task]) -> Vec<String> {
     let (table, lap_ns) = (&owner.table, owner.table.lap_ns);
-    let entries = || table.lists.iter().flat_map(|list| &list.entries);
-    let sizes = [
-        lap_ns.into(),
-        owner.cores as i128,
-        entries().count() as i128,
-        owner.tries.into(),
-    ];
+    let count = table.entries().count();
+    let sizes = [owner.cores as i128, count as i128, owner.tries.into()];
     let dags = owner.dags.iter().map(|&dag| dag as i128);
-    let numbers: Vec<i128> = sizes.into_iter().chain(dags).collect();
-    let mut records = vec![shown("table", &numbers)];
-    let windows_ns = [
-        lap_ns.div_ceil(7),
-        lap_ns.div_ceil(2),
-        lap_ns,
-        lap_ns + lap_ns / 3,
-    ];
+    let sizes = [lap_ns.into()].into_iter().chain(sizes);
+    let mut records = vec![shown("table", &sizes.chain(dags).collect::<Vec<_>>())];
+    let parts_ns = [lap_ns.div_ceil(7), lap_ns.div_ceil(2)];
+    let windows_ns = [parts_ns[0], parts_ns[1], lap_ns, lap_ns + lap_ns / 3];
     // The records count from the grid also where a table counts from the release of its one DAG.
     let is_alone = owner.dags.len() == 1;
-    let grid = |entry: &TableEntry| {
+    let on_grid = |entry: &TableEntry| {
         let task = tasks[entry.dag.index()];
         let offset_ns = task.table_terms().offset_ns.unwrap_or(0);
-        let phase_ns = if is_alone {
-            offset_ns % task.period_ns()
-        } else {
-            0
-        };
-        let first = if is_alone {
-            0
-        } else {
-            i128::from(offset_ns / task.period_ns())
+        let (phase_ns, first) = match is_alone {
+            true => (offset_ns % task.period_ns(), 0),
+            false => (0, offset_ns / task.period_ns()),
         };
         let start_ns = entry.start_ns + phase_ns;
-        let jobs = i128::from(lap_ns / task.period_ns());
-        (
-            start_ns % lap_ns,
-            i128::from(entry.job) + first - i128::from(start_ns / lap_ns) * jobs,
-        )
+        let jobs = i128::from(start_ns / lap_ns * (lap_ns / task.period_ns()));
+        let job = i128::from(entry.job) + i128::from(first) - jobs;
+        (start_ns % lap_ns, job, *entry)
     };
     for core in 0..owner.cores {
-        let mut entries: Vec<_> = list(table, core)
-            .iter()
-            .map(|entry| (grid(entry), entry))
-            .collect();
-        entries.sort_by_key(|((start_ns, _), _)| *start_ns);
-        let entries = entries.into_iter().flat_map(|((start_ns, job), of)| {
+        let entries = list(table, core).map_or(&[][..], |list| &list.entries);
+        let mut entries: Vec<_> = entries.iter().map(on_grid).collect();
+        entries.sort_by_key(|(start_ns, ..)| *start_ns);
+        let entries = entries.into_iter().flat_map(|(start_ns, job, of)| {
             let (dag, subtask, depth) = (of.dag.0.into(), of.subtask.0.into(), of.depth.into());
             let finish_ns = i128::from(start_ns + of.length_ns);
             [dag, job, subtask, start_ns.into(), finish_ns, depth]
         });
-        let numbers: Vec<i128> = [core as i128].into_iter().chain(entries).collect();
-        records.push(shown("list", &numbers));
+        records.push(counted("list", core, entries));
         records.push(busy(table, core, tasks, &windows_ns));
     }
-    let response_ns = |entry: &TableEntry| {
-        let release_ns = tasks[entry.dag.index()].release_in_lap_ns(entry.job, is_alone);
-        i128::from(entry.start_ns + entry.length_ns) - i128::from(release_ns)
+    let bound = |dag: usize, sink: Option<usize>| {
+        let own = table.entries().filter(|of| of.dag.index() == dag);
+        let own = own.filter(|of| sink.is_none_or(|sink| of.subtask.index() == sink));
+        let responses_ns = own.map(|of| {
+            let release_ns = tasks[dag].release_in_lap_ns(of.job, is_alone);
+            i128::from(of.start_ns + of.length_ns) - i128::from(release_ns)
+        });
+        responses_ns.max().unwrap_or(0)
     };
     for &dag in &owner.dags {
-        let own = entries().filter(|entry| entry.dag.index() == dag);
-        let bound_ns = own.map(response_ns).max().unwrap_or(0);
-        records.push(shown("bound", &[dag as i128, bound_ns]));
+        records.push(shown("bound", &[dag as i128, bound(dag, None)]));
     }
     for &dag in &owner.dags {
-        let is_sink = |subtask: &usize| tasks[dag].successors(*subtask).len() == 0;
-        let states = !tasks[dag].table_terms().sink_deadlines_ns.is_empty();
-        for sink in (0..tasks[dag].subtask_count())
-            .filter(|_| states)
-            .filter(is_sink)
-        {
-            let own = entries().filter(|of| (of.dag.index(), of.subtask.index()) == (dag, sink));
-            let bound_ns = own.map(response_ns).max().unwrap_or(0);
-            records.push(shown("sinkbound", &[dag as i128, sink as i128, bound_ns]));
+        let task = tasks[dag];
+        let is_sink = |sink: &usize| task.successors(*sink).len() == 0;
+        if !task.table_terms().sink_deadlines_ns.is_empty() {
+            for sink in (0..task.subtask_count()).filter(is_sink) {
+                let numbers = [dag as i128, sink as i128, bound(dag, Some(sink))];
+                records.push(shown("sinkbound", &numbers));
+            }
         }
     }
     records
 }
 
-fn list(table: &Table, core: usize) -> &[TableEntry] {
-    let list = u32::try_from(core).ok().and_then(|core| table.list(core));
-    list.map_or(&[], |list| &list.entries)
+fn list(table: &Table, core: usize) -> Option<&CoreList> {
+    table.list(u32::try_from(core).ok()?)
 }
 
 fn busy(table: &Table, core: usize, tasks: &[&Task], windows_ns: &[u64]) -> String {
-    let list = u32::try_from(core).ok().and_then(|core| table.list(core));
+    let list = list(table, core);
     let supply = list.map(|list| CoreSupply::of_list(table, list, |dag| tasks[dag.index()], 0));
-    let busy_ns = |&window_ns: &u64| {
-        let busy_ns = supply
-            .as_ref()
-            .map_or(0, |supply| supply.busy_ns(window_ns));
-        [i128::from(window_ns), busy_ns.into()]
+    let busy = |&window_ns: &u64| {
+        let busy_ns = supply.as_ref().map_or(0, |of| of.busy_ns(window_ns));
+        [window_ns.into(), busy_ns.into()]
     };
-    let numbers = [core as i128]
-        .into_iter()
-        .chain(windows_ns.iter().flat_map(busy_ns));
-    shown("busy", &numbers.collect::<Vec<_>>())
+    counted("busy", core, windows_ns.iter().flat_map(busy))
+}
+
+/// Returns a record that begins with a number.
+fn counted(kind: &str, number: usize, others: impl Iterator<Item = i128>) -> String {
+    let numbers = [number as i128].into_iter().chain(others);
+    shown(kind, &numbers.collect::<Vec<_>>())
 }
 
 #[cfg(test)]
