@@ -82,12 +82,6 @@ impl TaskSet {
         let tables = self.tables().iter().map(charged).collect();
         self.set_tables(tables);
     }
-
-    /// Returns the first job of a DAG to be released in lap 0 of its table.
-    pub(crate) fn first_in_lap(&self, table: &Table, dag: DagId) -> i64 {
-        let dag = self.dag(dag);
-        first_in_lap(dag.offset_ns(), dag.period_ns(), table.is_of_one_dag())
-    }
 }
 
 /// Returns the first job to be released in lap 0; the laps of a DAG alone begin with its jobs.

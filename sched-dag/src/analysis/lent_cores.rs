@@ -151,7 +151,9 @@ impl CoreSupply {
     /// Returns how long a core is busy from a time of the lap on, with so much work at once and what
     /// arrives later.
     fn until_idle_ns(&self, arrivals: &[(u64, u64)], origin_ns: u64, open_ns: u64) -> u64 {
-        let mut room_ns = 0;
+        let gain_ns = self.lap_ns - self.work_ns;
+        // At the end of the lap, after all arrivals.
+        let mut room_ns = gain_ns;
         let mut came_ns = 0;
         let mut gaps = Vec::new();
         let first = arrivals.partition_point(|&(ns, _)| ns <= origin_ns);
@@ -163,12 +165,11 @@ impl CoreSupply {
             came_ns += wcet_ns;
         }
         // Each lap without a gap leaves less work to the next by the table's idle time.
-        let gain_ns = self.lap_ns - self.work_ns;
         let laps = open_ns.saturating_sub(room_ns).div_ceil(gain_ns);
         let left_ns = open_ns - laps * gain_ns;
         let is_idle = |&&(after_ns, came_ns): &&(u64, u64)| left_ns + came_ns <= after_ns;
         let gap = gaps.iter().find(is_idle);
-        laps * self.lap_ns + left_ns + gap.map_or(0, |&(_, came_ns)| came_ns)
+        laps * self.lap_ns + left_ns + gap.map_or(came_ns, |&(_, came_ns)| came_ns)
     }
 
     /// Adds the ramps of a window that begins at a time of the lap, for the lap from `full_ns` on.
@@ -471,6 +472,53 @@ mod tests {
                 };
                 let most = (0..period).map(from).max().unwrap().max(later(window));
                 assert_eq!(supply.busy_ns(window), most, "{list:?} {period} {window}");
+            }
+        }
+    }
+
+    #[test]
+    fn busy_time_is_as_defined_where_jobs_outlast_laps_and_are_late() {
+        let mut random = Random::new(7);
+        for _ in 0..200 {
+            let (mut list, mut now) = (vec![], random.index(4) as u64);
+            for _ in 0..=random.index(4) {
+                let (release_ns, wcet_ns) = (random.within(0..=29_u64), random.within(1..=4));
+                list.push(SuppliedEntry {
+                    release_ns: now.cast_signed() - release_ns.cast_signed(),
+                    start_ns: now,
+                    wcet_ns,
+                });
+                now += wcet_ns + random.within(0..=3);
+            }
+            let (lap, late) = (now + random.within(1..=4), random.within(0..=2));
+            let supply = CoreSupply::of(lap, &list, late);
+            // What a core does that never idles with work, from an instant of the lap on.
+            let done = |from: u64, window: u64| {
+                let (from, late) = (from.cast_signed(), late.cast_signed());
+                let (mut left, mut done) = (0, 0);
+                for now in from + late..from + late + window.cast_signed() {
+                    for (of, lap) in list
+                        .iter()
+                        .flat_map(|of| (-9..30).map(move |n| (of, n * lap.cast_signed())))
+                    {
+                        let release = of.release_ns + lap;
+                        let is_open = release <= now && of.start_ns.cast_signed() + lap >= from;
+                        let is_new = release == now;
+                        left += of.wcet_ns
+                            * u64::from(if now == from + late { is_open } else { is_new });
+                    }
+                    done += left.min(1);
+                    left -= left.min(1);
+                }
+                done
+            };
+            for window in [1, 3, lap / 2, lap, lap + 3, 2 * lap + 1, 4 * lap] {
+                let most = (0..lap).map(|from| done(from, window)).max().unwrap();
+                assert_eq!(
+                    supply.busy_ns(window),
+                    most,
+                    "{list:?} {lap} {late} {window}"
+                );
             }
         }
     }

@@ -178,7 +178,13 @@ fn read_entry(word: &str, depth: u32, specs: &[&DagSpec]) -> Result<StatedEntry,
     let is_called =
         |called: &str, number: usize, part: &str| called == part || part.parse() == Ok(number);
     let mut found = Vec::new();
-    for (dot, _) in name.match_indices('.') {
+    // Two numbers are no names, or a record could not be read where names are numbers.
+    let numbers = name.split_once('.').and_then(|(dag, subtask)| {
+        let (dag, subtask) = (dag.parse().ok()?, subtask.parse().ok()?);
+        (subtask < specs.get::<usize>(dag)?.subtasks.len()).then_some((dag, subtask))
+    });
+    found.extend(numbers);
+    for (dot, _) in name.match_indices('.').filter(|_| numbers.is_none()) {
         for (dag, spec) in specs.iter().enumerate() {
             if is_called(&spec.name, dag, &name[..dot]) {
                 let subtasks = spec.subtasks.iter().enumerate();
@@ -404,9 +410,10 @@ impl TaskSet {
     fn list_text(&self, table: &Table, list: &CoreList) -> String {
         let core = self.cores_of(table.cluster, 0).start + list.core;
         let mut text = format!("core {core}:");
-        let mut depth = 0;
+        let (mut depth, is_alone) = (0, table.dags().len() == 1);
         for entry in &list.entries {
-            let job = entry.job - self.first_in_lap(table, entry.dag);
+            let dag = self.dag(entry.dag);
+            let job = entry.job - first_in_lap(dag.offset_ns(), dag.period_ns(), is_alone);
             let parenthesis = if entry.depth > depth { " (" } else { " )" };
             text += &parenthesis.repeat(depth.abs_diff(entry.depth) as usize);
             depth = entry.depth;
@@ -462,6 +469,16 @@ mod tests {
         let timed = "core 1: 0.0#0@0+2 0.1#0@2+3 1.0#0@5+8 ( 0.0#1@10+2 ) 0.1#1@13+3";
         assert_eq!(lists(&dags(), &[stated]).unwrap(), [timed]);
         assert_eq!(lists(&dags(), &[timed]).unwrap(), [timed]);
+        let mut named_by_numbers = dags();
+        (named_by_numbers[0].name, named_by_numbers[1].name) = ("1".into(), "0".into());
+        named_by_numbers[0].subtasks[1].name = "0".into();
+        assert_eq!(lists(&named_by_numbers, &[timed]).unwrap(), [timed]);
+        // A time without an end is none.
+        let mut endless = dags();
+        (endless[0].relative_deadline_ns, endless[0].in_flight) = (Some(1 << 63), Some(9));
+        endless[0].subtasks[0].wcet_ns = Some(1 << 62);
+        let untimed = lists(&endless, &["core 0: sense.read sense.steer"]).unwrap();
+        assert_eq!(untimed, ["core 0: 0.0#0 0.1#0"]);
         // From its second job on, `log` is released 5 ns after `sense`, whose jobs come first.
         let mut late = dags();
         late[1].offset_ns = 25;

@@ -56,13 +56,15 @@ pub fn entries(view: &View<'_>) -> Vec<Planned> {
                     true => i128::from(view.release_ns(dag, job)) - i128::from(entry.job) * lap_ns,
                     false => ahead / jobs * lap_ns,
                 };
-                let from_ns = u64::try_from(from_ns).unwrap_or(0) + entry.start_ns;
+                // Stated by hand, or in a record, times may be of any size.
+                let from_ns = u64::try_from(from_ns).unwrap_or(0);
+                let from_ns = from_ns.saturating_add(entry.start_ns);
                 all.push(Planned {
                     core,
                     instance: Instance::new(dag, job, subtask),
                     depth: entry.depth,
                     from_ns,
-                    to_ns: from_ns + entry.length_ns,
+                    to_ns: from_ns.saturating_add(entry.length_ns),
                 });
             }
         }
