@@ -96,9 +96,11 @@ fn not_proven_is_accepted_and_says_why() {
 
 #[test]
 fn a_demanded_proof_that_is_missing_refuses_the_commit() {
-    let _machine = VirtualTime::new().policy(Policy::Edf);
+    // Where cores are divided, no table is made for a proof.
+    let _machine = VirtualTime::new().policy(Policy::Edf).clusters(&[1]);
     let [late, busy] = late_and_busy();
-    busy.demand_proof();
+    late.cluster(0);
+    busy.cluster(0).demand_proof();
     let both = [late.clone(), busy];
     // Of `late` nothing is demanded.
     assert_eq!(codes(&both), ["not_proven"]);
@@ -106,7 +108,7 @@ fn a_demanded_proof_that_is_missing_refuses_the_commit() {
     assert_eq!(codes(&both), ["not_proven"; 2]);
     // Other faults come before that question.
     let none = chain("none", 0, [10, 4], [3, 3]);
-    none.demand_proof().jobs(0);
+    none.demand_proof().cluster(0).jobs(0);
     assert_eq!(codes(&[none]), ["zero_jobs"]);
     // The handles are as they were: alone it is proven.
     let commit = finish_create_dags(&[late]).expect("nothing delays it");
@@ -210,7 +212,7 @@ fn the_commit_divides_the_cores_and_says_why() {
         [
             "in cluster 1, on 1 core from core 2 on: the first with room for it, with 30 % of them \
              left (attempt 1, by density)",
-            "in cluster 0, on 2 cores from core 0 on: its own in a fixed order, as a job is 12ms of \
+            "in cluster 0, on 2 cores from core 0 on: its own by a table, as a job is 12ms of \
              work within 10ms, with 15 % of them left (attempt 1, by density)",
             "in cluster 0, on 1 core from core 1 on: the first with room for it, with 10 % of them \
              left (attempt 1, by density)",

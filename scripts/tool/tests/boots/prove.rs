@@ -53,10 +53,7 @@ fn the_example_of_lent_cores_is_proven_as_its_page_says() {
     let options = "--cores 2 --clusters auto --mode deterministic";
     let called = prove("lent", options, &[("lent.dag", lent)]);
     assert_eq!(called.code, Some(0), "{}{}", called.out, called.complaint);
-    for test in [
-        "an order of its own on each core",
-        "what owners leave of its cores",
-    ] {
+    for test in ["its entries in a table", "what tables leave of its cores"] {
         assert!(called.out.contains(test), "{}", called.out);
     }
 }
