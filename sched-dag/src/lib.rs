@@ -148,7 +148,7 @@ pub use spec::{
     DagSpec, LatestSpec, LockUse, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,
     TopicPort, Wait,
 };
-pub use table::{CoreList, Table, TableEntry};
+pub use table::{CoreList, ENTRY_LIMIT, Table, TableEntry};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{

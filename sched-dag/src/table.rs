@@ -31,6 +31,9 @@ use alloc::vec::Vec;
 use crate::ids::{ClusterId, DagId, SubtaskId};
 use crate::order::sorted;
 
+/// The most entries of a table.
+pub const ENTRY_LIMIT: usize = 1 << 12;
+
 /// The lists of some cores of one cluster, which run the same DAGs.
 ///
 /// Every subtask of these DAGs has one entry for each job in a lap. No DAG is in two tables, and

@@ -32,7 +32,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::case::of_cluster;
-use super::lending::{ENTRY_LIMIT, LendingAnswer, LendingPlan, LendingTerms, late_and_limit_ns};
+use super::lending::{LendingAnswer, LendingPlan, LendingTerms, late_and_limit_ns};
 use super::list_schedule::ListSchedule;
 use super::multi_path::multi_path;
 use super::ratio::{Ratio, sort_largest_first};
@@ -42,7 +42,7 @@ use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, answer};
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::{AssignmentReason, AttemptFailure, Preemption};
-use crate::table::Table;
+use crate::table::{ENTRY_LIMIT, Table};
 use crate::task_set::TaskSet;
 use crate::worded::texts;
 

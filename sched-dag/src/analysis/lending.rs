@@ -213,10 +213,7 @@ impl LendingPlan {
     }
 }
 
-/// The most entries in a lap of the table of several DAGs that a commit makes.
-pub const ENTRY_LIMIT: usize = 4096;
-
-/// What divisions depend on besides the DAGs.
+/// The terms of a division besides the DAGs.
 pub(super) struct LendingTerms<'b> {
     pub(super) bursts: &'b WorkloadBursts,
     /// The most entries in a lap; 0: there may be no table of several DAGs.
@@ -226,7 +223,7 @@ pub(super) struct LendingTerms<'b> {
 }
 
 /// Divides cores among DAGs by the analysis of tables in `docs/bounds.md`; a table of several DAGs
-/// has a number of entries at most ([`ENTRY_LIMIT`] where a commit makes it).
+/// has a number of entries at most ([`ENTRY_LIMIT`](crate::ENTRY_LIMIT) where a commit makes it).
 ///
 /// `None` if it does not apply: there is no core, or a subtask waits.
 #[must_use]

@@ -109,7 +109,7 @@ pub use cover::{covers, parallelism, width};
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
-pub use lending::{CoreOwner, ENTRY_LIMIT, LendingAnswer, LendingPlan, LentGroup, lend};
+pub use lending::{CoreOwner, LendingAnswer, LendingPlan, LentGroup, lend};
 pub use lent_cores::CoreSupply;
 pub use list_schedule::{ListSchedule, ScheduledSubtask};
 pub use multi_path::multi_path;

@@ -43,7 +43,7 @@ pub struct TableFault {
     pub subtask: SubtaskId,
     /// Its job in the first lap.
     pub job: i64,
-    /// What fails.
+    /// The condition that fails.
     pub condition: TableCondition,
 }
 

@@ -47,7 +47,7 @@ pub(super) struct TableFamily<'a> {
     entries: Vec<FamilyEntry>,
     /// By DAG, where its entries begin, and by subtask its place in the topological order.
     places: Vec<(usize, Vec<usize>)>,
-    /// What may still be looked at.
+    /// The looks that are left.
     work_left: u64,
 }
 
@@ -428,11 +428,11 @@ struct Lap {
 
 struct LapCore {
     held_until_ns: i64,
-    /// What has begun and not finished.
+    /// The entries that have begun and not finished.
     stack: Vec<usize>,
     /// All that has begun, in that order.
     begun: Vec<usize>,
-    /// What has ended last.
+    /// The entry that ended last.
     last: Option<usize>,
 }
 

@@ -148,7 +148,7 @@ impl Scheduler {
     /// Gives a core to the innermost entry that has begun there.
     #[inline]
     pub(super) fn give_to_entry(&mut self, core: CoreId, entry: u32) -> Decision {
-        self.cores.run(core, ENTRY, false);
+        self.cores.run(core, DispatchKey::ENTRY, false);
         let vertex = self.vertices.get_mut(entry);
         Decision::new(vertex.run(core), core, vertex.present_instance())
     }
@@ -384,9 +384,6 @@ pub(super) struct CoreTable {
     occupations: Box<[CoreOccupancy]>,
     idle: Vec<CoreId>,
 }
-
-/// Stands for the key of the innermost entry that has begun on a core.
-pub(super) const ENTRY: DispatchKey = DispatchKey::of_rank(0, u32::MAX - 1);
 
 #[derive(Clone, Copy, Debug, Hash)]
 struct CoreOccupancy {

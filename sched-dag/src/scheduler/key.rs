@@ -44,6 +44,8 @@ pub(super) struct DispatchKey(u128);
 impl DispatchKey {
     /// Stands where there is no key; it is larger than any.
     pub(super) const NONE: Self = Self(u128::MAX);
+    /// Stands for the key of the innermost entry that has begun on a core.
+    pub(super) const ENTRY: Self = Self::of_rank(0, u32::MAX - 1);
 
     /// Makes the key of a vertex under the order `Rank`.
     #[inline]

@@ -32,7 +32,6 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::bits::BitSet;
-use super::dispatch::ENTRY;
 use super::vertices::InstancePhase;
 use super::{OWED, Scheduler};
 use crate::ids::{ClusterId, CoreId, DagId, Instance, to_u32};
@@ -326,7 +325,7 @@ impl Scheduler {
             match (running, self.cores.running(core)) {
                 (Some(running), _) if running == entry => continue,
                 (Some(running), Some(key)) => {
-                    let key = match key == ENTRY {
+                    let key = match key == DispatchKey::ENTRY {
                         true => DispatchKey::of_rank(0, running),
                         false => key,
                     };
@@ -345,7 +344,7 @@ impl Scheduler {
     #[inline]
     pub(super) fn runs(&self, core: CoreId) -> Option<u32> {
         let key = self.cores.running(core)?;
-        match key == ENTRY {
+        match key == DispatchKey::ENTRY {
             true => self.ready.lists.innermost(core),
             false => Some(key.vertex()),
         }
@@ -366,7 +365,7 @@ impl Scheduler {
         let list = lists.lists.get_mut(core.index())?;
         lists.touched.remove(core.index());
         let is_here = |vertex: &u32| vertices.get(*vertex).phase == InstancePhase::Running(core);
-        let member = cores.running(core).filter(|key| *key != ENTRY);
+        let member = cores.running(core).filter(|key| *key != DispatchKey::ENTRY);
         let member = member.map(DispatchKey::vertex).filter(is_here);
         let mut top = (list.open > 0).then_some(list.innermost).or(member);
         let mut passed = 0;

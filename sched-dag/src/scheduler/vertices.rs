@@ -72,7 +72,7 @@ impl LineId {
     }
 }
 
-/// What has to be done at the end of an instance.
+/// The work at the end of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum EndKind {
     /// Anything.

@@ -13,10 +13,10 @@ use super::label::{
     DagLabel, SubtaskLabel, counted_from_0, list, members, ns, one_up_to, own_input, question,
     ring, undivided,
 };
-use super::lists::MOST_ENTRIES;
 use crate::ids::ClusterId;
 use crate::policy::Priority;
 use crate::spec::{MOST_WAITS, STACK_BYTES};
+use crate::table::ENTRY_LIMIT;
 use crate::worded::texts;
 use crate::{MAX_ARITY, worded};
 
@@ -345,7 +345,7 @@ texts! {
              long; choose periods on a grid";
         /// A lap has too many entries.
         TooManyEntries { count: u64 } =
-            "a lap of its DAGs has {count} entries, more than {MOST_ENTRIES}; choose periods on a \
+            "a lap of its DAGs has {count} entries, more than {ENTRY_LIMIT}; choose periods on a \
              grid";
         /// An entry is of no job of the lap.
         UnknownJob { word: String, job: i64, jobs: i64 } =

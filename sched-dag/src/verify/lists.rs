@@ -26,12 +26,9 @@ use crate::nearest::nearest_of;
 use crate::order::sorted_by_key;
 use crate::policy::Activation;
 use crate::spec::DagSpec;
-use crate::table::{CoreList, Table, TableEntry};
+use crate::table::{CoreList, ENTRY_LIMIT, Table, TableEntry};
 use crate::table_times::first_in_lap;
 use crate::task_set::TaskSet;
-
-/// The most entries of a table.
-pub(super) const MOST_ENTRIES: u64 = 1 << 12;
 
 /// The longest lap, 9 years: some laps are run to find times.
 const LONGEST_LAP_NS: u64 = 1 << 58;
@@ -331,7 +328,7 @@ impl<'s> LapJobs<'s> {
             let subtasks = specs[dag].subtasks.len() as u64;
             sum.saturating_add(jobs.count(dag).saturating_mul(subtasks))
         });
-        if count > MOST_ENTRIES {
+        if count > ENTRY_LIMIT as u64 {
             return Err(ListFault::TooManyEntries { count });
         }
         for &dag in dags {

@@ -61,7 +61,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     }
 }
 
-/// What a core's table leaves, or why that is not known.
+/// The supply that a core's table leaves, or the reason for none.
 type Supply = Result<CoreSupply, NotProvenReason>;
 
 /// Returns that by core, where members need it.
