@@ -18,7 +18,7 @@
 //! Assumes `D <= T`; `V` is the volume, `L` the length.
 
 use sched_dag::analysis::{
-    ENTRY_LIMIT, InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path,
+    InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path,
     multi_path_fp,
 };
 
