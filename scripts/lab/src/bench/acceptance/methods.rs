@@ -18,8 +18,7 @@
 //! Assumes `D <= T`; `V` is the volume, `L` the length.
 
 use sched_dag::analysis::{
-    InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path,
-    multi_path_fp,
+    InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path, multi_path_fp,
 };
 
 /// A test of whether DAGs with `D <= T` can be executed on a number of cores.
@@ -78,7 +77,11 @@ fn by_tables(tasks: &[&Task], cores: u32) -> bool {
     };
     let periodic = |task: &&Task| (*task).clone().with_table_terms(terms.clone());
     let periodic: Vec<Task> = tasks.iter().map(periodic).collect();
-    let answer = lend(&periodic.iter().collect::<Vec<_>>(), cores, ENTRY_LIMIT);
+    let answer = lend(
+        &periodic.iter().collect::<Vec<_>>(),
+        cores,
+        sched_dag::ENTRY_LIMIT,
+    );
     answer.is_some_and(|answer| answer.plan.is_some())
 }
 
