@@ -112,8 +112,63 @@ policies! {
 
 #[cfg(test)]
 mod tests {
-    use super::Policy;
-    use crate::{CommitOptions, DagSpec, SubtaskSpec, verify};
+    use alloc::sync::Arc;
+    use alloc::vec::Vec;
+
+    use super::{Policy, SchedulerOptions};
+    use crate::virtual_time::{ExecutionTimes, VirtualTime};
+    use crate::{
+        CommitOptions, ConstructionPolicy, DagId, DagSpec, Preemption, SubtaskSpec, verify,
+    };
+
+    /// Makes a DAG of one job with these WCETs.
+    pub(super) fn dag(deadline_ns: u64, wcets_ns: &[u64], edges: &[(usize, usize)]) -> DagSpec {
+        let subtask = |&wcet_ns: &u64| SubtaskSpec {
+            wcet_ns: Some(wcet_ns),
+            ..SubtaskSpec::default()
+        };
+        DagSpec {
+            period_ns: Some(deadline_ns),
+            relative_deadline_ns: Some(deadline_ns),
+            jobs: Some(1),
+            subtasks: wcets_ns.iter().map(subtask).collect(),
+            edges: edges.to_vec(),
+            ..DagSpec::default()
+        }
+    }
+
+    /// Runs a job of each DAG on two cores, released together, with WCETs. Returns the last finish, and
+    /// the DAGs that are late.
+    pub(super) fn run(word: &str, specs: &[DagSpec]) -> (u64, Vec<u32>) {
+        let policy = Policy::of_word(word).unwrap();
+        let options = CommitOptions::new(policy, 2);
+        let options = options.with_construction(ConstructionPolicy::any_graph());
+        let task_set = Arc::new(verify(specs, &options).unwrap().task_set);
+        let options = SchedulerOptions {
+            policy,
+            preemption: Preemption::Enabled,
+            cores: 2,
+        };
+        let mut run = VirtualTime::new(&task_set, options);
+        let wcets = |of: crate::Instance| task_set.dag(of.dag).subtask(of.subtask).wcet_ns();
+        let _ = run.run(&mut ExecutionTimes(|of| wcets(of).unwrap()));
+        let dags = (0..).take(specs.len()).filter(|&dag| {
+            let dag = DagId(dag);
+            run.scheduler_of(dag).statistics(dag).misses > 0
+        });
+        (run.now_ns(), dags.collect())
+    }
+
+    #[test]
+    fn the_least_slack_saves_a_path_that_deadlines_start_late() {
+        let specs = [
+            dag(9, &[2], &[]),
+            dag(9, &[2], &[]),
+            dag(10, &[1, 9], &[(0, 1)]),
+        ];
+        assert_eq!(run("edf", &specs), (12, alloc::vec![2]));
+        assert_eq!(run("slack", &specs), (10, alloc::vec![]));
+    }
 
     #[test]
     fn each_policy_is_that_of_its_word_and_numbers_each_subtask() {
