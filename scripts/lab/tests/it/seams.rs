@@ -1,10 +1,10 @@
-//! The kinds of change that CONTRIBUTING shows: the diffs of all apply to one copy of the tree, and
-//! their tests pass there.
+//! The changes that pages show: all diffs apply to one copy of the tree, and their tests pass there.
 //!
-//! A diff in `tests/seams` is an example of its kind, with tests on the host called `shown_...`.
+//! A diff is an example, with tests on the host called `shown_...`: in `tests/seams` of each kind of
+//! change, in `docs/policy-lab` of policies, which stand upon the example of a policy.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use tool::system;
@@ -20,44 +20,55 @@ const PROFILE: [&str; 4] = [
     "package.recording.opt-level=0",
 ];
 
+/// The folders of diffs in the order of application, each with its page, and the most lines of a diff.
+const FOLDERS: [(&str, &str, usize); 2] = [
+    ("tests/seams", "CONTRIBUTING.md", usize::MAX),
+    ("docs/policy-lab", "docs/policy-lab.md", 60),
+];
+
 /// The beginning of the names of the diffs' tests.
 const SHOWN: &str = "shown_";
 
 #[test]
-fn each_kind_of_change_that_contributing_shows_applies_and_works() {
+fn each_change_that_a_page_shows_applies_and_works() {
     let folder = system::workspace().join("target/seams");
     let tree = folder.join("tree");
     copy(system::workspace(), &tree);
-    let page = fs::read_to_string(tree.join("CONTRIBUTING.md")).expect("the page");
     let mut expected = Vec::new();
-    for diff in fs::read_dir(tree.join("tests/seams")).expect("the diffs") {
-        let path = diff.expect("a diff").path();
-        let name = format!(
-            "tests/seams/{}",
-            path.file_name().expect("a name").display()
-        );
-        let is_shown = page.contains(&format!("({name})"));
-        assert!(is_shown, "no row of CONTRIBUTING.md shows {name}; add one");
-        // The copy is no part of the repository around it, in which nothing is to change.
-        let mut git = Command::new("git");
-        git.args(["apply", "-C1"]).arg(&path);
-        git.env("GIT_CEILING_DIRECTORIES", &folder);
-        if let Err(why) = output(git.current_dir(&tree)) {
-            panic!(
-                "{name} does not apply any more; make its change by hand, see that it is still as \
-                 short as CONTRIBUTING.md says, and write it anew by `git diff -U1`:\n{why}"
+    for (diffs, page, most_lines) in FOLDERS {
+        let shown = fs::read_to_string(tree.join(page)).expect("the page");
+        let entries = fs::read_dir(tree.join(diffs)).expect("the diffs");
+        let paths = entries.map(|entry| entry.expect("a diff").path());
+        let mut paths: Vec<PathBuf> = paths.collect();
+        paths.sort();
+        for path in paths {
+            let file = path.file_name().expect("a name").display().to_string();
+            let is_shown = shown.contains(&format!("/{file})"));
+            assert!(is_shown, "{page} does not show {diffs}/{file}; add it");
+            // The copy is no part of the repository around it, in which nothing is to change.
+            let mut git = Command::new("git");
+            git.args(["apply", "-C1"]).arg(&path);
+            git.env("GIT_CEILING_DIRECTORIES", &folder);
+            if let Err(why) = output(git.current_dir(&tree)) {
+                panic!(
+                    "{diffs}/{file} does not apply any more; make its change by hand, see that it \
+                     is still as short as {page} says, and write it anew by `git diff -U1`:\n{why}"
+                );
+            }
+            let diff = fs::read_to_string(&path).expect("a text");
+            let count = diff.lines().count();
+            assert!(count <= most_lines, "{diffs}/{file} has {count} lines");
+            let lines = diff.lines().filter(|line| line.starts_with('+'));
+            let tests = lines.filter_map(|line| line.split_once("fn ")?.1.strip_suffix("() {"));
+            let tests = tests.filter(|test| test.starts_with(SHOWN));
+            let tests: Vec<String> = tests.map(String::from).collect();
+            let has_test = !tests.is_empty();
+            assert!(
+                has_test,
+                "{diffs}/{file} has no test called {SHOWN}..; add one"
             );
+            expected.extend(tests);
         }
-        let diff = fs::read_to_string(&path).expect("a text");
-        let lines = diff.lines().filter(|line| line.starts_with('+'));
-        let tests = lines.filter_map(|line| line.split_once("fn ")?.1.strip_suffix("() {"));
-        let tests = tests.filter(|test| test.starts_with(SHOWN));
-        let tests: Vec<String> = tests.map(String::from).collect();
-        assert!(
-            !tests.is_empty(),
-            "{name} has no test called {SHOWN}..; add one"
-        );
-        expected.extend(tests);
     }
     let said: String = TESTS.map(|words| run(words, &tree)).concat();
     for test in expected {
