@@ -8,7 +8,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::acceptance::{self, SetFile};
+use super::acceptance::{self, Generator, SetFile};
 use super::frame::by_plan;
 use tool::files;
 use tool::options::{Command, Parsed, Takes, options};
@@ -24,10 +24,11 @@ static COMMAND: Command = Command {
     )),
     options: OPTIONS,
     notes: "\
-A set has as many DAGs as cores, but 8 at least. Methods: graham, federated scheduling; multi_path,
+A set has as many DAGs as cores, but 8 at least; by `melani` 8, by `small` 4. Methods: graham, federated scheduling; multi_path,
 the same by the multi-path bound, or global deadline-monotonic priorities; v_fed, virtually-federated
-scheduling; lent, heavy DAGs with tables that lend their idle time; table, that and one table for
-several DAGs; fluid, a density test. The last one is of a scheduler that no machine has.
+scheduling, v_fed_p, the same with a parallelism stated of each DAG; lent, heavy DAGs with tables that lend their idle time; table, that and one table for
+several DAGs; fluid, a density test of a scheduler that no machine has; unrefuted, no
+DAG is late in one run under global EDF.
 
 Exit code: 0 counted; 1 no file can be written; 2 the command line or a file is refused.
 ",
@@ -36,6 +37,9 @@ Exit code: 0 counted; 1 no file can be written; 2 the command line or a file is 
 options! {
     /// The numbers of cores.
     CORES: Takes::Numbers(1, 64), or "4,8,16";
+    /// The kind of random sets: ours, ours with periods on a grid, Melani's graphs, or small ones of
+    /// these.
+    FROM: Takes::OneOf(Generator::WORDS), or "ours";
     /// Random sets for each number of cores, utilization and kind of deadlines.
     SETS: Takes::Number(1, 1_000_000), or "200";
     /// The seed of all random sets.
@@ -47,6 +51,7 @@ options! {
 /// The plan of a measurement.
 struct BoundsPlan {
     files: Vec<SetFile>,
+    generator: Generator,
     cores: Vec<u32>,
     sets: u64,
     seed: u64,
@@ -58,12 +63,16 @@ impl BoundsPlan {
         options.check_distinct(&[name::CORES])?;
         if options.files().len() > 0 {
             let why = "is for random sets; leave it or the files out";
-            options.check_without(&[name::CORES, name::SETS, name::SEED, name::OUT], why)?;
+            options.check_without(
+                &[name::FROM, name::CORES, name::SETS, name::SEED, name::OUT],
+                why,
+            )?;
         }
         files::check_once(options.files())?;
         (options.named(&[name::OUT]).iter()).try_for_each(files::check_folder)?;
         Ok(Self {
             files: (options.files().map(SetFile::read)).collect::<Result<_, _>>()?,
+            generator: Generator::of_word(options.text(name::FROM).unwrap_or_default()),
             cores: options.numbers(name::CORES),
             sets: options.number(name::SETS).unwrap_or_default(),
             seed: options.number(name::SEED).unwrap_or_default(),
@@ -81,7 +90,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 fn measure(plan: &BoundsPlan) -> Result<bool, String> {
     let BoundsPlan { files, out, .. } = plan;
     if files.is_empty() {
-        let table = acceptance::measure(&plan.cores, plan.sets, plan.seed, out)?;
+        let table = acceptance::measure((plan.generator, &plan.cores), plan.sets, plan.seed, out)?;
         print!("{table}");
         println!("written: {}", out.display());
     } else {

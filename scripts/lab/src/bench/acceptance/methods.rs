@@ -12,14 +12,30 @@
 //!
 //! V-Fed and fluid stand here for comparison only: no scheduler of this project does what they
 //! assume. They were written after another implementation, and agree with the worked examples that
-//! its tests quote from the papers. V-Fed is the form without a DAG's maximum parallelism. Sums of
-//! fractions are floating-point numbers, so a set that a test accepts with equality may be refused.
+//! its tests quote from the papers. V-Fed stands in both forms: in the second one a heavy DAG never
+//! executes on more of its cores than a *parallelism*, drawn for each DAG by a hash, as the paper
+//! draws it, from half its cores to all. Sums of fractions are floating-point numbers, so a set that a
+//! test accepts with equality may be refused.
+//! - *unrefuted*: no test: all DAGs released together meet their deadlines in a run under global EDF
+//!   on all cores. No test of global EDF can accept more.
 //!
 //! Assumes `D <= T`; `V` is the volume, `L` the length.
 
+use std::rc::Rc;
+use std::sync::Arc;
+
+use random::{Random, nth};
 use sched_dag::analysis::{
     InterferenceBound, ListSchedule, TableTerms, Task, federated, lend, multi_path, multi_path_fp,
 };
+
+use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, Preemption,
+    SchedulerOptions, SubtaskSpec, verify,
+};
+
+use super::sets::edges;
 
 /// A test of whether DAGs with `D <= T` can be executed on a number of cores.
 pub(super) struct Method {
@@ -32,7 +48,7 @@ pub(super) struct Method {
 }
 
 /// The methods, in the order of columns, curves and legend.
-pub(super) const METHODS: [Method; 6] = [
+pub(super) const METHODS: [Method; 8] = [
     Method {
         name: "graham",
         title: "federated, Graham's bound",
@@ -46,7 +62,12 @@ pub(super) const METHODS: [Method; 6] = [
     Method {
         name: "v_fed",
         title: "virtually-federated",
-        accepts: virtually_federated,
+        accepts: |tasks, cores| virtually_federated(tasks, cores, |_| u64::MAX),
+    },
+    Method {
+        name: "v_fed_p",
+        title: "the same, parallelism stated",
+        accepts: |tasks, cores| virtually_federated(tasks, cores, parallelism),
     },
     Method {
         name: "lent",
@@ -63,7 +84,15 @@ pub(super) const METHODS: [Method; 6] = [
         title: "fluid",
         accepts: fluid,
     },
+    Method {
+        name: "unrefuted",
+        title: "global EDF, not refuted by a run",
+        accepts: is_unrefuted,
+    },
 ];
+
+/// The length of a run that may refute a set.
+const LONGEST_PERIODS: u64 = 10;
 
 const fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.relative_deadline_ns()
@@ -102,9 +131,9 @@ fn by_multi_path(tasks: &[&Task], cores: u32) -> bool {
         || multi_path_fp(&by_deadline, cores, InterferenceBound::Waiting).is_some()
 }
 
-/// A core's time that the budget of its owner leaves: a *passive virtual processor*.
+/// The budget of a DAG on a core.
 #[derive(Clone, Copy)]
-struct PassiveProcessor {
+struct CoreBudget {
     /// The most that the owner executes of one job.
     budget_ns: u64,
     /// The owner's.
@@ -113,9 +142,9 @@ struct PassiveProcessor {
     deadline_ns: u64,
 }
 
-impl PassiveProcessor {
-    /// Returns the least time supplied in any window of a length. The worst one begins as the owner
-    /// does, so late that it ends at its deadline.
+impl CoreBudget {
+    /// Returns the least time that it leaves in any window of a length. The worst one begins as the
+    /// owner does, so late that it ends at its deadline.
     fn supply_ns(self, window_ns: u64) -> u64 {
         let Some(after_ns) = window_ns.checked_sub(self.budget_ns) else {
             return 0;
@@ -128,6 +157,33 @@ impl PassiveProcessor {
     }
 }
 
+/// The time that budgets leave: a *passive virtual processor*.
+#[derive(Clone)]
+enum PassiveProcessor {
+    /// Of a core with a budget.
+    Left(CoreBudget),
+    /// Of a core that its owner does not need beside as many others as its parallelism.
+    Whole,
+    /// An equal part of the cores of an owner, for as many processors as its parallelism.
+    Shared(Rc<[CoreBudget]>, u64),
+}
+
+impl PassiveProcessor {
+    /// Returns the least time supplied in any window of a length.
+    fn supply_ns(&self, window_ns: u64) -> u64 {
+        match self {
+            Self::Left(budget) => budget.supply_ns(window_ns),
+            Self::Whole => window_ns,
+            Self::Shared(budgets, parallelism) => {
+                let left = budgets.iter().map(|of| of.supply_ns(window_ns));
+                // The other processors are whole cores.
+                let whole = window_ns * (budgets.len() as u64 - parallelism);
+                left.sum::<u64>().saturating_sub(whole) / parallelism
+            }
+        }
+    }
+}
+
 /// Takes processors for a DAG, the first that are of use, until `V <= base + sum of (supply - L)`;
 /// at least one. If they are too few, none is taken.
 fn takes(pool: &mut Vec<PassiveProcessor>, task: &Task, base_ns: u64) -> bool {
@@ -135,10 +191,10 @@ fn takes(pool: &mut Vec<PassiveProcessor>, task: &Task, base_ns: u64) -> bool {
     let mut have_ns = u128::from(base_ns);
     let mut left = Vec::new();
     let mut is_enough = false;
-    for &processor in &*pool {
+    for processor in &*pool {
         let gain_ns = processor.supply_ns(deadline_ns).saturating_sub(length_ns);
         if is_enough || gain_ns == 0 {
-            left.push(processor);
+            left.push(processor.clone());
         } else {
             have_ns += u128::from(gain_ns);
             is_enough = have_ns >= task.volume_ns().into();
@@ -150,8 +206,16 @@ fn takes(pool: &mut Vec<PassiveProcessor>, task: &Task, base_ns: u64) -> bool {
     is_enough
 }
 
+/// Returns a heavy DAG's parallelism: of the cores that it needs by federated scheduling half to all.
+fn parallelism(task: &Task) -> u64 {
+    let (volume_ns, length_ns) = (task.volume_ns(), task.length_ns());
+    let cores = (volume_ns - length_ns).div_ceil(task.relative_deadline_ns() - length_ns);
+    let seed = nth(nth(volume_ns, task.period_ns()), length_ns);
+    Random::new(seed).within(cores.div_ceil(2)..=cores)
+}
+
 /// Divides cores by virtually-federated scheduling, with the fewest for heavy DAGs that do.
-fn virtually_federated(tasks: &[&Task], cores: u32) -> bool {
+fn virtually_federated(tasks: &[&Task], cores: u32, most: fn(&Task) -> u64) -> bool {
     let (mut heavy, mut light): (Vec<&Task>, Vec<&Task>) =
         tasks.iter().partition(|task| is_heavy(task));
     if heavy
@@ -169,7 +233,8 @@ fn virtually_federated(tasks: &[&Task], cores: u32) -> bool {
         product(other, one).cmp(&product(one, other))
     });
     let least = u32::from(!heavy.is_empty());
-    let found = (least..=cores).find_map(|count| Some((count, own_processors(&heavy, count)?)));
+    let found =
+        (least..=cores).find_map(|count| Some((count, own_processors(&heavy, count, most)?)));
     let Some((count, mut pool)) = found else {
         return false;
     };
@@ -178,8 +243,12 @@ fn virtually_federated(tasks: &[&Task], cores: u32) -> bool {
 }
 
 /// Gives heavy DAGs budgets on cores, and to those for which these are too few what others' budgets
-/// leave. Returns the passive processors that nobody has taken.
-fn own_processors(heavy: &[&Task], cores: u32) -> Option<Vec<PassiveProcessor>> {
+/// leave. Returns the passive processors that nobody has taken; `most` is the parallelism of a DAG.
+fn own_processors(
+    heavy: &[&Task],
+    cores: u32,
+    most: fn(&Task) -> u64,
+) -> Option<Vec<PassiveProcessor>> {
     let mut left = u64::from(cores);
     let mut pool = Vec::new();
     let mut tasks = heavy.iter();
@@ -188,8 +257,9 @@ fn own_processors(heavy: &[&Task], cores: u32) -> Option<Vec<PassiveProcessor>> 
         let slack_ns = deadline_ns - task.length_ns();
         // The first core is the DAG's until the deadline, the others as long as its path may wait.
         let (mut budget_ns, mut unserved_ns) = (deadline_ns, volume_ns);
+        let mut budgets = Vec::new();
         while left > 0 && unserved_ns > 0 {
-            pool.push(PassiveProcessor {
+            budgets.push(CoreBudget {
                 budget_ns: budget_ns.min(unserved_ns),
                 period_ns: task.period_ns(),
                 deadline_ns,
@@ -197,6 +267,15 @@ fn own_processors(heavy: &[&Task], cores: u32) -> Option<Vec<PassiveProcessor>> 
             left -= 1;
             unserved_ns = unserved_ns.saturating_sub(budget_ns);
             budget_ns = slack_ns;
+        }
+        let parallelism = most(task);
+        let whole = (budgets.len() as u64).saturating_sub(parallelism);
+        if whole == 0 {
+            pool.extend(budgets.into_iter().map(PassiveProcessor::Left));
+        } else {
+            pool.extend((0..whole).map(|_| PassiveProcessor::Whole));
+            let shared = PassiveProcessor::Shared(budgets.into(), parallelism);
+            pool.extend((0..parallelism).map(|_| shared.clone()));
         }
         if unserved_ns > 0 {
             // The cores are spent: this one has some, those after it none.
@@ -230,6 +309,46 @@ fn are_partitioned(mut light: Vec<&Task>, cores: u32) -> bool {
         *base += volume - of_task * deadline;
         true
     })
+}
+
+/// Reports whether no DAG is late in a run of some of the longest periods under global EDF, with
+/// WCETs, all released at once.
+fn is_unrefuted(tasks: &[&Task], cores: u32) -> bool {
+    let specs: Vec<DagSpec> = tasks.iter().map(|task| spec(task)).collect();
+    let policy = Policy::Edf;
+    let options = CommitOptions::new(policy, cores);
+    let options = options.with_construction(ConstructionPolicy::any_graph());
+    // A WCET is beyond its deadline.
+    let Ok(verified) = verify(&specs, &options) else {
+        return false;
+    };
+    let task_set = Arc::new(verified.task_set);
+    let options = SchedulerOptions {
+        policy,
+        preemption: Preemption::Enabled,
+        cores,
+    };
+    let mut run = VirtualTime::new(&task_set, options);
+    let longest_ns = tasks.iter().map(|task| task.period_ns()).max().unwrap_or(0);
+    let wcet_ns = |of: Instance| tasks[of.dag.index()].wcets_ns()[of.subtask.index()];
+    let _ = run.run_until(LONGEST_PERIODS * longest_ns, &mut ExecutionTimes(wcet_ns));
+    let mut dags = (0..).map(DagId).take(tasks.len());
+    dags.all(|dag| run.scheduler_of(dag).statistics(dag).misses == 0)
+}
+
+/// Returns a DAG as a commit states it.
+pub(super) fn spec(task: &Task) -> DagSpec {
+    let subtask = |&wcet_ns: &u64| SubtaskSpec {
+        wcet_ns: Some(wcet_ns),
+        ..SubtaskSpec::default()
+    };
+    DagSpec {
+        period_ns: Some(task.period_ns()),
+        relative_deadline_ns: Some(task.relative_deadline_ns()),
+        subtasks: task.wcets_ns().iter().map(subtask).collect(),
+        edges: edges(task),
+        ..DagSpec::default()
+    }
 }
 
 /// Sums up the densities that DAGs have if each segment of them gets a constant share of the cores.
@@ -299,7 +418,7 @@ mod tests {
 
     #[test]
     fn a_passive_processor_supplies_what_the_papers_figure_shows() {
-        let of = |budget_ns| PassiveProcessor {
+        let of = |budget_ns| CoreBudget {
             budget_ns,
             period_ns: 8,
             deadline_ns: 7,
@@ -313,6 +432,10 @@ mod tests {
         assert_eq!(curve(2), [0, 0, 0, 1, 1, 1, 2, 3, 4]);
         // From then on, each period repeats.
         assert_eq!(of(2).supply_ns(2 + 8 + 5), 6 + 3);
+        // Two of three cores never need the third one: 3 times 4, less 8, is shared by two.
+        let shared = PassiveProcessor::Shared([of(2); 3].into(), 2);
+        assert_eq!([7, 8].map(|ns| shared.supply_ns(ns)), [(3 * 3 - 7) / 2, 2]);
+        assert_eq!(PassiveProcessor::Whole.supply_ns(8), 8);
     }
 
     #[test]
@@ -328,16 +451,20 @@ mod tests {
         ];
         let heavy: Vec<&Task> = tasks[..3].iter().collect();
         let free = |cores| {
-            let pool = own_processors(&heavy, cores)?;
-            Some(pool.iter().map(|of| of.budget_ns).collect::<Vec<_>>())
+            let pool = own_processors(&heavy, cores, |_| u64::MAX)?;
+            let budget_ns = |of: &PassiveProcessor| match of {
+                PassiveProcessor::Left(budget) => budget.budget_ns,
+                _ => 0,
+            };
+            Some(pool.iter().map(budget_ns).collect::<Vec<_>>())
         };
         assert_eq!(free(5), None);
         assert_eq!(free(6), Some(vec![8, 1, 8]));
         assert_eq!(free(7), Some(vec![8, 1, 1, 8, 2]));
-        assert!(by(virtually_federated, &tasks, 7));
-        assert!(!by(virtually_federated, &tasks, 6));
+        assert!(by(METHODS[2].accepts, &tasks, 7));
+        assert!(!by(METHODS[2].accepts, &tasks, 6));
         let from_the_end: Vec<Task> = tasks.iter().rev().cloned().collect();
-        assert!(by(virtually_federated, &from_the_end, 7));
+        assert!(by(METHODS[2].accepts, &from_the_end, 7));
         // Federated scheduling needs 5, 2 and 2 cores for the heavy ones alone.
         assert!(!by(METHODS[0].accepts, &tasks, 9));
     }
@@ -348,13 +475,13 @@ mod tests {
         // and with a period of 16 still 6.25, and with WCETs of 3 it is 5.5.
         for (period, wcet, fits) in [(8, 4, false), (16, 4, false), (8, 3, true)] {
             let tasks = [dag(2, 2, period, 4), dag(wcet, wcet, 20, 6)];
-            assert_eq!(by(virtually_federated, &tasks, 1), fits, "{period} {wcet}");
-            assert!(by(virtually_federated, &tasks, 2));
+            assert_eq!(by(METHODS[2].accepts, &tasks, 1), fits, "{period} {wcet}");
+            assert!(by(METHODS[2].accepts, &tasks, 2));
         }
         // The third goes to the second on the fuller core, and leaves the first room for the last.
         let of = |volume, period| dag(volume, volume, period, period);
         let tasks = [of(3, 10), of(8, 11), of(2, 12), of(8, 13)];
-        assert!(by(virtually_federated, &tasks, 2));
+        assert!(by(METHODS[2].accepts, &tasks, 2));
     }
 
     #[test]
@@ -362,8 +489,8 @@ mod tests {
         // Budgets of 40 and 2: the second leaves 36 of 40 to the 35, and the third core has 4 + 30.
         let of = |volume| dag(volume, volume, 40, 40);
         let tasks = [dag(42, 20, 40, 40), of(4), of(35), of(30)];
-        assert!(by(virtually_federated, &tasks, 3));
-        assert!(!by(virtually_federated, &tasks, 2));
+        assert!(by(METHODS[2].accepts, &tasks, 3));
+        assert!(!by(METHODS[2].accepts, &tasks, 2));
     }
 
     #[test]
@@ -398,29 +525,41 @@ mod tests {
             // On two cores the lists of 4, 3 and 4 leave what the light DAG needs if they are
             // squeezed, and a budget of 10 and 1 leaves it, too. With three cores the heavy one gets
             // two, the light one the third.
-            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0, 0]),
-            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1, 1]),
-            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1, 1]),
+            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0, 0, 0, 0]),
+            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1, 1, 1, 1]),
+            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1, 1, 1, 1]),
             // Two paths of 9 leave a core for the 3: Graham's bound counts one path, and needs
             // ceil(12 / 3) cores.
-            (vec![free(20, 12, vec![9, 9, 3])], 2, [0, 1, 0, 1, 1, 1]),
-            (vec![free(20, 12, vec![9, 9, 3])], 4, [1, 1, 1, 1, 1, 1]),
+            (
+                vec![free(20, 12, vec![9, 9, 3])],
+                2,
+                [0, 1, 0, 0, 1, 1, 1, 1],
+            ),
+            (
+                vec![free(20, 12, vec![9, 9, 3])],
+                4,
+                [1, 1, 1, 1, 1, 1, 1, 1],
+            ),
             // Only an order of the subtasks is done by 7: 3, 2 and 2 next to 3 and 2.
             (
                 vec![free(20, 7, vec![3, 3, 2, 2, 2])],
                 2,
-                [0, 0, 0, 1, 1, 1],
+                [0, 0, 0, 0, 1, 1, 1, 1],
             ),
             (
                 vec![free(20, 7, vec![3, 3, 2, 2, 2])],
                 3,
-                [1, 1, 1, 1, 1, 1],
+                [1, 1, 1, 1, 1, 1, 1, 1],
             ),
             // Two of three light ones would be on one core, with 12 in 10; side by side on both the
             // third has 1 + ceil((5 + 12) / 2) = 10.
-            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 1, 1, 1]),
+            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 0, 1, 1, 1, 1]),
             // The volume of four is 24 in 10, more than two cores do.
-            (vec![wide(), wide(), wide(), wide()], 2, [0, 0, 0, 0, 0, 0]),
+            (
+                vec![wide(), wide(), wide(), wide()],
+                2,
+                [0, 0, 0, 0, 0, 0, 0, 0],
+            ),
         ] {
             let of: Vec<&Task> = tasks.iter().collect();
             let accepted = METHODS.map(|method| u8::from((method.accepts)(&of, cores)));

@@ -8,6 +8,7 @@
 //! - here: points, and what is written of them;
 //! - `methods`: the methods; `sets`: how sets are drawn; `picture`: the curves.
 
+mod melani;
 mod methods;
 mod picture;
 mod sets;
@@ -22,6 +23,7 @@ use sched_dag::analysis::Task;
 use crate::oracle;
 use crate::oracle::assignment::{self, AssignmentCase};
 use methods::METHODS;
+pub(super) use sets::Generator;
 use sets::{Deadlines, draw};
 use tool::files;
 use tool::output::Table;
@@ -71,12 +73,17 @@ struct Point {
 /// # Errors
 ///
 /// In words: a file cannot be written.
-pub(super) fn measure(cores: &[u32], sets: u64, seed: u64, out: &Path) -> Result<String, String> {
+pub(super) fn measure(
+    (generator, cores): (Generator, &[u32]),
+    sets: u64,
+    seed: u64,
+    out: &Path,
+) -> Result<String, String> {
     let mut points = points(cores);
     let mut progress = Progress::new(points.len() as u64, "points");
     for (done, point) in (0..).zip(&mut points) {
         progress.show(done);
-        point.count(sets, seed);
+        point.count(generator, sets, seed);
     }
     progress.wipe();
     files::write(&out.join("acceptance.csv"), csv(&points))?;
@@ -103,11 +110,17 @@ fn points(cores: &[u32]) -> Vec<Point> {
 impl Point {
     /// Draws sets and counts them. They depend on the seed and on the kind of the point, not on what
     /// other points there are.
-    fn count(&mut self, sets: u64, seed: u64) {
+    fn count(&mut self, generator: Generator, sets: u64, seed: u64) {
         let kind = u64::from(self.cores) << 16 | self.percent << 8 | self.deadlines as u64;
         let mut random = Random::new(nth(seed, kind));
         for _ in 0..sets {
-            let set = draw(&mut random, self.cores, self.percent, self.deadlines);
+            let set = draw(
+                &mut random,
+                generator,
+                self.cores,
+                self.percent,
+                self.deadlines,
+            );
             self.counts.add(&set, self.cores);
         }
     }
@@ -198,18 +211,17 @@ mod tests {
     use super::*;
     use sched_dag::analysis::{AnalysisSettings, Overheads, answer, assign};
     use sched_dag::{
-        AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption,
-        SubtaskSpec, verify,
+        AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, verify,
     };
 
-    const LENT: usize = 3;
+    const LENT: usize = 4;
 
     /// Points of 2 and 4 cores with counts of their own, of 200 sets.
     fn counted() -> Vec<Point> {
         let mut points = points(&[2, 4]);
         for (nth, point) in (0..).zip(&mut points) {
             point.counts.sets = 200;
-            point.counts.accepted = [nth, 2 * nth, 100, 200 - nth, 150, 200];
+            point.counts.accepted = [nth, 2 * nth, 100, 120, 200 - nth, 150, 200, 190];
         }
         points
     }
@@ -219,22 +231,22 @@ mod tests {
         let points = counted();
         let (text, table) = (csv(&points), table(&points));
         let (lines, rows): (Vec<_>, Vec<_>) = (text.lines().collect(), table.lines().collect());
-        let header = "cores,deadlines,utilization,sets,graham,multi_path,v_fed,lent,table,fluid";
+        let header = "cores,deadlines,utilization,sets,graham,multi_path,v_fed,v_fed_p,lent,table,fluid,unrefuted";
         assert_eq!(
             (lines[0], lines.len(), rows.len()),
             (header, 1 + 64, 2 + 64)
         );
-        assert_eq!(lines[1], "2,implicit,0.20,200,0,0,100,200,150,200");
+        assert_eq!(lines[1], "2,implicit,0.20,200,0,0,100,120,200,150,200,190");
         assert_eq!(
             lines[1 + 17],
-            "2,constrained,0.25,200,17,34,100,183,150,200"
+            "2,constrained,0.25,200,17,34,100,120,183,150,200,190"
         );
         assert_eq!(
             lines[1 + 63],
-            "4,constrained,0.95,200,63,126,100,137,150,200"
+            "4,constrained,0.95,200,63,126,100,120,137,150,200,190"
         );
         let cells: Vec<&str> = rows[2 + 17].split_whitespace().collect();
-        let expected = "2 constrained 0.25 8.5 17.0 50.0 91.5 75.0 100.0";
+        let expected = "2 constrained 0.25 8.5 17.0 50.0 60.0 91.5 75.0 100.0 95.0";
         assert_eq!(cells.join(" "), expected);
     }
 
@@ -273,8 +285,8 @@ mod tests {
         assert_eq!(ends(curves[1]), [[left, y(0)], [right, y(15)]]);
         assert_eq!(ends(curves[3]), [[left, y(100)], [right, y(100)]]);
         // Then come the constrained ones of 2 cores, below, and those of 4 cores, on the right.
-        let below = ends(curves[METHODS.len() + 5]);
-        let beside = ends(curves[2 * METHODS.len() + 5]);
+        let below = ends(curves[METHODS.len() + 6]);
+        let beside = ends(curves[2 * METHODS.len() + 6]);
         assert_eq!(
             below,
             [[left, top], [right, top]].map(|[x, y]| [x, y + picture::STEP.1])
@@ -291,8 +303,8 @@ mod tests {
             let [implicit, constrained] = &mut points[..] else {
                 panic!("{points:?}");
             };
-            implicit.count(6, seed);
-            constrained.count(6, seed);
+            implicit.count(Generator::Ours, 6, seed);
+            constrained.count(Generator::Ours, 6, seed);
             [implicit.counts, constrained.counts]
         };
         assert_eq!(drawn(&[2, 4], 80, 1), drawn(&[4], 80, 1));
@@ -307,20 +319,7 @@ mod tests {
 
     /// Returns whether a commit divides cores by lending them, and proves all DAGs.
     fn is_committed(tasks: &[Task], cores: u32) -> bool {
-        let spec = |(number, task): (usize, &Task)| DagSpec {
-            name: format!("dag {number}"),
-            period_ns: Some(task.period_ns()),
-            relative_deadline_ns: Some(task.relative_deadline_ns()),
-            subtasks: (task.wcets_ns().iter())
-                .map(|&wcet_ns| SubtaskSpec {
-                    wcet_ns: Some(wcet_ns),
-                    ..SubtaskSpec::default()
-                })
-                .collect(),
-            edges: sets::edges(task),
-            ..DagSpec::default()
-        };
-        let specs: Vec<DagSpec> = tasks.iter().enumerate().map(spec).collect();
+        let specs: Vec<DagSpec> = tasks.iter().map(methods::spec).collect();
         let policy = Policy::StaticPriority;
         let options = CommitOptions::new(policy, cores);
         let options = options.with_construction(ConstructionPolicy::any_graph());

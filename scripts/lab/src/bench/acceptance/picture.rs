@@ -14,7 +14,7 @@ pub(super) const FIELD: (u64, u64) = (224, 180);
 /// The distance of the left upper corners of two panels.
 pub(super) const STEP: (u64, u64) = (286, 252);
 /// The corner of the first field, right of the labels and below the legend.
-pub(super) const CORNER: (u64, u64) = (64, 108);
+pub(super) const CORNER: (u64, u64) = (64, 128);
 /// The utilizations, in percent, at the ends of a field.
 const ENDS: (u64, u64) = (PERCENTS.start, 100);
 
@@ -23,12 +23,14 @@ const STYLES: [&str; METHODS.len()] = [
     "stroke=\"#7f7f7f\" stroke-width=\"1.6\" stroke-dasharray=\"2 3\"",
     "stroke=\"#0072b2\" stroke-width=\"1.8\" stroke-dasharray=\"7 3\"",
     "stroke=\"#b5179e\" stroke-width=\"1.8\" stroke-dasharray=\"8 3 2 3\"",
+    "stroke=\"#b5179e\" stroke-width=\"1.3\"",
     "stroke=\"#f08c2e\" stroke-width=\"4\"",
     "stroke=\"#2a9d3a\" stroke-width=\"1.8\"",
     "stroke=\"#1b1b1b\" stroke-width=\"1.3\"",
+    "stroke=\"#7f7f7f\" stroke-width=\"1.3\" stroke-dasharray=\"9 4\"",
 ];
 /// The curve that lies below the others.
-const LOWEST: usize = 3;
+const LOWEST: usize = 4;
 
 /// Draws points, which are in the order of their cores, deadlines and utilizations.
 pub(super) fn draw(points: &[Point]) -> String {
@@ -49,7 +51,7 @@ pub(super) fn draw(points: &[Point]) -> String {
     svg.into_text((width, CORNER.1 + rows * STEP.1 - 16))
 }
 
-/// Draws the name of each method next to a piece of its curve, in two rows.
+/// Draws the name of each method next to a piece of its curve, in three rows.
 fn legend(svg: &mut Svg) {
     for (place, (method, style)) in (0..).zip(METHODS.iter().zip(STYLES)) {
         let (x, y) = (CORNER.0 + place % 3 * 270, 44 + place / 3 * 20);

@@ -2,15 +2,63 @@
 //!
 //! A graph is a fork-join of 2 to 8 branches, or 3 to 5 layers of 1 to 5 subtasks with an edge to and
 //! from each, or one of 6 to 18 subtasks with 15 % of the edges that there can be. WCETs are
-//! multiples of 10 up to 1,000. The DAGs of a set share its utilization so that each division is as
-//! likely as any other, as UUniFast does (E. Bini, G. Buttazzo, Real-Time Systems 30, 2005); sets in
-//! which a DAG would need more than its volume over its longest path are thrown away.
+//! multiples of 10 up to 1,000. Others' graphs are drawn by [`melani`]. The DAGs of a set share its
+//! utilization so that each division is as likely as any other, as UUniFast does (E. Bini, G. Buttazzo,
+//! Real-Time Systems 30, 2005); sets in which a DAG would need more than its volume over its longest
+//! path are thrown away.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 use random::Random;
 use sched_dag::analysis::Task;
+
+use super::melani;
+
+/// The kind of random sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::bench) enum Generator {
+    /// Graphs of ours, and periods that follow from shares of the utilization.
+    Ours,
+    /// The same, with periods on a grid, and WCETs in proportion.
+    Grid,
+    /// Eight of Melani's graphs, of up to 8 branches, three deep.
+    Melani,
+    /// Four of them, of up to 4 branches, two deep: sets as large as other implementations take.
+    Small,
+}
+
+impl Generator {
+    /// The words of the kinds.
+    pub(in crate::bench) const WORDS: &[&str] = &["ours", "grid", "melani", "small"];
+    const ALL: [Self; 4] = [Self::Ours, Self::Grid, Self::Melani, Self::Small];
+
+    /// Returns the kind of a word; ours, if there is none.
+    pub(in crate::bench) fn of_word(word: &str) -> Self {
+        let place = Self::WORDS.iter().position(|known| *known == word);
+        Self::ALL[place.unwrap_or(0)]
+    }
+
+    /// Returns the number of DAGs of a set.
+    fn dags(self, cores: u32) -> u32 {
+        match self {
+            Self::Ours | Self::Grid => cores.max(8),
+            Self::Melani => 8,
+            Self::Small => 4,
+        }
+    }
+
+    fn graph(self, random: &mut Random) -> Task {
+        match self {
+            Self::Ours | Self::Grid => graph(random),
+            Self::Melani => melani::graph(random, 8, 3),
+            Self::Small => melani::graph(random, 4, 2),
+        }
+    }
+}
+
+/// The grid of periods, in microseconds: of a robot's rates.
+const GRID: [u64; 6] = [5_000, 10_000, 20_000, 40_000, 50_000, 100_000];
 
 /// How deadlines relate to periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,17 +87,19 @@ const PARTS: u64 = 1 << 32;
 /// How many divisions of the utilization are tried before other graphs are drawn.
 const TRIES: u32 = 300;
 
-/// Draws a set for some cores: as many DAGs as cores, but 8 at least, with a utilization of
-/// `percent` of the cores, below 100.
+/// Draws a set for some cores, with a utilization of `percent` of the cores, below 100.
 pub(super) fn draw(
     random: &mut Random,
+    generator: Generator,
     cores: u32,
     percent: u64,
     deadlines: Deadlines,
 ) -> Vec<Task> {
     let whole = PARTS * u64::from(cores) * percent / 100;
     loop {
-        let graphs: Vec<Task> = (0..cores.max(8)).map(|_| graph(random)).collect();
+        let graphs: Vec<Task> = (0..generator.dags(cores))
+            .map(|_| generator.graph(random))
+            .collect();
         for _ in 0..TRIES {
             // The distances of random points are uniform among all that have this sum.
             let points = (1..graphs.len()).map(|_| random.within(0..=whole));
@@ -58,7 +108,10 @@ pub(super) fn draw(
             points.sort_unstable();
             let shares = points.windows(2).map(|pair| pair[1] - pair[0]);
             let dags = graphs.iter().zip(shares);
-            let timed = dags.map(|(graph, share)| timed(random, graph, share, deadlines));
+            let timed = dags.map(|(graph, share)| match generator {
+                Generator::Grid => on_grid(random, graph, share, deadlines),
+                _ => timed(random, graph, share, deadlines),
+            });
             if let Some(set) = timed.collect() {
                 return set;
             }
@@ -75,7 +128,25 @@ fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) ->
         return None;
     }
     let period = u64::try_from(work.div_ceil(share.into())).ok()?;
+    due(random, graph, period, deadlines)
+}
+
+/// Gives a graph a period of the grid, and WCETs by which it uses a share of a core at most.
+fn on_grid(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
+    let period = random.one_of(&GRID);
+    let work = u128::from(share) * u128::from(period) / u128::from(PARTS);
+    let scaled = |&wcet: &u64| u128::from(wcet) * work / u128::from(graph.volume_ns());
+    let wcets = graph.wcets_ns().iter().map(scaled);
+    let wcets = wcets.map(|wcet| u64::try_from(wcet).ok().map(|ns| ns.max(1)));
+    let scaled = Task::new(period, period, wcets.collect::<Option<_>>()?, &edges(graph)).ok()?;
+    due(random, &scaled, period, deadlines)
+}
+
+/// Gives a graph a period and a deadline; `None` if its longest path is beyond the period.
+fn due(random: &mut Random, graph: &Task, period: u64, deadlines: Deadlines) -> Option<Task> {
+    let length = graph.length_ns();
     let deadline = match deadlines {
+        _ if length > period => return None,
         Deadlines::Implicit => period,
         Deadlines::Constrained => random.within(length..=period),
     };
@@ -136,17 +207,23 @@ mod tests {
         let mut random = Random::new(36);
         for (cores, percent) in [(1, 50), (4, 95), (16, 70)] {
             for deadlines in Deadlines::ALL {
-                let set = draw(&mut random, cores, percent, deadlines);
-                assert_eq!(set.len(), cores.max(8) as usize);
-                let utilization = |task: &Task| task.volume_ns() as f64 / task.period_ns() as f64;
-                let sum: f64 = set.iter().map(utilization).sum();
-                let expected = f64::from(cores) * percent as f64 / 100.0;
-                // Periods are rounded up.
-                assert!(sum <= expected && sum > 0.99 * expected, "{sum} {expected}");
-                for task in set {
-                    let (period, deadline) = (task.period_ns(), task.relative_deadline_ns());
-                    assert!(task.length_ns() <= deadline && deadline <= period);
-                    assert!(deadlines == Deadlines::Constrained || deadline == period);
+                // Four small DAGs cannot use many cores.
+                let can = |kind: &Generator| *kind != Generator::Small || cores <= 4;
+                for kind in Generator::ALL.into_iter().filter(can) {
+                    let set = draw(&mut random, kind, cores, percent, deadlines);
+                    assert_eq!(set.len(), kind.dags(cores) as usize);
+                    let utilization =
+                        |task: &Task| task.volume_ns() as f64 / task.period_ns() as f64;
+                    let sum: f64 = set.iter().map(utilization).sum();
+                    let expected = f64::from(cores) * percent as f64 / 100.0;
+                    // Periods are rounded up; on a grid WCETs are rounded down, but not to 0.
+                    let is_near = (0.97 * expected..=1.001 * expected).contains(&sum);
+                    assert!(is_near, "{kind:?} {sum} {expected}");
+                    for task in set {
+                        let (period, deadline) = (task.period_ns(), task.relative_deadline_ns());
+                        assert!(task.length_ns() <= deadline && deadline <= period);
+                        assert!(deadlines == Deadlines::Constrained || deadline == period);
+                    }
                 }
             }
         }
