@@ -60,12 +60,13 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Returns the next record, or `None` at the end of the file.
+    /// Returns the next record, or `None` at the end of the file. A line that begins with `#` is a
+    /// remark.
     pub fn next_line(&mut self) -> Option<Line<'a>> {
         for (index, text) in self.rest.by_ref() {
             self.last = index + 1;
             let mut words = text.split_whitespace();
-            if let Some(kind) = words.next() {
+            if let Some(kind) = words.next().filter(|kind| !kind.starts_with('#')) {
                 return Some(Line {
                     number: index + 1,
                     kind,

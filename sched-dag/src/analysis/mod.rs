@@ -28,6 +28,7 @@
 //! | `list_schedule` | orders of a DAG on some cores | Graham 1969 |
 //! | `lending`, `lent_cores` | tables of DAGs, and what these leave to others | derived here |
 //! | `table_making`, `table_check` | tables of several DAGs; whether a table keeps its times | derived here |
+//! | `abstraction`, `explore` | the schedule-abstraction graph of periodic DAGs that keep cores; its search | Nasri, Nelissen, Brandenburg 2019 |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -67,10 +68,12 @@
 //!   evidence, not on a reviewed proof. The multi-path bound, waits and tables are proven in
 //!   `docs/bounds.md`.
 
+mod abstraction;
 mod assign;
 mod blocking;
 mod case;
 mod cover;
+mod explore;
 mod features;
 mod interference;
 mod intra_task;
@@ -104,8 +107,13 @@ use crate::policies::{Policy, SchedulerOptions};
 use crate::policy::Preemption;
 use crate::worded::texts;
 
+pub use abstraction::{
+    AbstractState, AbstractionDag, AbstractionSet, AbstractionSubtask, INSTANCE_LIMIT, NotClosed,
+    check_closed,
+};
 pub use assign::{AssignmentFailure, FailedAttempts, Federation, NotAssigned, assign, federated};
 pub use cover::{covers, parallelism, width};
+pub use explore::{STATE_LIMIT, explore};
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;

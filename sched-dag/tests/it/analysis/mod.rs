@@ -3,6 +3,7 @@
 //! [`together`] holds bounds of random sets with all features against virtual time. The other tests
 //! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
+mod abstraction;
 mod climb;
 mod forged;
 mod one_core;

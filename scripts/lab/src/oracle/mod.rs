@@ -7,6 +7,7 @@
 //!
 //! - [`assignment`]: cores that are owned and lent;
 //! - [`bounds`]: the analysis at commit;
+//! - `graph`: closed lists of a schedule-abstraction graph;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline;
@@ -17,6 +18,7 @@
 pub mod assignment;
 pub mod bounds;
 mod case;
+mod graph;
 pub mod in_kernel;
 pub(crate) mod older_bounds;
 mod responses;
@@ -47,6 +49,8 @@ static ORACLE: Menu = Menu {
             |words| assignment::ORACLE.run(words);
         "bounds": "lengths, widths, response-time bounds and verdicts",
             |words| bounds::ORACLE.run(words);
+        "graph": "schedule-abstraction graphs: verdicts, and bounds of sinks",
+            |words| graph::ORACLE.run(words);
         "responses": "random accepted sets in virtual time, with overheads, against their bounds",
             responses::command;
         "schedules": "starts, finishes, preemptions, response times and misses",

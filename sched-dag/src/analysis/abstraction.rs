@@ -1,0 +1,540 @@
+//! The schedule-abstraction graph of periodic DAGs whose subtasks keep their cores.
+//!
+//! M. Nasri, B. Brandenburg, RTSS 2017; M. Nasri, G. Nelissen, B. Brandenburg, ECRTS 2018 and 2019.
+//! Here for the scheduler's own rules (R2, R5, completions and releases before a dispatch, executions
+//! down to 0), and for a schedule without an end.
+//!
+//! A *state* stands for all runs in which the same instances have been dispatched: for each core an
+//! interval in which the core becomes free, and one for the finish of each dispatched instance that
+//! matters still. Each run that is in a state and dispatches an instance next finds that instance
+//! *eligible* there, starts it within an interval, and is in the successor (`transitions`). So a
+//! list of states is *closed* if it includes the initial state and, with each state, all successors.
+//! Every run of any length stays in a closed list, and the latest finishes seen there bound all
+//! responses.
+//!
+//! [`explore()`](super::explore()) looks for such a list; [`check_closed`] checks a list in one
+//! pass, and trusts nothing of the search.
+//!
+//! Assumes: each DAG is periodic, all jobs are released, each within the jitter after its nominal
+//! release; no instance loses its core or waits; nothing else executes. *Fewer* jobs than stated are a
+//! different set: the bounds do not hold beside pauses, modes, or the end of one DAG. No release waits for
+//! room in flight: the bound and the jitter of a DAG are at most its limit of jobs times the period.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::ratio::greatest_common_divisor;
+use crate::order::{sort, sorted};
+
+/// The largest time of a set, in nanoseconds: 13 days; sums of a few stay far below an `i64`.
+const MOST_NS: u64 = 1 << 50;
+
+/// The latest time and the latest release of a state; far from where sums overflow.
+const LATEST_NS: i64 = 1 << 53;
+
+/// The most instances of a hyperperiod.
+pub const INSTANCE_LIMIT: u64 = 1 << 12;
+
+/// A DAG whose subtasks keep their cores.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AbstractionDag {
+    /// The period in nanoseconds, at least 1.
+    pub period_ns: u64,
+    /// The first nominal release.
+    pub offset_ns: u64,
+    /// The longest time from a nominal release to the release, below the period.
+    pub jitter_ns: u64,
+    /// The subtasks.
+    pub subtasks: Vec<AbstractionSubtask>,
+    /// The edges.
+    pub edges: Vec<(usize, usize)>,
+}
+
+/// A subtask that keeps its core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AbstractionSubtask {
+    /// The shortest execution; at most the longest.
+    pub best_ns: u64,
+    /// The longest execution, at least 1.
+    pub wcet_ns: u64,
+    /// The number of the policy; the smaller one goes first.
+    pub number: u64,
+    /// The relative deadline; of a subtask that is no sink `None`.
+    pub deadline_ns: Option<u64>,
+}
+
+/// The reason for a set without a closed list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotClosed {
+    /// A sink may finish after its deadline, as far as states tell: no proof of a miss.
+    Late {
+        /// The DAG.
+        dag: usize,
+        /// The sink.
+        subtask: usize,
+    },
+    /// No core, no period, a WCET of 0 or below the shortest execution, a jitter as long as the period,
+    /// edges in a circle or to no subtask, or a sink without a deadline.
+    NotCovered,
+    /// More states than the limit, or a hyperperiod of too many instances or too long.
+    Limit,
+    /// A listed state is none of this set: of other numbers of subtasks or cores, out of order, or
+    /// beyond all times.
+    Malformed {
+        /// The state.
+        state: usize,
+    },
+    /// The list does not include a state that a run may reach.
+    Open {
+        /// The state with that successor; `None`: the initial state.
+        state: Option<usize>,
+    },
+}
+
+/// A set of DAGs on the cores of one cluster, ready to be explored.
+#[derive(Clone, Debug)]
+pub struct AbstractionSet {
+    pub(super) cores: usize,
+    adds_release: bool,
+    /// Whether executions are real numbers, as on a machine; else they are whole nanoseconds.
+    is_real: bool,
+    hyperperiod_ns: i64,
+    /// By DAG: period, offset, jitter, jobs in a hyperperiod.
+    dags: Vec<[i64; 4]>,
+    /// DAG by DAG.
+    vertices: Vec<AbstractVertex>,
+}
+
+#[derive(Clone, Debug)]
+struct AbstractVertex {
+    dag: usize,
+    subtask: usize,
+    terms: AbstractionSubtask,
+    predecessors: Vec<usize>,
+    successors: Vec<usize>,
+}
+
+/// The finish of an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct FinishInterval {
+    pub(super) vertex: usize,
+    pub(super) job: i64,
+    pub(super) low_ns: i64,
+    pub(super) high_ns: i64,
+}
+
+/// A state, in normal form where it is in a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AbstractState {
+    /// By vertex, the number of dispatched jobs.
+    pub(super) counts: Vec<i64>,
+    /// The earliest and the latest times at which cores become free, each sorted.
+    pub(super) free_ns: [Vec<i64>; 2],
+    /// Ascending by vertex and job.
+    pub(super) finishes: Vec<FinishInterval>,
+}
+
+impl AbstractState {
+    /// Returns numbers for [`AbstractionSet::state`]: the counts, the earliest and the latest times
+    /// of cores, and four numbers of each finish.
+    pub fn numbers(&self) -> Vec<i64> {
+        let mut numbers = self.counts.clone();
+        self.free_ns.iter().for_each(|times| numbers.extend(times));
+        for of in &self.finishes {
+            let vertex = i64::try_from(of.vertex).unwrap_or(i64::MAX);
+            numbers.extend([vertex, of.job, of.low_ns, of.high_ns]);
+        }
+        numbers
+    }
+}
+
+/// An instance that may be dispatched next.
+struct Candidate {
+    vertex: usize,
+    key: (i128, usize, i64, usize),
+    earliest_ns: i64,
+    latest_ns: i64,
+}
+
+impl AbstractionDag {
+    /// Reports whether executions are in order, edges lead on, and each sink has a deadline.
+    fn is_whole(&self) -> bool {
+        let count = self.subtasks.len();
+        let mut subtasks = self.subtasks.iter().enumerate();
+        let is_timed = subtasks.all(|(number, of)| {
+            let is_sink = !self.edges.iter().any(|edge| edge.0 == number);
+            of.wcet_ns > 0 && of.best_ns <= of.wcet_ns && (!is_sink || of.deadline_ns.is_some())
+        });
+        let edges = self.edges.iter();
+        let are_inside = edges.clone().all(|&(from, to)| from < count && to < count);
+        // Without a circle each round settles a subtask at least: none is left after as many.
+        let mut is_left = vec![true; count];
+        for _ in 0..if are_inside { count } else { 0 } {
+            for subtask in 0..count {
+                let waits = |&&(from, to): &&(usize, usize)| to == subtask && is_left[from];
+                is_left[subtask] &= edges.clone().any(|edge| waits(&edge));
+            }
+        }
+        is_timed && are_inside && !is_left.contains(&true)
+    }
+}
+
+impl AbstractionSet {
+    /// Prepares a set. `adds_release` says whether the policy adds the nominal release to the numbers,
+    /// `is_real` whether executions are real numbers.
+    ///
+    /// # Errors
+    ///
+    /// [`NotClosed::Limit`]: the hyperperiod is too long, or has too many instances;
+    /// [`NotClosed::NotCovered`].
+    pub fn new(
+        cores: u32,
+        dags: &[AbstractionDag],
+        adds_release: bool,
+        is_real: bool,
+    ) -> Result<Self, NotClosed> {
+        let mut hyperperiod_ns = 1_u64;
+        for dag in dags {
+            if cores == 0 || dag.jitter_ns >= dag.period_ns || !dag.is_whole() {
+                return Err(NotClosed::NotCovered);
+            }
+            let (so_far, period_ns) = (hyperperiod_ns.into(), dag.period_ns.into());
+            let product = so_far / greatest_common_divisor(so_far, period_ns) * period_ns;
+            hyperperiod_ns = u64::try_from(product).map_err(|_| NotClosed::Limit)?;
+        }
+        let mut set = Self {
+            cores: cores as usize,
+            adds_release,
+            is_real,
+            hyperperiod_ns: whole(hyperperiod_ns)?,
+            dags: Vec::new(),
+            vertices: Vec::new(),
+        };
+        let mut instances = 0_u64;
+        for (number, dag) in dags.iter().enumerate() {
+            let jobs = hyperperiod_ns / dag.period_ns;
+            instances = instances.saturating_add(jobs.saturating_mul(dag.subtasks.len() as u64));
+            let times = [dag.period_ns, dag.offset_ns, dag.jitter_ns].map(whole);
+            let [period, offset, jitter] = times;
+            set.dags.push([period?, offset?, jitter?, whole(jobs)?]);
+            let first = set.vertices.len();
+            for (subtask, terms) in dag.subtasks.iter().enumerate() {
+                let times_ns = terms.wcet_ns.max(terms.best_ns);
+                whole(times_ns.max(terms.deadline_ns.unwrap_or(0)))?;
+                let ends = |of: fn(&(usize, usize)) -> [usize; 2]| {
+                    let ends = dag.edges.iter().map(of).filter(|ends| ends[0] == subtask);
+                    ends.map(|ends| first + ends[1]).collect()
+                };
+                set.vertices.push(AbstractVertex {
+                    dag: number,
+                    subtask,
+                    terms: *terms,
+                    predecessors: ends(|&(from, to)| [to, from]),
+                    successors: ends(|&(from, to)| [from, to]),
+                });
+            }
+        }
+        match instances {
+            ..=INSTANCE_LIMIT => Ok(set),
+            _ => Err(NotClosed::Limit),
+        }
+    }
+
+    /// Returns zeros by DAG and subtask.
+    pub(super) fn no_bounds(&self) -> Vec<Vec<u64>> {
+        let mut bounds = vec![vec![]; self.dags.len()];
+        for vertex in &self.vertices {
+            bounds[vertex.dag].push(0);
+        }
+        bounds
+    }
+
+    /// Returns the state before anything has been dispatched.
+    pub(super) fn initial(&self) -> AbstractState {
+        self.normal(AbstractState {
+            counts: vec![0; self.vertices.len()],
+            free_ns: [vec![0; self.cores], vec![0; self.cores]],
+            finishes: vec![],
+        })
+    }
+
+    /// Returns the state of such [numbers](AbstractState::numbers), if the set can have it.
+    pub fn state(&self, numbers: &[i64]) -> Option<AbstractState> {
+        let (counts, rest) = numbers.split_at_checked(self.vertices.len())?;
+        let (low_ns, rest) = rest.split_at_checked(self.cores)?;
+        let (high_ns, rest) = rest.split_at_checked(self.cores)?;
+        let (finishes, []) = rest.as_chunks() else {
+            return None;
+        };
+        let finish = |&[vertex, job, low_ns, high_ns]: &[i64; 4]| {
+            Some(FinishInterval {
+                vertex: usize::try_from(vertex).ok()?,
+                job,
+                low_ns,
+                high_ns,
+            })
+        };
+        let state = AbstractState {
+            counts: counts.to_vec(),
+            free_ns: [low_ns.to_vec(), high_ns.to_vec()],
+            finishes: finishes.iter().map(finish).collect::<Option<_>>()?,
+        };
+        self.has_shape(&state).then_some(state)
+    }
+
+    /// Reports whether a state has the form on which [`transitions`](Self::transitions) and
+    /// [`includes`](Self::includes) rely, whoever made it.
+    fn has_shape(&self, state: &AbstractState) -> bool {
+        let is_time = |ns: &i64| (-LATEST_NS..=LATEST_NS).contains(ns);
+        let is_count = |(count, vertex): (&i64, &AbstractVertex)| {
+            let last_ns = count.checked_mul(self.dags[vertex.dag][0]);
+            *count >= 0 && last_ns.is_some_and(|ns| is_time(&ns))
+        };
+        let is_finish = |of: &FinishInterval| {
+            let count = state.counts.get(of.vertex);
+            count.is_some_and(|&count| (-1..count).contains(&of.job))
+                && is_time(&of.low_ns)
+                && is_time(&of.high_ns)
+        };
+        let mut counts = state.counts.iter().zip(&self.vertices);
+        state.counts.len() == self.vertices.len()
+            && counts.all(is_count)
+            && (state.free_ns.iter()).all(|times| {
+                times.len() == self.cores && times.is_sorted() && times.iter().all(is_time)
+            })
+            && state.finishes.iter().all(is_finish)
+            // A second entry of one instance would hide behind the first.
+            && (state.finishes.windows(2))
+                .all(|of| (of[0].vertex, of[0].job) < (of[1].vertex, of[1].job))
+    }
+
+    /// Returns the next job of each vertex, of which all predecessors have been dispatched.
+    fn candidates(&self, state: &AbstractState) -> Vec<Candidate> {
+        let mut candidates = Vec::new();
+        for (position, vertex) in self.vertices.iter().enumerate() {
+            let job = state.counts[position];
+            if vertex
+                .predecessors
+                .iter()
+                .any(|&of| state.counts[of] <= job)
+            {
+                continue;
+            }
+            let [period_ns, offset_ns, jitter_ns, _] = self.dags[vertex.dag];
+            let release_ns = offset_ns + job * period_ns;
+            let [mut earliest_ns, mut latest_ns] = [release_ns, release_ns + jitter_ns];
+            for finish in &state.finishes {
+                if self.precedes(finish, position, job) {
+                    earliest_ns = earliest_ns.max(finish.low_ns);
+                    latest_ns = latest_ns.max(finish.high_ns);
+                }
+            }
+            let added_ns = if self.adds_release { release_ns } else { 0 };
+            let number = i128::from(vertex.terms.number) + i128::from(added_ns);
+            candidates.push(Candidate {
+                vertex: position,
+                key: (number, vertex.dag, job, vertex.subtask),
+                earliest_ns,
+                latest_ns,
+            });
+        }
+        candidates
+    }
+
+    /// Reports whether an instance is ready only after a finish.
+    fn precedes(&self, finish: &FinishInterval, vertex: usize, job: i64) -> bool {
+        match finish.vertex == vertex {
+            true => finish.job == job - 1,
+            false => {
+                finish.job == job && self.vertices[vertex].predecessors.contains(&finish.vertex)
+            }
+        }
+    }
+
+    /// Calls `each` with the normal successor of a state by each eligible instance, and raises bounds to
+    /// the latest finishes of sinks.
+    ///
+    /// # Errors
+    ///
+    /// A sink may be late, or `each` fails.
+    pub(super) fn transitions(
+        &self,
+        state: &AbstractState,
+        bounds: &mut [Vec<u64>],
+        each: &mut dyn FnMut(AbstractState) -> Result<(), NotClosed>,
+    ) -> Result<(), NotClosed> {
+        let candidates = self.candidates(state);
+        let first_ready = candidates.iter().map(|of| of.latest_ns).min();
+        let busy_until_ns = state.free_ns[1][0].max(first_ready.unwrap_or(0));
+        for chosen in &candidates {
+            let start_ns = chosen.earliest_ns.max(state.free_ns[0][0]);
+            let more_urgent = candidates.iter().filter(|of| of.key < chosen.key);
+            // What is ready at the same instant and more urgent goes first; the instants just before
+            // that readiness are whole ones only where executions are.
+            let first = more_urgent.map(|of| of.latest_ns).min().unwrap_or(i64::MAX);
+            let latest_ns = busy_until_ns.min(first - i64::from(!self.is_real));
+            if start_ns > latest_ns || start_ns >= first {
+                continue;
+            }
+            let AbstractVertex {
+                dag,
+                subtask,
+                terms,
+                ..
+            } = &self.vertices[chosen.vertex];
+            let job = state.counts[chosen.vertex];
+            let low_ns = start_ns + terms.best_ns.cast_signed();
+            let high_ns = latest_ns + terms.wcet_ns.cast_signed();
+            if let Some(deadline_ns) = terms.deadline_ns {
+                let [period_ns, offset_ns, ..] = self.dags[*dag];
+                let response_ns = (high_ns - offset_ns - job * period_ns)
+                    .max(0)
+                    .cast_unsigned();
+                if response_ns > deadline_ns {
+                    let (dag, subtask) = (*dag, *subtask);
+                    return Err(NotClosed::Late { dag, subtask });
+                }
+                let bound_ns = &mut bounds[*dag][*subtask];
+                *bound_ns = response_ns.max(*bound_ns);
+            }
+            let finish = FinishInterval {
+                vertex: chosen.vertex,
+                job,
+                low_ns,
+                high_ns,
+            };
+            each(self.successor(state, finish, [start_ns, latest_ns]))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the normal state after the dispatch of an instance, which starts between two times.
+    fn successor(
+        &self,
+        state: &AbstractState,
+        finish: FinishInterval,
+        [start_ns, latest_ns]: [i64; 2],
+    ) -> AbstractState {
+        let mut next = state.clone();
+        next.counts[finish.vertex] += 1;
+        let finishes_ns = [finish.low_ns, finish.high_ns];
+        for (times, finish_ns) in next.free_ns.iter_mut().zip(finishes_ns) {
+            times.remove(0);
+            times
+                .iter_mut()
+                .for_each(|time| *time = start_ns.max(*time));
+            let place = times.partition_point(|time| *time <= finish_ns);
+            times.insert(place, finish_ns);
+        }
+        for earlier in &mut next.finishes {
+            if self.precedes(earlier, finish.vertex, finish.job) {
+                earlier.high_ns = earlier.high_ns.min(latest_ns);
+            }
+        }
+        next.finishes.push(finish);
+        self.normal(next)
+    }
+
+    /// Drops what no later start can see, and counts from the hyperperiod in hand.
+    pub(super) fn normal(&self, mut state: AbstractState) -> AbstractState {
+        let counts = &state.counts;
+        state.finishes.retain(|of| {
+            let later = &self.vertices[of.vertex].successors;
+            of.job == counts[of.vertex] - 1 || later.iter().any(|&next| counts[next] <= of.job)
+        });
+        let now_ns = self.now_ns(&state);
+        state.finishes.retain(|of| of.high_ns > now_ns);
+        let jobs = |number: usize| self.dags[self.vertices[number].dag][3];
+        let laps = state.counts.iter().enumerate();
+        let laps = laps.map(|(number, count)| count.div_euclid(jobs(number)));
+        let laps = laps.min().unwrap_or(0);
+        let back_ns = laps * self.hyperperiod_ns;
+        for (number, count) in state.counts.iter_mut().enumerate() {
+            *count -= laps * jobs(number);
+        }
+        for times in &mut state.free_ns {
+            times
+                .iter_mut()
+                .for_each(|time| *time = now_ns.max(*time) - back_ns);
+        }
+        for finish in &mut state.finishes {
+            finish.job -= laps * jobs(finish.vertex);
+            finish.low_ns = now_ns.max(finish.low_ns) - back_ns;
+            finish.high_ns -= back_ns;
+        }
+        state.finishes = sorted(&state.finishes);
+        state
+    }
+
+    /// Returns a time before which nothing starts.
+    pub(super) fn now_ns(&self, state: &AbstractState) -> i64 {
+        let earliest = self.candidates(state).into_iter().map(|of| of.earliest_ns);
+        state.free_ns[0][0].max(earliest.min().unwrap_or(0))
+    }
+
+    /// Reports whether each run of a normal state is in another one, too.
+    pub(super) fn includes(&self, outer: &AbstractState, inner: &AbstractState) -> bool {
+        let [outer_ns, inner_ns] = [&outer.free_ns, &inner.free_ns];
+        let is_earlier = |(outer, inner): (&i64, &i64)| outer <= inner;
+        let of = |state: &AbstractState, finish: &FinishInterval| {
+            let same = |one: &&FinishInterval| (one.vertex, one.job) == (finish.vertex, finish.job);
+            state.finishes.iter().find(same).copied()
+        };
+        outer.counts == inner.counts
+            && outer_ns[0].iter().zip(&inner_ns[0]).all(is_earlier)
+            && inner_ns[1].iter().zip(&outer_ns[1]).all(is_earlier)
+            && inner.finishes.iter().all(|finish| {
+                of(outer, finish).is_some_and(|known| {
+                    known.low_ns <= finish.low_ns && finish.high_ns <= known.high_ns
+                })
+            })
+            && (outer.finishes.iter())
+                .all(|finish| of(inner, finish).is_some() || finish.low_ns <= self.now_ns(inner))
+    }
+}
+
+/// Checks that a list of normal states is closed, in one pass, and returns by DAG and subtask the
+/// longest responses of sinks; 0 of a subtask that is none.
+///
+/// # Errors
+///
+/// A sink may be late, or the list is open.
+pub fn check_closed(
+    set: &AbstractionSet,
+    states: &[AbstractState],
+) -> Result<Vec<Vec<u64>>, NotClosed> {
+    if let Some(state) = states.iter().position(|state| !set.has_shape(state)) {
+        return Err(NotClosed::Malformed { state });
+    }
+    let mut by_counts: Vec<usize> = (0..states.len()).collect();
+    sort(&mut by_counts, &mut |one, other| {
+        states[one].counts.cmp(&states[other].counts)
+    });
+    let has = |state: &AbstractState| {
+        let first = by_counts.partition_point(|&of| states[of].counts < state.counts);
+        let same = by_counts[first..].iter();
+        let mut same = same.take_while(|&&of| states[of].counts == state.counts);
+        same.any(|&of| set.includes(&states[of], state))
+    };
+    if !has(&set.initial()) {
+        return Err(NotClosed::Open { state: None });
+    }
+    let mut bounds = set.no_bounds();
+    for (number, state) in states.iter().enumerate() {
+        let state_number = Some(number);
+        set.transitions(state, &mut bounds, &mut |next| match has(&next) {
+            true => Ok(()),
+            false => Err(NotClosed::Open {
+                state: state_number,
+            }),
+        })?;
+    }
+    Ok(bounds)
+}
+
+fn whole(ns: u64) -> Result<i64, NotClosed> {
+    match ns {
+        ..=MOST_NS => Ok(ns.cast_signed()),
+        _ => Err(NotClosed::Limit),
+    }
+}
