@@ -212,6 +212,8 @@ texts! {
         AnyOrder = "multiple paths in any work-conserving order";
         /// Response-time analysis of one core under static priorities.
         OneCore = "response times on one core (Joseph and Pandya 1986)";
+        /// Response-time analysis of one core under EDF.
+        OneCoreEdf = "response times on one core under EDF (Guan and Yi 2014)";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
         /// The times of its entries in a table: nothing else can delay them.

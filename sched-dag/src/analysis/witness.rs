@@ -40,8 +40,11 @@
 //!
 //! sink DAG SUBTASK R OWN                      that is complete before its job; as `overlap`
 //!
-//! bound DAG R response BLOCKED                on one core
-//! window X OWN
+//! bound DAG R core BUSY                       on one core; BUSY: the longest stretch
+//! target SUBTASK                              that is the last of its deadline; none: the whole job
+//! at A X..                                    the release after a stretch's begin, and the finish by
+//!                                             each subtask that may keep the core as the stretch begins
+//! sooner DAG R BUSY                           a sink; its target and points as above
 //!
 //! demand BUSY TIME..                          before all bounds, if it proves some
 //! bound DAG R demand

@@ -172,7 +172,7 @@ fn a_sink_waits_for_what_is_due_later_and_keeps_its_core() {
     let specs = [quick, slow];
     let answer = answered(&specs, &settings);
     assert_eq!(bounds(&answer)[0], Some(52));
-    assert_eq!(answer.sinks_ns[0], [Some(52), Some(52)]);
+    assert_eq!(answer.sinks_ns[0], [Some(51), Some(52)]);
     let (policy, preemption) = NON_PREEMPTIVE_EDF;
     let task_set = commit(&specs, policy, 1);
     let script = Script::new(|instance: Instance| [1, 50, 50][instance.dag.index()]);

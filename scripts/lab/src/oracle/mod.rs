@@ -10,6 +10,7 @@
 //! - `graph`: closed lists of a schedule-abstraction graph;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
+//! - [`one_core`]: response times on one core;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline;
 //! - [`waiting`]: schedules and bounds of subtasks that wait, in one file.
 //!
@@ -21,6 +22,7 @@ mod case;
 mod graph;
 pub mod in_kernel;
 pub(crate) mod older_bounds;
+pub mod one_core;
 mod responses;
 pub mod schedules;
 pub mod synchronizer;
@@ -51,6 +53,7 @@ static ORACLE: Menu = Menu {
             |words| bounds::ORACLE.run(words);
         "graph": "schedule-abstraction graphs: verdicts, and bounds of sinks",
             |words| graph::ORACLE.run(words);
+        "one-core": "response times on one core", |words| one_core::ORACLE.run(words);
         "responses": "random accepted sets in virtual time, with overheads, against their bounds",
             responses::command;
         "schedules": "starts, finishes, preemptions, response times and misses",

@@ -9,7 +9,7 @@ use crate::support::{
 /// Every command, by the words that name it.
 const COMMANDS: &str = "test, soak, bench, \
     bench bounds, bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle assignment, \
-    oracle bounds, oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, \
+    oracle bounds, oracle one-core, oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, \
     oracle waiting";
 
 #[test]

@@ -1,0 +1,268 @@
+//! Reference values of one core: response times that some run attains, and the published ones.
+//!
+//! ```text
+//! case NAME edf(0/1) ndags
+//! dag T D 0 nsub nedge / sub C priority keeps(0/1) .. / edge u v .. / sink v D_v .. / wait v n C_0 W_1 C_1 ..
+//! kind exact|bound
+//! r DAG least most         the bound of the job is in between
+//! f DAG SUB least most     that of a sink
+//! w DAG joint sum best most
+//! end
+//! ```
+//!
+//! or a line for each set of sequential DAGs, the most urgent one first
+//!
+//! ```text
+//! edf C,T,D .. -> least .. | most ..
+//! npfp C,T .. -> least .. | most ..
+//! ```
+//!
+//! A response time does not depend on the deadlines under static priorities, nor under EDF if all
+//! are later by the same. So they are, lest a bound be beyond its deadline.
+
+use sched_dag::analysis::{AnalysisSettings, Overheads, answer};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, Priority, SchedulerOptions,
+    SubtaskSpec, Wait, verify,
+};
+
+use text::{Line, Lines, Malformed, cases};
+
+use super::FileOracle;
+use super::bounds::parse_wait;
+
+/// The kind `one-core`.
+pub(super) static ORACLE: FileOracle<OneCoreCase> = FileOracle {
+    invocation: "./scripts/oracle one-core",
+    about: "Compares response times on one core, under static priorities and under EDF, with those \
+            that some run attains and with published ones.",
+    parse,
+    check,
+    name: |case| &case.name,
+    schedules: None,
+};
+
+/// By how much all deadlines are later than those of a case.
+const LATER_NS: u64 = 10_000;
+
+/// One set of DAGs with the response times expected of it.
+#[derive(Debug)]
+pub struct OneCoreCase {
+    /// The case's name.
+    pub name: String,
+    policy: Policy,
+    dags: Vec<DagSpec>,
+    /// The DAG, the sink if it is of one, and the least and the most.
+    expected: Vec<(usize, Option<usize>, [u64; 2])>,
+}
+
+/// Reads all cases of a file.
+///
+/// # Errors
+///
+/// [`Malformed`] for the first record that is not as described above.
+pub fn parse(text: &str) -> Result<Vec<OneCoreCase>, Malformed> {
+    let code = |line| {
+        if str::starts_with(line, '#') {
+            ""
+        } else {
+            line
+        }
+    };
+    let text = &text.lines().map(code).collect::<Vec<_>>().join("\n");
+    let mut lines = Lines::new(text);
+    if lines
+        .clone()
+        .next_line()
+        .is_none_or(|line| line.kind == "case")
+    {
+        return cases(text, parse_case);
+    }
+    let mut sets = Vec::new();
+    while let Some(line) = lines.next_line() {
+        // Waits on one core are in the other form alone.
+        if line.kind != "waits" {
+            sets.push(parse_line(&line)?);
+        }
+    }
+    Ok(sets)
+}
+
+const fn policy(by_deadline: bool) -> Policy {
+    if by_deadline {
+        Policy::Edf
+    } else {
+        Policy::StaticPriority
+    }
+}
+
+fn dag(period_ns: u64, deadline_ns: u64) -> DagSpec {
+    DagSpec {
+        period_ns: Some(period_ns),
+        relative_deadline_ns: Some(deadline_ns + LATER_NS),
+        in_flight: u32::try_from((deadline_ns + LATER_NS).div_ceil(period_ns)).ok(),
+        ..DagSpec::default()
+    }
+}
+
+fn subtask(wcet_ns: u64, priority: u32, non_preemptive: bool) -> SubtaskSpec {
+    SubtaskSpec {
+        wcet_ns: Some(wcet_ns),
+        priority: Some(Priority(priority)),
+        non_preemptive,
+        ..SubtaskSpec::default()
+    }
+}
+
+fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<OneCoreCase, Malformed> {
+    let [name, by_deadline, count] = header.fixed()?;
+    let mut case = OneCoreCase {
+        name: name.to_owned(),
+        policy: policy(header.flag(by_deadline)?),
+        dags: Vec::new(),
+        expected: Vec::new(),
+    };
+    for _ in 0..header.at_least_one(count)? {
+        case.dags.push(parse_dag(lines)?);
+    }
+    lines.expect("kind")?.exactly(1)?;
+    loop {
+        let line = lines.next_line().ok_or_else(|| lines.ended("end"))?;
+        let numbers = || line.numbers::<usize>(line.words.len());
+        let values = |numbers: &[usize]| [numbers[0] as u64, numbers[1] as u64];
+        let (dag, subtask, range) = match line.kind {
+            "end" => return Ok(case),
+            "r" if line.words.len() == 3 => {
+                let of = numbers()?;
+                (of[0], None, values(&of[1..]))
+            }
+            "f" if line.words.len() == 4 => {
+                let of = numbers()?;
+                (of[0], Some(of[1]), values(&of[2..]))
+            }
+            // A bound of waits may be any that is no more.
+            "w" if line.words.len() == 5 => match line.words[4] {
+                "-" => continue,
+                most => (line.number(line.words[0])?, None, [0, line.number(most)?]),
+            },
+            _ => return Err(line.malformed("expected `r`, `f`, `w` or `end`")),
+        };
+        if case
+            .dags
+            .get(dag)
+            .is_none_or(|of| subtask >= Some(of.subtasks.len()))
+        {
+            return Err(line.malformed("there is no such DAG or subtask"));
+        }
+        case.expected.push((dag, subtask, range));
+    }
+}
+
+fn parse_dag(lines: &mut Lines<'_>) -> Result<DagSpec, Malformed> {
+    let header = lines.expect("dag")?;
+    let [period, deadline, _, subtasks, edges] = header.fixed()?;
+    let mut spec = dag(
+        header.at_least_one(period)?.into(),
+        header.at_least_one(deadline)?.into(),
+    );
+    for _ in 0..header.at_least_one(subtasks)? {
+        let line = lines.expect("sub")?;
+        let [wcet, priority, keeps] = line.fixed()?;
+        let wcet_ns = line.at_least_one(wcet)?.into();
+        spec.subtasks
+            .push(subtask(wcet_ns, line.number(priority)?, line.flag(keeps)?));
+    }
+    let count = spec.subtasks.len();
+    spec.edges = lines.edges(header.number(edges)?, count)?;
+    while let Some(line) = lines.next_if("sink") {
+        let [sink, deadline] = line.fixed()?;
+        let deadline_ns = u64::from(line.at_least_one(deadline)?) + LATER_NS;
+        spec.subtasks[line.index("subtask", sink, count)?].relative_deadline_ns = Some(deadline_ns);
+    }
+    while let Some(line) = lines.next_if("wait") {
+        let (subtask, _, times) = parse_wait(&line, count)?;
+        let waits = times[1..].chunks(2).map(|of| Wait {
+            limit_ns: of[0],
+            segment_ns: Some(of[1]),
+        });
+        spec.subtasks[subtask].waits = waits.collect();
+    }
+    Ok(spec)
+}
+
+fn parse_line(line: &Line<'_>) -> Result<OneCoreCase, Malformed> {
+    let fault =
+        || line.malformed("expected `edf C,T,D ..` or `npfp C,T ..`, then `-> least .. | most ..`");
+    let words = line.words.join(" ");
+    let (sets, values) = words.split_once(" -> ").ok_or_else(fault)?;
+    let (least, most) = values.split_once(" | ").ok_or_else(fault)?;
+    let numbers = |words: &str, separator| -> Result<Vec<u64>, Malformed> {
+        words
+            .split(separator)
+            .map(|word| line.number(word))
+            .collect()
+    };
+    let (least, most) = (numbers(least, ' ')?, numbers(most, ' ')?);
+    let by_deadline = line.kind == "edf";
+    let mut case = OneCoreCase {
+        name: format!("line {}", line.number),
+        policy: policy(by_deadline),
+        dags: Vec::new(),
+        expected: Vec::new(),
+    };
+    for (place, words) in sets.split(' ').enumerate() {
+        let of = numbers(words, ',')?;
+        let (&[wcet_ns, period_ns] | &[wcet_ns, period_ns, _]) = &of[..] else {
+            return Err(fault());
+        };
+        let mut spec = dag(period_ns, of.get(2).copied().unwrap_or(0));
+        spec.subtasks
+            .push(subtask(wcet_ns, priority_of(place), !by_deadline));
+        case.dags.push(spec);
+        let range = least.get(place).zip(most.get(place)).ok_or_else(fault)?;
+        case.expected.push((place, None, [*range.0, *range.1]));
+    }
+    Ok(case)
+}
+
+fn priority_of(place: usize) -> u32 {
+    u32::try_from(place).unwrap_or(u32::MAX)
+}
+
+/// Compares each bound with what is expected.
+///
+/// # Errors
+///
+/// The first difference, in one line.
+pub fn check(case: &OneCoreCase) -> Result<(), String> {
+    let options = CommitOptions::new(case.policy, 1)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_instance_limit(u32::MAX);
+    let verified = verify(&case.dags, &options).map_err(|rejected| rejected.to_string())?;
+    let scheduler = SchedulerOptions {
+        policy: case.policy,
+        preemption: Preemption::Enabled,
+        cores: 1,
+    };
+    let settings = AnalysisSettings::new(scheduler, Overheads::default());
+    let answer = answer(&verified.task_set, &settings);
+    for &(dag, subtask, [least, most]) in &case.expected {
+        let whole = answer.bounds[dag].map(|bound| bound.bound_ns);
+        let found = match subtask {
+            None => whole,
+            Some(subtask) => {
+                let mut sinks = verified.task_set.dags()[dag].sinks().iter();
+                let place = sinks.position(|sink| sink.index() == subtask);
+                place.and_then(|place| answer.sinks_ns[dag][place])
+            }
+        };
+        if found.is_none_or(|found| found < least || found > most) {
+            let sink = subtask.map_or_else(String::new, |subtask| format!(", sink {subtask}"));
+            let found = found.map_or_else(|| "none".into(), |found| found.to_string());
+            return Err(format!(
+                "dag {dag}{sink}: expected {least} to {most}, found {found}"
+            ));
+        }
+    }
+    Ok(())
+}
