@@ -45,9 +45,6 @@ pub struct FileDag {
     pub subtasks: Vec<FileSubtask>,
     /// The line of each edge, in the order of the spec.
     pub edge_lines: Vec<usize>,
-    /// Remarks about the DAG for a reader of the file, a sentence each; comments
-    /// in our own format.
-    pub remarks: Vec<String>,
 }
 
 /// The lines of a file about a subtask, beyond its spec.

@@ -60,55 +60,6 @@ pub fn parse_ns(word: &str) -> Result<u64, String> {
     })
 }
 
-/// Reads a decimal number of units of `unit_ns`, in nanoseconds, as formats
-/// without units have it. A part of a nanosecond is rounded to the safe side: up for what takes
-/// time, and down for what has time, a period or a deadline.
-///
-/// # Errors
-///
-/// In words: it is no decimal number, is negative, or is beyond 64 bits of
-/// nanoseconds.
-pub fn scale_ns(word: &str, unit_ns: u64, rounds_up: bool) -> Result<u64, String> {
-    let shown = quoted(word);
-    if word.starts_with('-') {
-        return Err(format!("{shown} is negative; give a time from 0 on"));
-    }
-    let (whole, fraction) = word.split_once('.').unwrap_or((word, "0"));
-    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
-    if !is_number(whole) || !is_number(fraction) {
-        return Err(format!(
-            "{shown} is no time; give a number such as 25 or 2.5"
-        ));
-    }
-    // Beyond 18 digits a fraction tells less than a part of a nanosecond; what is not
-    // 0 there may round the rest up.
-    let (fraction, beyond) = fraction.split_at(fraction.len().min(18));
-    let beyond = u128::from(beyond.bytes().any(|digit| digit != b'0'));
-    let scaled = || {
-        let whole_ns = whole
-            .parse::<u128>()
-            .ok()?
-            .checked_mul(u128::from(unit_ns))?;
-        let divisor = 10_u128.pow(u32::try_from(fraction.len()).ok()?);
-        let part = fraction
-            .parse::<u128>()
-            .ok()?
-            .checked_mul(u128::from(unit_ns))?
-            .checked_add(beyond)?;
-        let part_ns = match rounds_up {
-            true => part.div_ceil(divisor),
-            false => part / divisor,
-        };
-        u64::try_from(whole_ns.checked_add(part_ns)?).ok()
-    };
-    scaled().ok_or_else(|| {
-        format!(
-            "{shown} units of {} are more than 64 bits of nanoseconds hold; choose a shorter unit",
-            Time(unit_ns)
-        )
-    })
-}
-
 /// A time as a DAG file has it: exactly, in the largest unit that divides it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Time(
@@ -164,31 +115,5 @@ mod tests {
             let message = parse_ns(text).unwrap_err();
             assert!(message.contains(words), "{message}");
         }
-    }
-
-    #[test]
-    fn numbers_without_unit_are_scaled() {
-        for (text, unit_ns, up, down) in [
-            ("73", 1_000_000, 73_000_000, 73_000_000),
-            ("2.5", 1000, 2500, 2500),
-            ("33.33333333", 1_000_000, 33_333_334, 33_333_333),
-            ("0.0001", 1000, 1, 0),
-            ("0.0000000000000000000000001", 1000, 1, 0),
-            ("2.0000000000000000000000000", 1000, 2000, 2000),
-        ] {
-            let found = [true, false].map(|rounds_up| scale_ns(text, unit_ns, rounds_up));
-            assert_eq!(found, [Ok(up), Ok(down)], "{text}");
-        }
-        for text in ["-2", "1e3", "", ".", "1.", "x"] {
-            assert!(
-                scale_ns(text, 1, true).unwrap_err().contains("give a"),
-                "{text}"
-            );
-        }
-        let message = scale_ns("18446744073710", 1_000_000, true).unwrap_err();
-        assert!(
-            message.contains("units of 1ms are more than 64 bits"),
-            "{message}"
-        );
     }
 }

@@ -29,9 +29,6 @@ impl Display for DagFile {
 
 fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
     let spec = &dag.spec;
-    for remark in &dag.remarks {
-        writeln!(out, "# {remark}")?;
-    }
     write!(out, "dag {}", spec.name)?;
     write!(out, " period {}", Time(spec.period_ns.unwrap_or(0)))?;
     if let Some(deadline_ns) = spec.relative_deadline_ns {

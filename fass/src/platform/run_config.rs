@@ -100,7 +100,8 @@ impl RunConfig {
     }
 
     /// Returns the settings for the analysis of a commit.
-    pub(crate) fn settings(&self) -> AnalysisSettings {
+    #[must_use]
+    pub fn settings(&self) -> AnalysisSettings {
         AnalysisSettings::new(self.scheduler, self.overheads)
     }
 }

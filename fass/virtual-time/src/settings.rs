@@ -208,3 +208,18 @@ impl VirtualTime {
         self.set(|settings| settings.silent = silent)
     }
 }
+
+impl VirtualTime {
+    /// Returns the terms of the commits to come, for a program that takes them from words.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn terms(&self) -> RunConfig {
+        self.machine.settings.borrow().terms.clone()
+    }
+
+    /// Changes these.
+    #[doc(hidden)]
+    pub fn change(&self, change: impl FnOnce(&mut RunConfig)) {
+        change(&mut self.machine.settings.borrow_mut().terms);
+    }
+}

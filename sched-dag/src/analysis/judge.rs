@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use super::case::{AnalysisInput, dag_id, of_cluster, with_case};
 use super::ratio::Ratio;
-use super::schedulability::{JobBounds, bound_jobs, bound_sinks};
+use super::schedulability::{JobBounds, bound_by_each, bound_jobs, bound_sinks};
 use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason};
 use crate::ids::{SubtaskId, to_u32};
@@ -28,33 +28,25 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
     let mut answer = AnalysisResult {
         bounds: vec![None; dags.len()],
         sinks_ns: unknown.collect(),
-        reasons: vec![None; dags.len()],
+        reasons: Vec::new(),
         first_failing: None,
     };
-    for cluster in task_set.clusters() {
-        let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
-        let own: Vec<usize> = own.collect();
-        let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
-        let settings = of_cluster(settings, cores, &mut own.iter().map(|&dag| &dags[dag]));
-        let first_failing = &mut answer.first_failing;
-        let tables = task_set.tables().iter();
-        let tables: Vec<&Table> = tables.filter(|table| table.cluster == cluster).collect();
-        with_case(
-            (dags, &tables),
-            &own,
-            &settings,
-            &mut answer.reasons,
-            |case, mut verdict, reasons| {
-                bound(case, &mut verdict, &mut answer.sinks_ns);
-                let first = first_own(&own, reasons).or(verdict.first_failing);
-                *first_failing = first_failing.or(first);
-                for (position, &dag) in case.members.iter().enumerate() {
-                    answer.bounds[dag] = verdict.bounds[position];
-                    reasons[dag] = verdict.reasons[position];
-                }
-            },
-        );
-    }
+    let mut reasons = vec![None; dags.len()];
+    each_case(
+        task_set,
+        settings,
+        &mut reasons,
+        &mut |own, case, mut verdict, reasons| {
+            bound(case, &mut verdict, &mut answer.sinks_ns);
+            let first = first_own(own, reasons).or(verdict.first_failing);
+            answer.first_failing = answer.first_failing.or(first);
+            for (position, &dag) in case.members.iter().enumerate() {
+                answer.bounds[dag] = verdict.bounds[position];
+                reasons[dag] = verdict.reasons[position];
+            }
+        },
+    );
+    answer.reasons = reasons;
     // However the search ended: where a DAG has no bound, one is named, with what is now its reason.
     let all: Vec<usize> = (0..dags.len()).collect();
     let first = answer.first_failing.map(|failing| failing.dag.index());
@@ -62,6 +54,48 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         .or_else(|| first_own(&all, &answer.reasons));
     answer
 }
+
+/// Bounds the response time of every DAG by each test that bounds it, where the others' smallest
+/// bounds are known, whichever of them is proven.
+#[must_use]
+pub fn bounds_by_test(task_set: &TaskSet, settings: &AnalysisSettings) -> Vec<Vec<DagBound>> {
+    let mut found = vec![Vec::new(); task_set.dags().len()];
+    let mut reasons = vec![None; found.len()];
+    each_case(task_set, settings, &mut reasons, &mut |_, case, _, _| {
+        for (&dag, bounds) in case.members.iter().zip(bound_by_each(case)) {
+            found[dag] = bounds;
+        }
+    });
+    found
+}
+
+/// Calls `work` for the case of each cluster, with the positions of all its DAGs.
+fn each_case(
+    task_set: &TaskSet,
+    settings: &AnalysisSettings,
+    reasons: &mut [Option<NotProvenReason>],
+    work: &mut CaseWork<'_>,
+) {
+    let dags = task_set.dags();
+    for cluster in task_set.clusters() {
+        let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
+        let own: Vec<usize> = own.collect();
+        let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
+        let settings = of_cluster(settings, cores, &mut own.iter().map(|&dag| &dags[dag]));
+        let tables = task_set.tables().iter();
+        let tables: Vec<&Table> = tables.filter(|table| table.cluster == cluster).collect();
+        with_case(
+            (dags, &tables),
+            &own,
+            &settings,
+            reasons,
+            |case, verdict, reasons| work(&own, case, verdict, reasons),
+        );
+    }
+}
+
+type CaseWork<'w> =
+    dyn FnMut(&[usize], &AnalysisInput<'_>, AnalysisResult, &mut [Option<NotProvenReason>]) + 'w;
 
 impl AnalysisResult {
     /// Takes all bounds away for one reason.

@@ -116,7 +116,7 @@ pub use cover::{covers, parallelism, width};
 pub use explore::{STATE_LIMIT, explore};
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
-pub use judge::answer;
+pub use judge::{answer, bounds_by_test};
 pub use lending::{CoreOwner, LendingAnswer, LendingPlan, LentGroup, lend};
 pub use lent_cores::CoreSupply;
 pub use list_schedule::{ListSchedule, ScheduledSubtask};

@@ -151,6 +151,15 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<PathBuf, String> 
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
+/// Builds the program that runs DAG files in virtual time.
+///
+/// # Errors
+///
+/// Cargo failed.
+pub(crate) fn build_host() -> Result<PathBuf, String> {
+    build_target("dag-file", "linux", ["--example", "dag-file-host"], None)
+}
+
 /// The profile of the page's engine, which alone is no program of this computer or an image.
 pub(crate) const PAGE_PROFILE: &str = "page";
 
@@ -179,6 +188,8 @@ pub fn build_target(
         _ if profile == PAGE_PROFILE => ("build", &["--target", WASM_TARGET][..]),
         // Only `cargo rustc` takes flags for the last crate alone.
         "--bin" => ("rustc", &FOR_IMAGES[..]),
+        // The kernel is in none of its features.
+        _ if name.ends_with("-host") => ("build", &["--no-default-features"][..]),
         _ => ("build", &[][..]),
     };
     let failed = |why: &str| format!("cannot build `{name}`: {why}");

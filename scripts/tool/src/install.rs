@@ -98,6 +98,14 @@ pub static CHROMIUM: Need = Need {
     packages: "",
 };
 
+/// The reader of YAML for `scripts/convert`, which Debian's Python finds here.
+static YAML: Need = Need {
+    name: "PyYAML",
+    what: "Python's reader of YAML",
+    parts: &["python3", "/usr/lib/python3/dist-packages/yaml"],
+    packages: "python3 python3-yaml",
+};
+
 /// Rust's target for the page's engine: WebAssembly with standard input and output.
 pub(crate) const WASM_TARGET: &str = "wasm32-wasip1";
 
@@ -153,6 +161,23 @@ pub fn ensure(need: &Need) -> Result<(), String> {
             need.what
         )),
     }
+}
+
+/// Makes sure that Python can read YAML, as [`ensure`] does.
+///
+/// # Errors
+///
+/// As [`ensure`], or that the Python on the `PATH` is another than Debian's.
+pub fn ensure_yaml() -> Result<(), String> {
+    let import = || system::run(Command::new("python3").args(["-c", "import yaml"]));
+    if import().is_ok() {
+        return Ok(());
+    }
+    ensure(&YAML)?;
+    let remedy = "install it by `pip install pyyaml`";
+    import()
+        .map(drop)
+        .map_err(|_| format!("the `python3` on the PATH has no PyYAML; {remedy}"))
 }
 
 /// Makes sure that Rust can compile for WebAssembly, and adds its target if it is missing.

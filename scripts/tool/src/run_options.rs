@@ -58,8 +58,8 @@ options! {
     MODULE: Takes::File("FILE");
     /// More words for the guest's command line.
     APPEND: Takes::Text("WORDS");
-    /// Platform.
-    ON in "where": Takes::OneOf(&["machine", "linux", "debian"]), or "machine";
+    /// On.
+    ON in "where": Takes::OneOf(&["machine", "linux", "debian", "host"]), or "machine";
     /// Processors; 4 on debian.
     CORES: Takes::Number(1, MOST_CORES), or "8";
     /// See docs/commands.md.

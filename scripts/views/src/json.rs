@@ -110,32 +110,11 @@ pub fn parse(text: &str) -> Result<Value, JsonError> {
     Parser::new(text).whole()
 }
 
-/// Reads as [`parse`] does, and also returns the byte offsets at which the elements of the list
-/// `name`, a member of the outermost object, begin.
-///
-/// # Errors
-///
-/// As [`parse`].
-pub fn parse_with_places<'t>(
-    text: &'t str,
-    name: &'t str,
-) -> Result<(Value, Vec<usize>), JsonError> {
-    let mut parser = Parser::new(text);
-    parser.watched = Some(name);
-    let value = parser.whole()?;
-    Ok((value, parser.places))
-}
-
 #[derive(Default)]
 struct Parser<'t> {
     text: &'t str,
     position: usize,
     depth: usize,
-    /// The member of the outermost object whose elements' offsets are recorded.
-    watched: Option<&'t str>,
-    /// Whether that member's value is being read.
-    is_watched: bool,
-    places: Vec<usize>,
 }
 
 impl<'t> Parser<'t> {
@@ -203,8 +182,6 @@ impl<'t> Parser<'t> {
             if !self.skip(b':') {
                 return Err(self.unexpected("`:`"));
             }
-            // Depth 1 is inside the outermost object; equal names further in do not count.
-            self.is_watched = self.depth == 1 && self.watched == Some(key.as_str());
             let value = self.value()?;
             members.push((key, value));
             self.skip_blanks();
@@ -232,13 +209,8 @@ impl<'t> Parser<'t> {
         if self.skip(b']') {
             return Ok(Value::Array(elements));
         }
-        // A list inside the watched member has its own elements, which are not recorded.
-        let is_watched = self.is_watched && self.depth == 2;
         loop {
             self.skip_blanks();
-            if is_watched {
-                self.places.push(self.position);
-            }
             elements.push(self.value()?);
             self.skip_blanks();
             if self.skip(b']') {
@@ -465,7 +437,7 @@ pub fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{DEEPEST, Object, Value, parse, parse_with_places, quoted};
+    use super::{DEEPEST, Object, Value, parse, quoted};
 
     fn refused(text: &str) -> (usize, String) {
         let error = parse(text).expect_err(text);
@@ -547,16 +519,6 @@ nul | 1
         let (_, message) = refused(&format!(r#"{{"{long}":1,"{long}":2}}"#));
         let is_told = message.len() < 100 && message.contains("\\u{1b}");
         assert!(is_told, "{message}");
-    }
-
-    #[test]
-    fn tells_where_the_elements_of_a_member_begin() {
-        let text = r#"{"b":[1],"a":[ [2,[3]], {"a":[4]} ,5],"c":{"a":[6]}}"#;
-        let (value, places) = parse_with_places(text, "a").unwrap();
-        assert_eq!(value.get("a").unwrap().elements().len(), 3);
-        let begins: Vec<&str> = places.iter().map(|&at| &text[at..=at]).collect();
-        assert_eq!(begins, ["[", "{", "5"]);
-        assert_eq!(parse_with_places("[[1]]", "a").unwrap().1, []);
     }
 
     #[test]

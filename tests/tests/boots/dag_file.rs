@@ -5,12 +5,10 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use fass_dag_file::Length;
 use harness::file::File;
 use harness::markdown::{blocks, page};
 use harness::{Guest, Members, Said};
 use lab::golden;
-use tool::dag_file::{Import, load};
 use tool::{Outcome, system};
 use views::protocol::Status;
 
@@ -33,27 +31,14 @@ fn is_refused(content: &[u8], words: &str, why: &str) {
     assert!(reason.contains(why), "{words}: {reason}\n  not: {why}");
 }
 
-/// A generated file as the guest gets it.
+/// A generated file as the guest gets it: a copy in our format, which the converter has made.
 fn generated(name: &str) -> String {
-    let path = system::workspace().join("apps/dag-file/examples/rd-gen");
-    let path: PathBuf = path.join(name);
-    let import = Import {
-        unit_ns: 1_000_000,
-        graph: None,
-        cores: 4,
-        clusters: sched_dag::CoreDivision::Undivided,
-        length: Length::Jobs(20),
-    };
-    load(&path, &import).expect("it is well formed").to_string()
+    page(&format!("apps/dag-file/examples/converted/{name}"))
 }
 
 #[test]
 fn generated_dags_run_without_violation_within_their_bounds() {
-    for (name, dags) in [
-        ("fifo_05.yaml", 1),
-        ("gnp_03.yaml", 1),
-        ("chain_04.yaml", 3),
-    ] {
+    for (name, dags) in [("fifo_05.dag", 1), ("gnp_03.dag", 1), ("chain_04.dag", 3)] {
         for words in [
             "policy=static",
             "policy=edf execution=uniform:0.2..1 seed=7",
@@ -64,7 +49,7 @@ fn generated_dags_run_without_violation_within_their_bounds() {
             set.has([("violations", 0), ("allocations", 0), ("dags", dags)]);
             for dag in outcome.lines("dag_run") {
                 dag.has([("completed", 20)]);
-                if name == "gnp_03.yaml" && words.contains("static") {
+                if name == "gnp_03.dag" && words.contains("static") {
                     // With the overheads stated the bound holds, and is near.
                     let tightness = dag.number("tightness_permille");
                     assert!((900..=1000).contains(&tightness), "{}", dag.text);
@@ -271,14 +256,15 @@ fn script(words: &[&str]) -> Output {
 
 #[test]
 fn what_only_the_guest_finds_has_the_line_of_the_persons_file() {
-    let text = "# a period of six days\nnodes:\n- id: 0\n  execution_time: 1\n  period: 584000\n";
-    let file = File::of("dag-file", "yaml", text);
+    let text = "@TASK_GRAPH 0 {\nPERIOD 584000\n\tTASK a TYPE 0\n}\n@PE 0 {\n# type exec_time\n\
+                0 1\n}\n";
+    let file = File::of("dag-file", "tgff", text);
     let path = file.0.to_str().expect("UTF-8");
-    let words = ["--timeout", "100", "--dag", path, "--unit", "1s"];
+    let words = ["--timeout", "100", "--dag", path];
     let output = script(&[&words[..], &["--append", "jobs=1000000"]].concat());
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    let reason = format!("run: {path}:3: the deadline of the last job of dag");
+    let reason = format!("run: {path}:1: the deadline of the last job of dag");
     assert!(said.starts_with(&reason), "{said}");
 }
 

@@ -6,7 +6,7 @@ use std::fs;
 use dag_file::{Settings, commit};
 use fass::{Occupation, Policy, Preemption};
 use fass_dag_file::{Execution, Length, Set};
-use tool::dag_file::stg;
+use tool::dag_file::{Import, load};
 use tool::system::workspace;
 use views::json::{self, Value};
 use virtual_time::VirtualTime;
@@ -39,7 +39,14 @@ fn virtual_time_finds_the_published_makespans() {
     let text = fs::read_to_string(path).expect("it is in the tree");
     let published = json::parse(&text).expect("it is JSON");
     let published = published.get("graphs").expect("graphs").elements();
-    let file = stg::read(&text, None, UNIT_NS).expect("it is well formed");
+    let import = Import {
+        unit_ns: Some(UNIT_NS),
+        graph: None,
+        cores: 16,
+        clusters: sched_dag::CoreDivision::Undivided,
+        length: Length::Jobs(1),
+    };
+    let file = load(&path, &import).expect("it is well formed");
     assert_eq!((file.sets.len(), published.len()), (45, 45));
     for (graph, published) in file.sets.iter().zip(published) {
         for cores in [2, 4, 8, 16] {

@@ -152,6 +152,33 @@ pub(super) fn bound_jobs(case: &AnalysisInput<'_>) -> JobBounds {
     found
 }
 
+/// Returns the bounds of each DAG of a case by each test, where the smallest ones of the others are
+/// known that tests before have found.
+pub(super) fn bound_by_each(case: &AnalysisInput<'_>) -> Vec<Vec<DagBound>> {
+    let count = case.members.len();
+    let (mut by_test, mut best) = (vec![Vec::new(); count], vec![None; count]);
+    for test in TESTS {
+        let mut found = JobBounds {
+            bounds: best.clone(),
+            reasons: vec![None; count],
+            first_failing: None,
+            asked: Vec::new(),
+        };
+        for (dag, bounds) in by_test.iter_mut().enumerate() {
+            if test.ask(case, &mut found.asked) && found.asked[dag] {
+                found.bounds.clone_from(&best);
+                found.bounds[dag] = None;
+                (test.jobs)(case, &mut found);
+                bounds.extend(found.bounds[dag]);
+            }
+        }
+        for (best, bounds) in best.iter_mut().zip(&by_test) {
+            *best = bounds.iter().copied().min_by_key(|bound| bound.bound_ns);
+        }
+    }
+    by_test
+}
+
 /// Returns the bounds of the sinks of a case, by DAG and place among its sinks.
 pub(super) fn bound_sinks(
     case: &AnalysisInput<'_>,

@@ -32,6 +32,9 @@ const OF_PAGE: [(&str, &Need); 2] = [
     ("in_chromium::", &install::CHROMIUM),
 ];
 
+/// The module of tests on the host that convert YAML.
+const CONVERT: &str = "by_convert::";
+
 /// Makes sure that something is there.
 type Ensure = fn() -> Result<(), String>;
 
@@ -72,6 +75,9 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
         for (module, need) in OF_PAGE.into_iter().filter(|(module, _)| plan.wants(module)) {
             let there = install::ensure(need).and_then(|()| install::ensure_wasm());
             leave_out(module, there, &mut host, tally);
+        }
+        if plan.wants(CONVERT) {
+            leave_out(CONVERT, install::ensure_yaml(), &mut host, tally);
         }
         run(plan, "tests on the host", host, tally);
         // Doctests need cargo to compile each, which is not quick.

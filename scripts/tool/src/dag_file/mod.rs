@@ -1,10 +1,8 @@
 //! DAG files on the host: reading all formats, and preparing a run of one.
 //!
-//! The kernel reads one format, `docs/dag-file.md`. Here other formats are converted to it:
+//! The kernel reads one format, `docs/dag-file.md`. `scripts/convert` converts others to it:
 //!
-//! - [`rd_gen`]: RD-Gen's YAML, by [`yaml`], with several rates split by [`rates`];
-//! - [`stg`]: task graphs, from JSON;
-//! - [`load()`]: reads a file of any of these, and checks it as the commit will;
+//! - [`load()`]: reads a file of any format, and checks it as the commit will;
 //! - [`prepare()`]: the input of `./scripts/run --dag FILE`: the file that becomes the boot module,
 //!   words for the guest, and enough memory and time.
 //!
@@ -14,20 +12,14 @@
 //! checked here, with the right lines; the rest are words for the guest that the host does not
 //! read, and a machine that is too small.
 
-pub mod rates;
-pub mod rd_gen;
-pub mod stg;
-pub mod yaml;
+mod foreign;
 
 use std::path::{Path, PathBuf};
 
 use fass_dag_file::time::parse_ns;
-use fass_dag_file::{
-    DagFile, Execution, FileDag, Length, Set, check, is_name, kernel_overheads_ns, parse,
-};
+use fass_dag_file::{DagFile, Execution, FileDag, Length, Set, check, kernel_overheads_ns, parse};
 use sched_dag::{CommitOptions, CoreDivision, Policy};
-use text::Malformed;
-use text::{is_seen, shown};
+use text::{Malformed, shown};
 
 use crate::files;
 use crate::options::{Name, Parsed};
@@ -36,8 +28,8 @@ use crate::run_options::name;
 /// The settings for reading a file.
 #[derive(Clone, Debug)]
 pub struct Import {
-    /// The length of a unit, for formats whose numbers have none.
-    pub unit_ns: u64,
+    /// The length of a unit, for formats whose numbers have none; by default the format's.
+    pub unit_ns: Option<u64>,
     /// The only graph wanted of a set of task graphs.
     pub graph: Option<String>,
     /// The number of cores for the run.
@@ -53,39 +45,24 @@ pub struct Import {
 pub(crate) enum Format {
     /// Our own.
     Ours,
-    /// RD-Gen's YAML.
-    RdGen,
-    /// A set of task graphs in JSON.
-    TaskGraphs,
+    /// One that `scripts/convert` reads.
+    Foreign,
 }
+
+/// The endings of the names that a folder's files may have, ours first.
+pub(crate) const ENDINGS: [&str; 9] = [
+    "dag", "yaml", "yml", "json", "dot", "gv", "graphml", "xml", "tgff",
+];
 
 impl Format {
     /// Returns the format that a file's name states, in small or in capital letters; `None` if its
     /// ending is unknown.
     pub(crate) fn of(path: &Path) -> Option<Format> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-        match ending.as_str() {
-            "dag" => Some(Format::Ours),
-            "yaml" | "yml" => Some(Format::RdGen),
-            "json" => Some(Format::TaskGraphs),
-            _ => None,
+        match ENDINGS.iter().position(|known| *known == ending)? {
+            0 => Some(Format::Ours),
+            _ => Some(Format::Foreign),
         }
-    }
-}
-
-/// Returns a name for the DAGs of a file: its own without the ending, with `_` in place of
-/// characters that a name must not have.
-fn name_of(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let plain = |character: char| match character.is_whitespace() || !is_seen(character) {
-        true => '_',
-        false => character,
-    };
-    let name: String = stem.chars().map(plain).collect();
-    match is_name(&name) {
-        true => name,
-        // Such as a name that begins with `#` or is `->`, which our format reads otherwise.
-        false => format!("_{name}"),
     }
 }
 
@@ -96,32 +73,26 @@ fn name_of(path: &Path) -> String {
 ///
 /// Lines for people, each beginning with the file and mostly the line.
 pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+    let file = read(path, import)?;
+    check_sets(path, &file, import).map(|()| file)
+}
+
+/// Returns faults as lines for people.
+fn located(path: &Path, faults: Vec<Malformed>) -> Vec<String> {
     let place = files::shown_path(path);
-    let located = |faults: Vec<Malformed>| -> Vec<String> {
-        let located = faults.into_iter();
-        located
-            .map(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))
-            .collect()
-    };
+    let located = faults.into_iter();
+    located
+        .map(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))
+        .collect()
+}
+
+/// Reads a file as [`load`] does, without checks of its sets.
+fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+    let place = files::shown_path(path);
     let text = files::read_text(path).map_err(|line| vec![line])?;
     let text = text.as_str();
     let format = Format::of(path);
-    let file = match format {
-        Some(Format::RdGen) => rd_gen::read(text, &name_of(path), import.unit_ns),
-        Some(Format::TaskGraphs) => {
-            stg::read(text, import.graph.as_deref(), import.unit_ns).map_err(|one| vec![one])
-        }
-        Some(Format::Ours) => parse(text).map_err(|one| vec![one]),
-        // A wrong ending is the likeliest cause, so the message names the others.
-        None => parse(text).map_err(|Malformed { line, reason }| {
-            let hint = "read as our format; a name in .yaml or .yml tells RD-Gen's, in .json a task \
-                        graph set";
-            let reason = format!("{reason} ({hint})");
-            vec![Malformed { line, reason }]
-        }),
-    };
-    let file = file.map_err(located)?;
-    if format != Some(Format::TaskGraphs)
+    if format != Some(Format::Foreign)
         && let Some(graph) = &import.graph
     {
         return Err(vec![format!(
@@ -129,13 +100,27 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
             shown(graph)
         )]);
     }
+    match format {
+        Some(Format::Foreign) => foreign::read(path, import),
+        Some(Format::Ours) => parse(text).map_err(|one| located(path, vec![one])),
+        // A wrong ending is the likeliest cause, so the message names the others.
+        None => parse(text).map_err(|Malformed { line, reason }| {
+            let others = ENDINGS[1..].join(", .");
+            let reason = format!("{reason} (read as our format; others end in .{others})");
+            located(path, vec![Malformed { line, reason }])
+        }),
+    }
+}
+
+/// Checks all sets of a file as the commit will.
+fn check_sets(path: &Path, file: &DagFile, import: &Import) -> Result<(), Vec<String>> {
     // A commit with static priorities makes all checks of one with EDF, and more.
     let options = CommitOptions::new(Policy::StaticPriority, import.cores)
         .with_clusters(import.clusters.clone());
     for set in &file.sets {
-        check(set, &options, import.length).map_err(located)?;
+        check(set, &options, import.length).map_err(|faults| located(path, faults))?;
     }
-    Ok(file)
+    Ok(())
 }
 
 /// The options that only mean something together with `--dag`.
@@ -211,8 +196,8 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     if let Some(text) = options.text(name::EXECUTION) {
         Execution::parse(text).map_err(|why| refuse(format!("`--execution`: {why}")))?;
     }
-    let unit_ns = match parse_ns(options.text(name::UNIT).unwrap_or("1ms")) {
-        Ok(0) => Err("a unit of 0; give at least 1ns".into()),
+    let unit_ns = match options.text(name::UNIT).map(parse_ns).transpose() {
+        Ok(Some(0)) => Err("a unit of 0; give at least 1ns".into()),
         other => other,
     };
     let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
@@ -225,9 +210,15 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         clusters: clusters(options.text(name::CLUSTERS)).map_err(refuse)?,
         length,
     };
-    let file = load(path, &import)?;
+    // In virtual time neither a guest's memory nor its time is a limit, and of many sets one that is
+    // refused does not keep the others from being run: the program checks each.
+    let is_booted = options.text(name::ON) != Some("host");
+    let file = read(path, &import)?;
+    if is_booted || file.sets.len() == 1 {
+        check_sets(path, &file, &import)?;
+    }
     let memory_mib = memory_mib(&file, length, cores);
-    if memory_mib > MOST_MEMORY_MIB && !options.is_given(name::MEMORY) {
+    if is_booted && memory_mib > MOST_MEMORY_MIB && !options.is_given(name::MEMORY) {
         return Err(refuse(format!(
             "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
              guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs, in the file or by \
@@ -239,7 +230,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     let limit_s = limit_s(&file, length);
     let has_limit = options.is_given(name::TIMEOUT) || options.is_given(name::PRINT_DAG);
     // Printing boots nothing, and a person's limit is a person's choice.
-    if limit_s > MOST_S && !has_limit {
+    if is_booted && limit_s > MOST_S && !has_limit {
         return Err(refuse(format!(
             "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
              fewer jobs, in the file or by --jobs, or a limit by --timeout",
@@ -377,7 +368,7 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
 
 /// Translates a guest's message: `path` and its lines take the place of the words `DAG file`, one
 /// line a fault; `None` if the message is not about the file.
-fn translate(said: &str, path: &Path, file: &DagFile) -> Option<String> {
+pub(crate) fn translate(said: &str, path: &Path, file: &DagFile) -> Option<String> {
     let place = path.display();
     let said = said.strip_prefix("DAG file")?;
     if let Some(reason) = said.strip_prefix(": ") {
@@ -422,74 +413,18 @@ mod tests {
     use crate::run_options::RUN;
     use crate::system::workspace;
     use crate::tests::{right, rows};
-    use random::Random;
 
     #[test]
-    fn every_file_name_becomes_a_name_and_its_ending_tells_the_format() {
-        for (file, name, format) in [
-            ("a/gnp_01.yaml", "gnp_01", Some(Format::RdGen)),
-            ("a b.Yml", "a_b", Some(Format::RdGen)),
-            ("#h.YAML", "_#h", Some(Format::RdGen)),
-            ("->.dag", "_->", Some(Format::Ours)),
-            ("{x.JSON", "_{x", Some(Format::TaskGraphs)),
-            ("a\u{1b}\u{202e}b.txt", "a__b", None),
-            ("yaml", "yaml", None),
+    fn the_ending_of_a_name_tells_the_format() {
+        for (file, format) in [
+            ("a/gnp_01.yaml", Some(Format::Foreign)),
+            ("a b.Yml", Some(Format::Foreign)),
+            ("->.dag", Some(Format::Ours)),
+            ("{x.JSON", Some(Format::Foreign)),
+            ("a\u{1b}\u{202e}b.txt", None),
+            ("yaml", None),
         ] {
-            assert_eq!(name_of(Path::new(file)), name);
-            assert!(is_name(name), "{name}");
             assert_eq!(Format::of(Path::new(file)), format, "{file}");
-        }
-    }
-
-    /// Changes, drops or repeats a part of a text, differently for each number.
-    fn damaged(text: &str, number: u64) -> String {
-        let mut random = Random::new(number);
-        let mut below = |most: usize| random.index(most);
-        let from = below(text.len());
-        let to = (from + below(12)).min(text.len());
-        let (before, part, rest) = (&text[..from], &text[from..to], &text[to..]);
-        match below(4) {
-            0 => [before, rest].concat(),
-            1 => [before, part, part, rest].concat(),
-            2 => {
-                let other = ["-", "#", "\n", "9", " ", "'"][below(6)];
-                [before, other, part, rest].concat()
-            }
-            _ => before.into(),
-        }
-    }
-
-    #[test]
-    fn no_damage_makes_a_reader_panic_or_lose_its_line_or_differ_from_the_guests() {
-        let data = workspace().join("apps/dag-file/examples");
-        let yaml = std::fs::read_to_string(data.join("rd-gen/chain_03.yaml")).unwrap();
-        let json = r#"{"graphs":[{"name":"g","c":[0,3,4,0],"edges":[[0,1],[1,2],[2,3]],"optimal":{"2":7}}]}"#;
-        let ours = rd_gen::read(&yaml, "x", 1000).unwrap().to_string();
-        let ours = ours.replacen(" wcet ", " wcet 2us wait 3ms wcet ", 3);
-        type Read = fn(&str) -> Result<DagFile, Vec<Malformed>>;
-        let readers: [(&str, Read); 3] = [
-            (&yaml, |text| rd_gen::read(text, "x", 1000)),
-            (&ours, |text| parse(text).map_err(|fault| vec![fault])),
-            (json, |text| {
-                stg::read(text, None, 1000).map_err(|fault| vec![fault])
-            }),
-        ];
-        for number in 0..4000 {
-            for (text, read) in readers {
-                let text = damaged(text, number);
-                match read(&text) {
-                    // An accepted file is written for the guest, whose reader is ours.
-                    Ok(file) => {
-                        let refused = parse(&file.to_string()).err();
-                        assert_eq!(refused, None, "damage {number}:\n{file}");
-                    }
-                    Err(faults) => {
-                        let lines = 1..=text.lines().count() + 1;
-                        let is_in = |fault: &Malformed| lines.contains(&fault.line);
-                        assert!(faults.iter().all(is_in), "damage {number}: {faults:?}");
-                    }
-                }
-            }
         }
     }
 

@@ -13,6 +13,7 @@ mod debug;
 mod handed;
 mod kept;
 mod loading;
+mod many_sets;
 mod on_linux;
 mod page;
 mod screen;
@@ -71,6 +72,10 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     }
     // Before the checks below: a folder, and an observed run, have rules of their own.
     if let Some(folder) = several::folder(options) {
+        if on_linux::is_on_host(options) {
+            let files = several::files(&folder).map_err(Refusal::Usage)?;
+            return many_sets::run(options, &files);
+        }
         return several::run_folder(options, &folder);
     }
     if options.is_given(name::PROVE) {
@@ -86,6 +91,11 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given(name::PRINT_DAG)) {
         print!("{}", dags.file);
         return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(dags) = dags.as_ref().filter(|of| of.file.sets.len() > 1)
+        && on_linux::is_on_host(options)
+    {
+        return many_sets::run(options, std::slice::from_ref(&dags.path));
     }
     let booted = boot_app(options, dags.as_ref(), true)?;
     Ok(conclude(&booted, dags.as_ref(), options))

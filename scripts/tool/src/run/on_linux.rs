@@ -1,5 +1,6 @@
 //! `run --on linux`: the app as a program of this computer, built, started, shown and judged like a
-//! guest. With `--on debian` it runs on Debian's Linux in QEMU.
+//! guest. With `--on debian` it runs on Debian's Linux in QEMU, and with `--on host` the app of DAG
+//! files runs in virtual time.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -44,12 +45,32 @@ const NOT_IN_GUEST: [Name; 6] = [
 ];
 const ONLY_IN_GUEST: [Name; 2] = [name::MODE, name::BUSY];
 
+/// Options that virtual time has no use for, besides those of the bare machine.
+const NOT_ON_HOST: [Name; 11] = [
+    name::BUSY,
+    name::CONSOLE,
+    name::IMAGE,
+    name::INPUT,
+    name::MECHANISM,
+    name::MODE,
+    name::OCCUPY,
+    name::OUTPUT,
+    name::PAGE,
+    name::PROVE,
+    name::REPLAY,
+];
+
 /// The additional time that a guest may take, in which Linux starts.
 const START: Duration = Duration::from_secs(120);
 
-/// Reports whether the options ask for Linux.
+/// Reports whether the options ask for Linux, or for a program of this computer at least.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
-    options.text(name::ON) == Some("linux") || is_in_guest(options)
+    options.text(name::ON) != Some("machine")
+}
+
+/// Reports whether the options ask for virtual time.
+pub(super) fn is_on_host(options: &Parsed) -> bool {
+    options.text(name::ON) == Some("host")
 }
 
 /// Reports whether that Linux runs as a guest, in QEMU.
@@ -69,6 +90,9 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     let why = format!("is for the bare machine; leave it or `--on {on}` out");
     let on_linux = options.check_without(&FOREIGN, &why);
     on_linux.map_err(Refusal::Usage)?;
+    if is_on_host(options) {
+        return settle_host(options).map_err(Refusal::Usage);
+    }
     let (others, place) = match is_in_guest(options) {
         true => (&NOT_IN_GUEST[..], "linux"),
         false => (&ONLY_IN_GUEST[..], "debian"),
@@ -94,6 +118,19 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     let there = thread::available_parallelism().map_or(1, |count| count.get() as u64);
     // More workers than processors would share them, and the times would say little.
     Ok(options.with(name::CORES, usual.min(there).to_string()))
+}
+
+fn settle_host(options: &Parsed) -> Result<Parsed, String> {
+    options.check_without(
+        &NOT_ON_HOST,
+        "is not for virtual time; leave it or `--on host` out",
+    )?;
+    if !options.is_given(name::DAG) {
+        return Err("`--on host` runs DAGs of a file; name one by `--dag FILE`".into());
+    }
+    // As on the machine, whatever this computer has.
+    let cores = options.number(name::CORES).unwrap_or(1);
+    Ok(options.with(name::CORES, cores.to_string()))
 }
 
 /// The number of processors of a guest if `--cores` is not given.
@@ -138,6 +175,7 @@ pub(super) fn run_app(
     let log = Log::choose(options, app)?;
     let image = match given {
         Some(path) => path.into(),
+        None if is_on_host(options) => image::build_host()?,
         None => image::build_linux(app, None)?,
     };
     let mut screen = Screen::new(options, &image);
@@ -223,6 +261,12 @@ fn introduce(
         screen.say(&format!("time: {}\n", meaning(mode)));
         return;
     }
+    if is_on_host(options) {
+        screen.say(&format!(
+            "in virtual time, {cores} cores; bounds have the overheads, responses have none\n"
+        ));
+        return;
+    }
     screen.say(&format!("on Linux, {cores} cores of this computer"));
     screen.say("time: real nanoseconds on real cores, whatever else this computer does\n");
 }
@@ -238,14 +282,15 @@ fn meaning(mode: Mode) -> &'static str {
     }
 }
 
-/// Returns the words that only a Linux program gets.
-fn own_words(options: &Parsed) -> Vec<String> {
+/// Returns the words that only a program of this computer gets.
+pub(super) fn own_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
     for name in [name::CORES, name::MECHANISM, name::OUTPUT] {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(options.is_given(name::CONSOLE).then(|| "console=on".into()));
     words.extend(handed::is_live(options).then(|| "input=-".into()));
+    words.extend(is_on_host(options).then(|| "tests=on".into()));
     words
 }
 

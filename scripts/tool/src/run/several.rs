@@ -4,7 +4,7 @@
 //! An observed guest records its DAGs and times. `--prove` boots twice: the first run is observed,
 //! the second one commits with the WCETs and overheads of the first, unless the person states them.
 //!
-//! Every file of a folder whose name ends in `.dag`, `.yaml` or `.yml` is run, in the order of the
+//! Every file of a folder whose name ends as that of a DAG file is run, in the order of the
 //! names: one boot each, with `--prove` two, in one table. A file that is refused or fails does not
 //! keep the others from being run.
 
@@ -16,7 +16,7 @@ use sched_dag::law::MeasuredCosts;
 
 use super::screen::NOTHING;
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
-use crate::dag_file::{Format, states_overheads};
+use crate::dag_file::{ENDINGS, Format, states_overheads};
 use crate::files::{self, Temporary};
 use crate::options::{Name, Parsed, Refusal};
 use crate::outcome::Outcome;
@@ -228,7 +228,7 @@ pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
 }
 
 /// Options that make sense for one file only.
-const FOR_ONE_FILE: [Name; 8] = [
+pub(super) const FOR_ONE_FILE: [Name; 8] = [
     name::PRINT_DAG,
     name::GRAPH,
     name::TRACE,
@@ -331,14 +331,15 @@ pub(super) fn folder(options: &Parsed) -> Option<PathBuf> {
 /// # Errors
 ///
 /// In words: it cannot be read, or has none.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let place = folder.display();
     let entries = fs::read_dir(folder).map_err(|error| format!("{place}: {error}"))?;
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|path| matches!(Format::of(path), Some(Format::Ours | Format::RdGen)));
+    files.retain(|path| Format::of(path).is_some());
     if files.is_empty() {
+        let endings = ENDINGS.join(", .");
         return Err(format!(
-            "{place}: the folder has no file .dag, .yaml or .yml; name another"
+            "{place}: the folder has no file .{endings}; name another"
         ));
     }
     // The order of a folder's entries is up to the file system.

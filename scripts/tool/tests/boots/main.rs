@@ -8,6 +8,7 @@ mod ends_in_order;
 mod images;
 mod keeps;
 mod live_page;
+mod on_host;
 mod prove;
 #[path = "../support/mod.rs"]
 mod support;

@@ -2,37 +2,16 @@
 //! and remedy.
 
 use std::fs;
-use std::path::Path;
-
-use tool::system::workspace;
 
 use crate::support::{assert_refused, call, folder, refusal, succeed};
 
 const DAG: &str = "dag x period 10ms\nsubtask a wcet 1ms\nsubtask b wcet 1ms\nedge a -> b\nend\n";
-const YAML: &str = "nodes:\n- id: 0\n  execution_time: 5\n  period: 9\n- id: 1\n  \
-    execution_time: 2\nlinks:\n- source: 0\n  target: 1\n";
-const JSON: &str = "{\"graphs\":[\n{\"name\":\"a\",\"c\":[1,2,4],\"edges\":[[0,1],[1,2]]}]}";
-
-/// A file's name, a part of the good file of its format, its replacement, and the refusal. A line's
-/// end is `/`, and `..` is the rest of the file.
+/// A file's name, a part of the good file, its replacement, and the refusal. A line's end is `/`, and
+/// `..` is the rest of the file. `by_convert.rs` has those of other formats.
 const WRONG: &str = r#"
 cycle.dag | end | edge b -> a/end | cycle.dag:5: dag `x` has a cycle: subtask `a` -> subtask `b` -> subtask `a`; remove one
-cycle.yaml | target: 1 | target: 1/- source: 1/  target: 0 | cycle.yaml:10: dag `cycle` has a cycle
-cycle.json | [1,2] | [1,0] | cycle.json:2: dag `a` has a cycle
-key.yaml | period | perod | key.yaml:4: unknown key `perod`; a node has
-missing.yaml | target: 1 | target: 7 | missing.yaml:9: target: there is no node `7`; add it
-negative.yaml | 5 | -5 | negative.yaml:3: execution_time: `-5` is negative
-overflow.yaml | 5 | 99999999999999 | overflow.yaml:3: execution_time: `99999999999999` units of 1ms
-path.yaml | 5/.. | 9000000000000/- id: 1/  execution_time: 18000000000000/links:/- source: 0/  target: 1/ | path.yaml:2: the longest path of dag `path` is more than 64 bits
-zero.yaml | period: 9 | period: 0 | zero.yaml:4: period: it is 0; give more
 late.dag | 10ms | 500000000s offset 18000000000s | late.dag:1: the deadline of the first job of dag `x`
-empty.yaml | nodes.. |  | empty.yaml:1: the file is empty
-cut.yaml |   target: 1/ |  | cut.yaml:8: this link lacks its `source` or its `target`; give both
-both.yaml | target: 1 | target: 1/edges: [] | both.yaml:10: `links` and `edges` both list the edges; keep one
-amid.json | 2,4 | 0,4 | amid.json:2: graph `a`: vertex 1 has cost 0 and stands between others
-same.json | ]}] | ]},/{"name":"a","c":[1]}] | same.json:3: graph `a` stands here twice, first on line 2; rename one
-other.json | graphs | apps | other.json:1: the file has no `graphs`; of JSON a task graph set is read
-graph.txt | dag.. | nodes:/ | (read as our format; a name in .yaml or .yml tells RD-Gen's
+graph.txt | dag.. | nodes:/ | (read as our format; others end in .yaml, .yml, .json
 "#;
 
 #[test]
@@ -43,11 +22,7 @@ fn a_broken_file_is_named_with_its_line() {
         let [name, from, to, words] = row.split(" | ").collect::<Vec<_>>()[..] else {
             panic!("{row}");
         };
-        let good = match name.rsplit_once('.') {
-            Some((_, "yaml")) => YAML,
-            Some((_, "json")) => JSON,
-            _ => DAG,
-        };
+        let good = DAG;
         let text = match from.strip_suffix("..") {
             Some(from) => good.split_once(from).expect(from).0.to_string() + to,
             None => good.replacen(from, to, 1),
@@ -102,47 +77,22 @@ run --dag set --print-dag | run: `--print-dag` is for one file; name one with `-
     assert_refused(&folder, rows);
 }
 
-/// Writes files of `subtasks` subtasks, one in each format.
-fn many(folder: &Path, subtasks: usize) -> [&'static str; 2] {
-    let lines = |line: &dyn Fn(usize) -> String| (0..subtasks).map(line).collect::<String>();
-    let ours = lines(&|number| format!("subtask s{number} wcet 1us\n"));
-    let nodes = lines(&|number| format!("- id: {number}\n  execution_time: 1\n"));
-    let ours = format!("dag many period 1s\n{ours}end\n");
-    fs::write(folder.join("many.dag"), ours).expect("a file");
-    fs::write(folder.join("many.yaml"), format!("nodes:\n{nodes}")).expect("a file");
-    ["many.dag", "many.yaml"]
-}
-
 #[test]
 fn ten_thousand_subtasks_are_read_and_more_than_any_guest_holds_are_2() {
     let folder = folder("many");
-    for name in many(&folder, 10_000) {
-        let printed = succeed(&folder, &format!("run --print-dag --dag {name}"));
-        assert_eq!(printed.matches("\nsubtask ").count(), 10_000, "{name}");
-    }
-    for name in many(&folder, 20_000) {
-        let said = refusal(&folder, ["run", "--dag", name]);
-        let words = "its 20000 subtasks, their jobs and the file itself need 5";
-        assert!(said.starts_with(&format!("run: {name}: {words}")), "{said}");
-    }
-}
-
-#[test]
-fn every_format_is_printed_as_ours() {
-    // A name that no DAG may have, an ending in capitals, and a byte-order mark.
-    let folder = folder("printed");
-    let odd = "\u{feff}nodes:\n- id: a\n  execution_time: 5\n  end_to_end_deadline: 9\n";
-    fs::write(folder.join("#h.YAML"), odd).expect("a file");
-    let data = workspace().join("apps/dag-file/examples");
-    let data = data.display();
-    for file in [
-        format!("{data}/rd-gen/gnp_01.yaml"),
-        "#h.YAML".into(),
-        format!("{data}/stg50.json --graph 50/rand0008"),
-    ] {
-        let printed = succeed(&folder, &format!("run --print-dag --dag {file}"));
-        fs::write(folder.join("printed.dag"), &printed).expect("a file");
-        let again = succeed(&folder, "run --print-dag --dag printed.dag");
-        assert_eq!(again, printed);
-    }
+    let many = |subtasks: usize| {
+        let lines = (0..subtasks).map(|number| format!("subtask s{number} wcet 1us\n"));
+        let text = format!("dag many period 1s\n{}end\n", lines.collect::<String>());
+        fs::write(folder.join("many.dag"), text).expect("a file");
+    };
+    many(10_000);
+    let printed = succeed(&folder, "run --print-dag --dag many.dag");
+    assert_eq!(printed.matches("\nsubtask ").count(), 10_000);
+    many(20_000);
+    let said = refusal(&folder, ["run", "--dag", "many.dag"]);
+    let words = "its 20000 subtasks, their jobs and the file itself need 5";
+    assert!(
+        said.starts_with(&format!("run: many.dag: {words}")),
+        "{said}"
+    );
 }

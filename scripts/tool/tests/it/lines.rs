@@ -28,7 +28,7 @@ fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
     fs::write(folder.join("good.rec"), crate::traces::good()).expect("a file");
     let log = folder.join("good.rec").display().to_string();
     for line in [
-        "run --print-dag --dag apps/dag-file/examples/rd-gen/gnp_01.yaml",
+        "run --print-dag --dag apps/dag-file/examples/converted/gnp_01.dag",
         &format!("trace {log}"),
         &format!("check-trace {log}"),
     ] {

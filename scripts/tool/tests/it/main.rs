@@ -1,6 +1,7 @@
 //! The commands of the tool as a person calls them: their output, their refusals, and their
 //! exit codes; and schedules and traces held against references. Nothing is booted.
 
+mod by_convert;
 mod dag_files;
 mod elf;
 mod files;
@@ -10,6 +11,7 @@ mod links;
 #[path = "../../../views/src/record/tests/made.rs"]
 #[allow(dead_code, reason = "each program uses a part of this")]
 mod made;
+mod on_host;
 mod on_linux;
 mod page;
 mod recordings;

@@ -1,0 +1,183 @@
+//! Virtual time as the system below an app's machine.
+
+use std::cell::{Cell, RefCell};
+use std::fs;
+use std::net::SocketAddrV4;
+use std::sync::Arc;
+use std::time::Duration;
+
+use fass::platform::{Protocol, RunConfig};
+use fass::shared::{Signal, Wire};
+use front::app::ending::AppError;
+use front::app::machine::System;
+use front::json;
+use front::options::{CommandLine, UsageError};
+use front::report::{HeapUsage, Ns};
+use front::shell::LiveRun;
+use sched_dag::analysis;
+use sched_dag::engine::Run;
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, SchedulerQuery, TaskSet};
+use virtual_time::VirtualTime;
+
+/// The machine, lent to the app's function for the time of the run.
+pub type Machine = front::app::machine::Machine<HostSystem>;
+
+/// Virtual time, as an app's machine knows it.
+#[derive(Debug)]
+pub struct HostSystem {
+    /// The machine of the next run: each has its own.
+    machine: RefCell<VirtualTime>,
+    /// The file for the record of the run.
+    keep: Cell<Option<&'static str>>,
+    /// Whether each test is asked for its own bounds.
+    tells_tests: bool,
+}
+
+impl HostSystem {
+    /// Makes a machine with these terms.
+    pub(crate) fn new(terms: RunConfig, keep: Option<&'static str>, tells_tests: bool) -> Self {
+        Self {
+            machine: RefCell::new(with_terms(terms)),
+            keep: Cell::new(keep),
+            tells_tests,
+        }
+    }
+
+    /// Tells of each DAG the bound that each test gives.
+    fn tell_tests(&self, run: &Run) {
+        let task_set = run.task_set();
+        let found = analysis::bounds_by_test(task_set, &self.terms().settings());
+        for (model, bounds) in task_set.dags().iter().zip(found) {
+            let dag = model.name();
+            for bound in bounds {
+                crate::println!("dag `{dag}` by {}: {}", bound.test, Ns(bound.bound_ns));
+                json::emit("test_bound", |line| {
+                    line.text("dag", dag)
+                        .text("test", bound.test)
+                        .number("bound_ns", bound.bound_ns);
+                });
+            }
+        }
+    }
+}
+
+fn with_terms(terms: RunConfig) -> VirtualTime {
+    let machine = VirtualTime::new().contain_panics();
+    machine.change(|own| *own = terms);
+    machine
+}
+
+/// Returns a refusal of a request that needs a machine.
+fn refused<T>(what: &str) -> Result<T, AppError> {
+    let line = format!("{what} is for the machine; there is none in virtual time, leave it out");
+    Err(UsageError::new(line).into())
+}
+
+impl System for HostSystem {
+    type Run = NoRun;
+
+    fn terms(&self) -> RunConfig {
+        self.machine.borrow().terms()
+    }
+
+    fn change(&self, change: impl FnOnce(&mut RunConfig)) {
+        self.machine.borrow().change(change);
+    }
+
+    /// Events of one instant are taken together in any case.
+    fn set_coincidence(&self, _window: Duration) {}
+
+    fn run(&self, _epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError> {
+        if input.is_some() {
+            return refused("a signal of input");
+        }
+        let failure = |why: String| Err(AppError::Failure(why));
+        let next = with_terms(self.terms());
+        let machine = self.machine.replace(next);
+        let report = match machine.try_run() {
+            Ok(report) => report,
+            Err(error) => return failure(error.to_string()),
+        };
+        report
+            .logs
+            .iter()
+            .for_each(|line| crate::println!("{line}"));
+        let run = Run::clone(&report);
+        if self.tells_tests {
+            self.tell_tests(&run);
+        }
+        if let Some(path) = self.keep.take()
+            && let Err(why) = fs::write(path, machine.recording())
+        {
+            return failure(format!("`keep={path}`: {why}"));
+        }
+        // What the app counts leaves out R5, which on the machine needs a tolerance.
+        let late = run.dispatch_violations(0).unwrap_or_default();
+        late.iter()
+            .for_each(|of| crate::println!("violation: {of}"));
+        AppError::of_violations(late.len() as u64).map(|()| run)
+    }
+
+    fn is_shut_down(&self) -> bool {
+        false
+    }
+
+    fn connect(
+        &self,
+        wire: &Wire,
+        _options: &CommandLine<'static>,
+        _module: &Cell<Option<&'static [u8]>>,
+    ) -> Result<(), AppError> {
+        refused(&format!("wire `{}`", wire.name()))
+    }
+
+    fn connect_protocol(
+        &self,
+        _protocol: Box<dyn Protocol>,
+        _peer: SocketAddrV4,
+        _options: &CommandLine<'static>,
+    ) -> Result<(), AppError> {
+        refused("`router`")
+    }
+
+    fn seed() -> u128 {
+        0
+    }
+
+    fn unix_ns() -> Option<u64> {
+        None
+    }
+
+    fn measure_overheads(_margin_percent: u32) -> Result<(), AppError> {
+        refused("`overheads`")
+    }
+
+    fn memory() -> HeapUsage {
+        HeapUsage::default()
+    }
+}
+
+/// No run that a person could talk to.
+#[derive(Debug)]
+pub struct NoRun;
+
+impl LiveRun for NoRun {
+    fn task_set() -> Option<Arc<TaskSet>> {
+        None
+    }
+
+    fn control(_dag: DagId, _change: fn(DagId) -> Request) {}
+
+    fn now_ns() -> u64 {
+        0
+    }
+
+    fn ask(_cluster: usize, _query: SchedulerQuery<'_>) -> Option<u64> {
+        None
+    }
+
+    fn receive() -> Option<u8> {
+        None
+    }
+}

@@ -1,0 +1,69 @@
+//! Reading a file of another format, by `scripts/convert`.
+//!
+//! The converter writes our format and ends each record with the line of the person's file, so a
+//! fault that a check of ours finds later has that line, too. Faults that the converter finds have
+//! their lines already. Parts of a file that are left out are told on standard error.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use fass_dag_file::time::Time;
+use fass_dag_file::{DagFile, parse};
+
+use super::Import;
+use crate::system::workspace;
+
+/// The comment by which the converter tells a record's line.
+const LINE: &str = " # line ";
+
+/// Reads a file by the converter.
+///
+/// # Errors
+///
+/// The converter's lines, or the reason why it did not run.
+pub(super) fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+    let mut convert = Command::new("python3");
+    convert.arg(workspace().join("scripts/convert"));
+    convert.arg("--lines").stdin(Stdio::null());
+    if let Some(unit_ns) = import.unit_ns {
+        convert.args(["--unit", &Time(unit_ns).to_string()]);
+    }
+    if let Some(graph) = &import.graph {
+        convert.args(["--graph", graph]);
+    }
+    // No name begins with `-` once a folder stands before it.
+    let output = convert.arg(Path::new(".").join(path)).output();
+    let output = output.map_err(|why| {
+        let remedy = "install Python 3, which reads all formats but ours";
+        vec![format!("`python3` did not start: {why}; {remedy}")]
+    })?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let said: Vec<&str> = said.lines().map(without_folder).collect();
+    if !output.status.success() {
+        return Err(said.into_iter().map(String::from).collect());
+    }
+    said.iter().for_each(|line| eprintln!("{line}"));
+    let text = String::from_utf8_lossy(&output.stdout);
+    let mut file = parse(&text).map_err(|fault| {
+        let said = format!("`{}`: the converter wrote {fault}", path.display());
+        vec![said]
+    })?;
+    locate(&mut file, &text);
+    Ok(file)
+}
+
+/// Takes off what [`read`] has put before a path.
+fn without_folder(line: &str) -> &str {
+    line.strip_prefix("./").unwrap_or(line)
+}
+
+/// Gives everything in a file the line of the person's file.
+fn locate(file: &mut DagFile, text: &str) {
+    let told = |line: &str| line.rsplit_once(LINE)?.1.parse().ok();
+    let lines: Vec<usize> = text.lines().map(|line| told(line).unwrap_or(1)).collect();
+    for dag in file.sets.iter_mut().flat_map(|set| &mut set.dags) {
+        let subtasks = dag.subtasks.iter_mut().map(|subtask| &mut subtask.line);
+        let all = subtasks.chain(&mut dag.edge_lines).chain([&mut dag.line]);
+        all.for_each(|line| *line = lines[*line - 1]);
+    }
+}
