@@ -36,7 +36,7 @@ fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
 #[test]
 fn virtual_time_finds_the_published_makespans() {
     let path = workspace().join("apps/dag-file/examples/stg50.json");
-    let text = fs::read_to_string(path).expect("it is in the tree");
+    let text = fs::read_to_string(&path).expect("it is in the tree");
     let published = json::parse(&text).expect("it is JSON");
     let published = published.get("graphs").expect("graphs").elements();
     let import = Import {

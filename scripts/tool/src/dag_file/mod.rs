@@ -411,7 +411,6 @@ fn lines(dag: &FileDag) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::run_options::RUN;
-    use crate::system::workspace;
     use crate::tests::{right, rows};
 
     #[test]
