@@ -83,7 +83,9 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
         "{refused}, {same}"
     );
     assert!(sound > 100, "no statement was altered: {sound}");
-    for form in ["core", "sooner", "lent", "table", "sequence", "reserved", "blocked"] {
+    for form in [
+        "core", "sooner", "lent", "table", "sequence", "reserved", "blocked",
+    ] {
         assert!(seen[form] > 3, "{form} is rare");
     }
     fs::remove_dir_all(&folder).unwrap();

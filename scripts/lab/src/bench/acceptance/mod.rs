@@ -34,26 +34,41 @@ const PERCENTS: Range<u64> = 20..100;
 const STEP: usize = 5;
 
 /// Sets that were counted, and how many of them each method accepts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 struct AcceptanceCounts {
     sets: u64,
-    accepted: [u64; METHODS.len()],
+    /// In the order of the methods, of which the last ones may be left out.
+    accepted: Vec<u64>,
 }
 
 impl AcceptanceCounts {
+    /// Returns none of all methods, or of all but the ceiling, which takes the most time.
+    fn none(has_ceiling: bool) -> Self {
+        Self {
+            sets: 0,
+            accepted: vec![0; METHODS.len() - usize::from(!has_ceiling)],
+        }
+    }
+
+    /// Returns the names of the methods that are counted, a column each.
+    fn columns(&self, column: impl Fn(&str) -> String) -> String {
+        let counted = METHODS[..self.accepted.len()].iter();
+        counted.map(|method| column(method.name)).collect()
+    }
+
     /// Counts a set, in which no DAG has `D > T`.
     fn add(&mut self, tasks: &[Task], cores: u32) {
         let tasks: Vec<&Task> = tasks.iter().collect();
         self.sets += 1;
-        for (count, method) in self.accepted.iter_mut().zip(&METHODS) {
+        for (count, method) in self.accepted.iter_mut().zip(METHODS) {
             *count += u64::from((method.accepts)(&tasks, cores));
         }
     }
 
     /// Returns the shares of the sets in percent, as cells of a table.
     fn shares(&self) -> impl Iterator<Item = String> {
-        let share = |count| format!("{:.1}", 100.0 * count as f64 / self.sets as f64);
-        self.accepted.into_iter().map(share)
+        let share = |count: u64| format!("{:.1}", 100.0 * count as f64 / self.sets as f64);
+        self.accepted.iter().map(move |&count| share(count))
     }
 }
 
@@ -75,11 +90,12 @@ struct Point {
 /// In words: a file cannot be written.
 pub(super) fn measure(
     (generator, cores): (Generator, &[u32]),
+    has_ceiling: bool,
     sets: u64,
     seed: u64,
     out: &Path,
 ) -> Result<String, String> {
-    let mut points = points(cores);
+    let mut points = points(cores, has_ceiling);
     let mut progress = Progress::new(points.len() as u64, "points");
     for (done, point) in (0..).zip(&mut points) {
         progress.show(done);
@@ -92,7 +108,7 @@ pub(super) fn measure(
 }
 
 /// Returns the points in the order of their cores, deadlines and utilizations, nothing counted yet.
-fn points(cores: &[u32]) -> Vec<Point> {
+fn points(cores: &[u32], has_ceiling: bool) -> Vec<Point> {
     let mut points = Vec::new();
     for &cores in cores {
         for deadlines in Deadlines::ALL {
@@ -100,7 +116,7 @@ fn points(cores: &[u32]) -> Vec<Point> {
                 cores,
                 deadlines,
                 percent,
-                counts: AcceptanceCounts::default(),
+                counts: AcceptanceCounts::none(has_ceiling),
             }));
         }
     }
@@ -135,30 +151,27 @@ impl Point {
 
 /// Returns a row for each point: numbers of sets.
 fn csv(points: &[Point]) -> String {
-    let methods = METHODS.each_ref().map(|method| method.name).join(",");
-    let mut text = format!("cores,deadlines,utilization,sets,{methods}\n");
+    let methods = points[0].counts.columns(|name| format!(",{name}"));
+    let mut text = format!("cores,deadlines,utilization,sets{methods}\n");
     for point in points {
-        let (kind, AcceptanceCounts { sets, accepted }) = (point.kind().join(","), point.counts);
-        let counts = accepted.map(|count| count.to_string()).join(",");
+        let AcceptanceCounts { sets, accepted } = &point.counts;
+        let counts = accepted.iter().map(|count| format!(",{count}"));
         // Writing into a `String` cannot fail.
-        let _ = writeln!(text, "{kind},{sets},{counts}");
+        let _ = writeln!(
+            text,
+            "{},{sets}{}",
+            point.kind().join(","),
+            counts.collect::<String>()
+        );
     }
     text
-}
-
-/// Returns the columns of the methods.
-fn columns() -> String {
-    METHODS
-        .each_ref()
-        .map(|method| format!("{}:12", method.name))
-        .join("|")
 }
 
 /// Returns a row for each point: shares of the sets.
 fn table(points: &[Point]) -> String {
     let title = "random sets accepted, in percent\n";
-    let columns = format!("cores:5|deadlines:13|U / m:7|{}", columns());
-    let mut table = Table::new(title, &columns);
+    let methods = points[0].counts.columns(|name| format!("|{name}:12"));
+    let mut table = Table::new(title, &format!("cores:5|deadlines:13|U / m:7{methods}"));
     for point in points {
         table.cells(point.kind().into_iter().chain(point.counts.shares()));
     }
@@ -192,11 +205,13 @@ impl SetFile {
 }
 
 /// Counts the sets of files; returns a table with a row for each file.
-pub(super) fn of_files(files: &[SetFile]) -> String {
-    let columns = format!("sets:6|{}|  file:<6", columns());
+pub(super) fn of_files(files: &[SetFile], has_ceiling: bool) -> String {
+    let none = AcceptanceCounts::none(has_ceiling);
+    let columns = none.columns(|name| format!("|{name}:12"));
+    let columns = format!("sets:6{columns}|  file:<6");
     let mut table = Table::new("sets accepted, in percent\n", &columns);
     for SetFile { name, sets } in files {
-        let mut counts = AcceptanceCounts::default();
+        let mut counts = none.clone();
         for set in sets {
             counts.add(&set.tasks, set.cores);
         }
@@ -218,10 +233,10 @@ mod tests {
 
     /// Points of 2 and 4 cores with counts of their own, of 200 sets.
     fn counted() -> Vec<Point> {
-        let mut points = points(&[2, 4]);
+        let mut points = points(&[2, 4], true);
         for (nth, point) in (0..).zip(&mut points) {
             point.counts.sets = 200;
-            point.counts.accepted = [nth, 2 * nth, 100, 120, 200 - nth, 150, 200, 190];
+            point.counts.accepted = vec![nth, 2 * nth, 100, 120, 200 - nth, 150, 200, 190];
         }
         points
     }
@@ -298,21 +313,22 @@ mod tests {
     #[test]
     fn a_point_depends_on_nothing_but_its_kind_and_the_seed() {
         let drawn = |cores, percent, seed| {
-            let mut points = points(cores);
+            let mut points = points(cores, false);
             points.retain(|point| (point.cores, point.percent) == (4, percent));
-            let [implicit, constrained] = &mut points[..] else {
-                panic!("{points:?}");
-            };
-            implicit.count(Generator::Ours, 6, seed);
-            constrained.count(Generator::Ours, 6, seed);
-            [implicit.counts, constrained.counts]
+            for point in &mut points {
+                point.count(Generator::Ours, 6, seed);
+            }
+            points
+                .into_iter()
+                .map(|point| point.counts)
+                .collect::<Vec<_>>()
         };
         assert_eq!(drawn(&[2, 4], 80, 1), drawn(&[4], 80, 1));
         assert_ne!(drawn(&[4], 80, 1), drawn(&[4], 80, 2));
         // All methods accept a light load.
         let all = AcceptanceCounts {
             sets: 6,
-            accepted: [6; METHODS.len()],
+            accepted: vec![6; METHODS.len() - 1],
         };
         assert_eq!(drawn(&[4], 20, 1)[0], all);
     }
@@ -360,7 +376,7 @@ mod tests {
         let bare = assignment::parse_sets(&bare.join("\n")).unwrap();
         assert_eq!((sets.len(), bare.len()), (60, 60));
         for ((set, bare), expected) in sets.iter().zip(&bare).zip(expected) {
-            let mut counts = AcceptanceCounts::default();
+            let mut counts = AcceptanceCounts::none(false);
             counts.add(&bare.tasks, bare.cores);
             let is_accepted = expected != "attempt -";
             assert_eq!(

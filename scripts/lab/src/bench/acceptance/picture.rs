@@ -38,22 +38,33 @@ pub(super) fn draw(points: &[Point]) -> String {
     let sets = points.first().map_or(0, |point| point.counts.sets);
     let title = format!("Random sets of DAGs that a method accepts, of {sets} a point");
     svg.text((CORNER.0, 24), "start", &title);
-    legend(&mut svg);
-    let rows = Deadlines::ALL.len() as u64;
+    let methods = points
+        .first()
+        .map_or(0, |point| point.counts.accepted.len());
+    legend(&mut svg, methods);
+    let kinds = Deadlines::ALL.len() as u64;
     let kind = |point: &Point| (point.cores, point.deadlines);
-    let mut panels = 0;
-    for curve in points.chunk_by(|one, other| kind(one) == kind(other)) {
-        panel(&mut svg, (panels / rows, panels % rows), curve);
-        panels += 1;
+    let curves: Vec<_> = points
+        .chunk_by(|one, other| kind(one) == kind(other))
+        .collect();
+    // A column for each number of cores; panels of one number lie side by side.
+    let numbers = curves.len() as u64 / kinds;
+    let (columns, rows) = if numbers == 1 {
+        (kinds, 1)
+    } else {
+        (numbers, kinds)
+    };
+    for (place, curve) in (0..).zip(curves) {
+        panel(&mut svg, (place / rows, place % rows), curve);
     }
     // The legend takes the room of three panels.
-    let width = CORNER.0 + (panels / rows).max(3) * STEP.0 - 20;
+    let width = CORNER.0 + columns.max(3) * STEP.0 - 20;
     svg.into_text((width, CORNER.1 + rows * STEP.1 - 16))
 }
 
 /// Draws the name of each method next to a piece of its curve, in three rows.
-fn legend(svg: &mut Svg) {
-    for (place, (method, style)) in (0..).zip(METHODS.iter().zip(STYLES)) {
+fn legend(svg: &mut Svg, methods: usize) {
+    for (place, (method, style)) in (0..).zip(METHODS[..methods].iter().zip(STYLES)) {
         let (x, y) = (CORNER.0 + place % 3 * 270, 44 + place / 3 * 20);
         svg.line((x, y), (x + 40, y), style);
         svg.text((x + 48, y + 4), "start", method.title);
@@ -88,7 +99,8 @@ fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point]) {
         svg.text((left, top - 10), "start", &title);
     }
     svg.text((right, bottom + 34), "end", "utilization / m");
-    let others = (0..METHODS.len()).filter(|method| *method != LOWEST);
+    let methods = curve.first().map_or(0, |point| point.counts.accepted.len());
+    let others = (0..methods).filter(|method| *method != LOWEST);
     for method in [LOWEST].into_iter().chain(others) {
         let ends = curve.iter().map(
             |Point {
