@@ -218,6 +218,10 @@ impl<'a> CommandLine<'a> {
         let Some(word) = self.words.iter().find(|word| !word.taken.get()) else {
             return Ok(());
         };
+        if KERNELS.contains(&word.key) {
+            let line = format!("`{}` means nothing here; leave it out", word.key);
+            return Err(UsageError(line));
+        }
         let (own, kernels) = (known.join(", "), KERNELS.join(", "));
         Err(UsageError(format!(
             "`{}` is no option; there are {own}, and for every app {kernels}",
@@ -284,6 +288,9 @@ mod tests {
              budget_factor, overheads_ns, wcets, trace_events, bounds, events, log, measure, idle, \
              console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
         );
+        // Another system takes it.
+        let wrong = message(CommandLine::parse("idle=halt").unwrap().finish(&["jobs"]));
+        assert_eq!(wrong, "`idle` means nothing here; leave it out");
     }
 
     #[test]

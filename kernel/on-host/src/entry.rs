@@ -7,7 +7,7 @@
 //! | `cores=N` | the number of cores | 8 |
 //! | `module=FILE` | a file for the app | |
 //! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
-//! | `keep=FILE`, `events=FILE` | the record of the run is written there | |
+//! | `keep=FILE`, `events=FILE\|on` | the record of the run is written there; `on` is for lines of the output | |
 //! | `tests=off\|on` | whether each test of the commit is asked for its own bounds | `off` |
 //!
 //! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
@@ -17,19 +17,18 @@
 //! end with its verdict.
 
 use std::borrow::Cow;
-use std::fs;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use fass::platform::RunConfig;
-use front::app::ending::{self, AppError, AppExit, RunVerdict};
+use front::app::ending::{AppError, RunVerdict};
 use front::app::terms::{self, RunTerms};
 use front::json;
 use front::options::{CommandLine, UsageError};
 pub use front::output;
 
 use crate::host_system::{HostSystem, Machine};
-pub use crate::output::write_as;
+use crate::program;
+pub use crate::program::write_as;
 
 /// Makes an app's function the one that the program runs: the function `program`, for the file
 /// that has the app's `main.rs` as its module.
@@ -47,62 +46,45 @@ macro_rules! entry {
 
 type App = fn(&Machine) -> Result<(), AppError>;
 
+/// An app's file, or a part of it.
+type Module = Option<&'static [u8]>;
+
+/// Runs an app with the words of the program's command line; of several parts, the exit code is
+/// that of the last one.
+pub fn start(name: &'static str, app: App) -> ExitCode {
+    let line = program::command_line();
+    let module = CommandLine::parse(line).and_then(|options| {
+        let path = options.text("module");
+        path.map(|path| program::read("module", path)).transpose()
+    });
+    let parts = match module {
+        Ok(Some(bytes)) => bytes
+            .split(|byte| *byte == FORM_FEED)
+            .map(|it| Ok(Some(it)))
+            .collect(),
+        other => vec![other],
+    };
+    let run = |part| program::run(|| attempt(name, line, app, part));
+    parts
+        .into_iter()
+        .fold(ExitCode::SUCCESS, |_, part| run(part))
+}
+
 /// What stands between the parts of a file.
 const FORM_FEED: u8 = 0x0c;
-
-/// Runs an app with the words of the program's command line. The exit code is 0 after a
-/// success, 1 after a failure, 2 if the command line is refused; of several parts it is 0.
-pub fn start(name: &'static str, app: App) -> ExitCode {
-    let line = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    let line: &'static str = line.leak();
-    // A file that cannot be read is refused in `attempt`.
-    let module = CommandLine::parse(line).and_then(|options| read(&options));
-    let parts: Vec<_> = match module {
-        Ok(Some(bytes)) => bytes.split(|byte| *byte == FORM_FEED).map(Some).collect(),
-        _ => vec![None],
-    };
-    if let [part] = parts[..] {
-        return match run(name, line, app, part) {
-            AppExit::Success => ExitCode::SUCCESS,
-            AppExit::Failure => ExitCode::FAILURE,
-            AppExit::Usage => ExitCode::from(2),
-        };
-    }
-    for part in parts {
-        run(name, line, app, part);
-    }
-    ExitCode::SUCCESS
-}
-
-/// Runs the app, and tells how it has ended.
-fn run(name: &'static str, line: &'static str, app: App, part: Option<&'static [u8]>) -> AppExit {
-    let result = catch_unwind(AssertUnwindSafe(|| attempt(name, line, app, part)));
-    let result = result.unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().copied();
-        let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-        let text = text.unwrap_or("it says nothing");
-        Err(AppError::Failure(format!(
-            "the app's function panicked: {text}"
-        )))
-    });
-    ending::tell(&result)
-}
 
 fn attempt(
     name: &'static str,
     line: &'static str,
     app: App,
-    part: Option<&'static [u8]>,
+    module: Result<Module, UsageError>,
 ) -> Result<(), AppError> {
     let options = CommandLine::parse(line)?;
     let chosen = RunTerms::read(&options)?;
     let cores = options.number("cores", 1..=1024, 8)?;
-    let module = match part {
-        Some(part) => Some(part),
-        None => read(&options)?,
-    };
+    // The word is taken, though the file is read already.
     let _ = options.text("module");
-    let (wcets, module) = terms::split_wcets(&options, module)?;
+    let (wcets, module) = terms::split_wcets(&options, module?)?;
     let mut terms = RunConfig::default();
     terms.scheduler.cores = u32::try_from(cores).unwrap_or(u32::MAX);
     terms.wcets = wcets.map(Cow::Borrowed);
@@ -121,15 +103,4 @@ fn attempt(
     let system = HostSystem::new(terms, keep.or(events), tells_tests);
     let verdict = RunVerdict::new(chosen.judges_bounds, false);
     Machine::serve(system, options, module, verdict, app)
-}
-
-/// Reads the file that the word `module` names. It stays as long as the program, as the loader's
-/// does.
-fn read(options: &CommandLine<'static>) -> Result<Option<&'static [u8]>, UsageError> {
-    let Some(path) = options.text("module") else {
-        return Ok(None);
-    };
-    let bytes = fs::read(path);
-    let bytes = bytes.map_err(|why| UsageError::new(format!("`module={path}`: {why}")))?;
-    Ok(Some(bytes.leak()))
 }

@@ -6,13 +6,14 @@ use std::net::SocketAddrV4;
 use std::sync::Arc;
 use std::time::Duration;
 
+use fass::edge::Sink as _;
 use fass::platform::{Protocol, RunConfig};
 use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
 use front::app::machine::System;
 use front::json;
 use front::options::{CommandLine, UsageError};
-use front::report::{HeapUsage, Ns};
+use front::report::{HeapUsage, Ns, RecordLines};
 use front::shell::LiveRun;
 use sched_dag::analysis;
 use sched_dag::engine::Run;
@@ -28,18 +29,22 @@ pub type Machine = front::app::machine::Machine<HostSystem>;
 pub struct HostSystem {
     /// The machine of the next run: each has its own.
     machine: RefCell<VirtualTime>,
-    /// The file for the record of the run.
-    keep: Cell<Option<&'static str>>,
+    /// The file for the record of the run; `on` is for lines of the output.
+    record_to: Cell<Option<&'static str>>,
     /// Whether each test is asked for its own bounds.
     tells_tests: bool,
 }
 
 impl HostSystem {
     /// Makes a machine with these terms.
-    pub(crate) fn new(terms: RunConfig, keep: Option<&'static str>, tells_tests: bool) -> Self {
+    pub(crate) fn new(
+        terms: RunConfig,
+        record_to: Option<&'static str>,
+        tells_tests: bool,
+    ) -> Self {
         Self {
             machine: RefCell::new(with_terms(terms)),
-            keep: Cell::new(keep),
+            record_to: Cell::new(record_to),
             tells_tests,
         }
     }
@@ -92,13 +97,11 @@ impl System for HostSystem {
         if input.is_some() {
             return refused("a signal of input");
         }
-        let failure = |why: String| Err(AppError::Failure(why));
+        let failure = AppError::Failure;
         let next = with_terms(self.terms());
         let machine = self.machine.replace(next);
-        let report = match machine.try_run() {
-            Ok(report) => report,
-            Err(error) => return failure(error.to_string()),
-        };
+        let report = machine.try_run();
+        let report = report.map_err(|error| failure(error.to_string()))?;
         report
             .logs
             .iter()
@@ -107,13 +110,21 @@ impl System for HostSystem {
         if self.tells_tests {
             self.tell_tests(&run);
         }
-        if let Some(path) = self.keep.take()
-            && let Err(why) = fs::write(path, machine.recording())
-        {
-            return failure(format!("`keep={path}`: {why}"));
+        match self.record_to.take() {
+            Some("on") => {
+                let mut lines = RecordLines::new();
+                lines.put(&machine.recording());
+                lines.flush();
+            }
+            Some(path) => {
+                let written = fs::write(path, machine.recording());
+                written.map_err(|why| failure(format!("`{path}`: {why}")))?;
+            }
+            None => {}
         }
         // What the app counts leaves out R5, which on the machine needs a tolerance.
-        let late = run.dispatch_violations(0).unwrap_or_default();
+        let late = run.dispatch_violations(0);
+        let late = late.expect("in virtual time no event is lost");
         late.iter()
             .for_each(|of| crate::println!("violation: {of}"));
         AppError::of_violations(late.len() as u64).map(|()| run)

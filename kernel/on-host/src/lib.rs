@@ -20,8 +20,8 @@
 #[doc(hidden)]
 pub mod entry;
 mod host_system;
-#[path = "../../on-linux/src/output.rs"]
-mod output;
+#[path = "../../on-linux/src/program/mod.rs"]
+mod program;
 
 pub use front::app::ending::AppError;
 #[doc(inline)]

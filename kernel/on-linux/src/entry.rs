@@ -24,14 +24,13 @@
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use fass::edge::Sink;
-use front::app::ending::{self, AppError, AppExit, RunVerdict};
+use front::app::ending::{AppError, RunVerdict};
 use front::app::terms::{self, RunTerms};
 use front::json;
 use front::options::{CommandLine, UsageError};
@@ -40,7 +39,8 @@ use front::report::RecordLines;
 use linux::{EndSignals, Linux, Mechanism};
 
 use crate::linux_system::{LinuxSystem, Machine, memory_kib};
-pub use crate::output::write_as;
+pub use crate::program::write_as;
+use crate::program::{self, read};
 
 /// Makes an app's function the one that the program runs: the function `program`, for the file
 /// that has the app's `main.rs` as its module.
@@ -59,24 +59,9 @@ macro_rules! entry {
     };
 }
 
-/// Runs an app with the words of the program's command line. The exit code is 0 after a
-/// success, 1 after a failure, 2 if the command line is refused.
+/// Runs an app with the words of the program's command line.
 pub fn start(name: &'static str, app: fn(&Machine) -> Result<(), AppError>) -> ExitCode {
-    let line = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    let run = AssertUnwindSafe(|| run(name, line.leak(), app));
-    let result = catch_unwind(run).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().copied();
-        let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-        let text = text.unwrap_or("it says nothing");
-        Err(AppError::Failure(format!(
-            "the app's function panicked: {text}"
-        )))
-    });
-    match ending::tell(&result) {
-        AppExit::Success => ExitCode::SUCCESS,
-        AppExit::Failure => ExitCode::FAILURE,
-        AppExit::Usage => ExitCode::from(2),
-    }
+    program::run(|| run(name, program::command_line(), app))
 }
 
 fn run(
@@ -205,13 +190,6 @@ pub(crate) fn apply(
         limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
     }
     Ok((machine, module))
-}
-
-/// Reads the file that a word names. It stays as long as the program, as the loader's does.
-fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
-    let bytes = fs::read(path);
-    let bytes = bytes.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
-    Ok(bytes.leak())
 }
 
 /// The record as lines of the program's output.

@@ -35,7 +35,7 @@ mod event;
 #[allow(unsafe_code, reason = "an allocator that counts")]
 mod heap;
 mod linux_system;
-mod output;
+mod program;
 
 pub use event::Event;
 #[doc(inline)]

@@ -216,6 +216,8 @@ texts! {
         OneCoreEdf = "response times on one core under EDF (Guan and Yi 2014)";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
+        /// As many cores as can be needed at once: the longest path.
+        Widths = "widths that fit the cores";
         /// The times of its entries in a table: nothing else can delay them.
         Table = "its entries in a table";
         /// The rest of cores that tables leave, under fixed priorities.

@@ -49,6 +49,9 @@
 //! demand BUSY TIME..                          before all bounds, if it proves some
 //! bound DAG R demand
 //!
+//! bound DAG R widths                          as many cores as its DAGs are wide
+//! reached DAG SUBTASK R                       a sink of such a DAG
+//!
 //! bound DAG R table                           of a DAG in a table
 //! bound DAG R sequence OWNED                  of a member, on one core
 //! bound DAG R lent CHAINS CLIPPED LEFT OWNED  of a member, on several; OWNED: by their tables

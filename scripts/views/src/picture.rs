@@ -139,6 +139,20 @@ pub fn graphs(view: &View<'_>) -> String {
     picture.svg.into_text((picture.right, height))
 }
 
+/// Returns the part of a name that fits into a box: its end, where generated names differ.
+fn fitted(name: &str) -> String {
+    let (count, most) = (name.chars().count(), ((BOX.0 - LETTER) / LETTER) as usize);
+    let end: String = name
+        .chars()
+        .skip((count + 1).saturating_sub(most))
+        .collect();
+    if count > most {
+        format!("…{end}")
+    } else {
+        name.into()
+    }
+}
+
 struct Picture<'v> {
     view: &'v View<'v>,
     svg: Svg,
@@ -154,8 +168,6 @@ impl<'v> Picture<'v> {
     fn new(view: &'v View<'v>, window: Window) -> Self {
         let dags = window.dags.iter().map(|dag| view.run.task_set.dag(*dag));
         let names = dags.map(|dag| dag.name().len() as u64);
-        // Those of several machines begin with the machine's.
-        let names = names.filter(|_| !view.run.machines.is_empty());
         Self {
             view,
             left: (16 + 8 * names.max().unwrap_or(0)).clamp(LEFT, WIDTH / 2),
@@ -247,7 +259,7 @@ impl<'v> Picture<'v> {
             let wcet = model.wcet_ns().map(|ns| format!("WCET {}", time(ns)));
             let waits = Some(model.waiting_ns()).filter(|ns| *ns > 0);
             let waits = waits.map(|ns| format!("waits {}", time(ns)));
-            let lines = [Some(model.name().into()), wcet, waits];
+            let lines = [Some(fitted(model.name())), wcet, waits];
             for (row, line) in (0..).zip(lines.into_iter().flatten()) {
                 self.svg
                     .text((x + BOX.0 / 2, y + 17 + 16 * row), "middle", &line);

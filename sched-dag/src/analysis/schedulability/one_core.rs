@@ -3,34 +3,32 @@
 //! On one core the subtasks of a job start in an order that nothing else changes: of those that are
 //! ready by edges the most urgent one first. So a DAG is as several sequential tasks that are
 //! released together, one for each deadline among its sinks, and one alone under static
-//! priorities. `docs/bounds.md` has the proof; in short: let S be a subtask, what is before it
-//! in its job, and all of other jobs that goes before it. Look at a longest stretch in which work
-//! of
-//! S is pending. Only S executes in it, but for one subtask that keeps its core and started before.
-//! So a job that is released `a` after the stretch's begin completes the subtask within the least
-//! `X > 0` with
+//! priorities. `docs/bounds.md` has the proof; in short: let S be a subtask, all that is before the
+//! subtask in its job, and all of other jobs that goes before. Look at a longest stretch in which
+//! work of S is pending. Only S executes in the stretch, but for one subtask that keeps its core and
+//! started before. So a job that is released `a` after the stretch's begin completes the subtask
+//! within the least `X > 0` with
 //!
 //! `X = blocking + own(a) + sum over S of min(ceil(max(0, X - first) / T), most) work`
 //!
 //! and `R = max over a of X - a`, where `a` is a multiple of the own period or, under EDF, an
 //! instant at which another job joins S. A subtask that keeps its core has to *start*: its
-//! equation is without its own WCET, and also counts what is released at its start, if nothing
-//! blocks. What blocks has started before the stretch, so it ends before its WCET has passed.
+//! equation is without its own WCET, and also counts work that is released at its start, if nothing
+//! blocks. A blocking subtask has started before the stretch, so it ends before its WCET has passed.
 //!
 //! M. Joseph, P. Pandya, The Computer Journal 29(5), 1986; J. P. Lehoczky, RTSS 1990; L. George,
 //! N. Rivierre, M. Spuri, INRIA RR-2966, 1996; R. Davis et al., Real-Time Systems 35, 2007;
 //! N. Guan, W. Yi, IEEE Trans. Industrial Informatics 10(2), 2014. Ties, DAGs, sinks and younger
 //! jobs were derived here.
 //!
-//! Where static priorities interleave, S is the DAG and all that may outrank it, or outrank one of
-//! these, and so on; where they differ within the DAG, its younger jobs count, too. That is a
-//! bound,
-//! but none that some run attains. The time for which long steps and a device's interrupts keep the
-//! core in the
-//! stretch (bursts, in `workload`) is added; then all subtasks count as if they could be preempted.
+//! Where static priorities interleave, S is the DAG and all that may outrank the DAG, or outrank one
+//! of these, and so on; where priorities differ within the DAG, its younger jobs count, too. That is
+//! a bound, but none that some run attains. The time for which long steps and a device's interrupts
+//! keep the core in the stretch (bursts, in `workload`) is added; then all subtasks count as if they
+//! could be preempted.
 //!
 //! Assumes: releases at least `T` apart; WCETs above 0; no job waits for room, so under EDF all
-//! DAGs must have their bounds.
+//! DAGs must have their bounds. Beyond its limits the test has no bound, and the next one is asked.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -62,13 +60,16 @@ pub(super) const WITNESS: BoundWitness = BoundWitness {
     ..BoundWitness::NONE
 };
 
-/// The most evaluations of sums under EDF, for the jobs of all DAGs and for the sinks of all.
-const STEP_LIMIT: u64 = 1 << 20;
+/// The most terms of sums under EDF, for the jobs of all DAGs and for the sinks of all.
+const TERM_LIMIT: u64 = 1 << 17;
+
+/// The most releases that are looked at for one bound: a witness has a line for each.
+const RELEASE_LIMIT: u32 = 4096;
 
 fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let (core, count) = (CoreDemand::of(case), case.members.len());
     let mut solved = vec![None; count];
-    let (mut shares, mut steps) = (EvaluationBudget::of(count), STEP_LIMIT);
+    let (mut shares, mut steps) = (EvaluationBudget::of(count), TERM_LIMIT);
     for &dag in &case.order {
         solved[dag] = match core.by_deadline {
             false => shares.spend(dag, |steps| core.response(dag, steps)),
@@ -92,7 +93,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
 }
 
 fn sinks(case: &AnalysisInput<'_>, responses: Responses<'_>, found: &mut SinkBounds) {
-    let (core, mut steps) = (CoreDemand::of(case), STEP_LIMIT);
+    let (core, mut steps) = (CoreDemand::of(case), TERM_LIMIT);
     for dag in (0..case.members.len()).filter(|&dag| TEST.is_for(case, dag)) {
         let bounds = core.of_sinks(dag, responses, &mut steps);
         found.offer(dag, bounds.into_iter().map(|(_, bound)| bound));
@@ -109,8 +110,8 @@ fn write(
     let (id, core) = (case.members[dag], CoreDemand::of(case));
     let busy = core.busy(dag, &mut { u64::MAX }).unwrap_or(0);
     text.line(format_args!("bound {id} {bound_ns} core {busy}"));
-    for target in core.last(dag) {
-        core.write(&target, bound_ns, busy, text);
+    for target in core.last_of_levels(dag) {
+        core.write_points(&target, bound_ns, busy, text);
     }
 }
 
@@ -121,13 +122,13 @@ fn write_sinks(
     whole_ns: u64,
     text: &mut WitnessText,
 ) {
-    let (id, core, steps) = (case.members[dag], CoreDemand::of(case), &mut { STEP_LIMIT });
+    let (id, core, steps) = (case.members[dag], CoreDemand::of(case), &mut { TERM_LIMIT });
     for (target, bound) in core.of_sinks(dag, responses, steps) {
         if let Some(bound_ns) = bound.filter(|&bound_ns| bound_ns < whole_ns)
             && let Some(busy) = core.busy(dag, &mut { u64::MAX })
         {
             text.line(format_args!("sooner {id} {bound_ns} {busy}"));
-            core.write(&target, bound_ns, busy, text);
+            core.write_points(&target, bound_ns, busy, text);
         }
     }
 }
@@ -168,8 +169,9 @@ struct CoreDemand<'a> {
     case: &'a AnalysisInput<'a>,
     levels: Vec<LevelDemand>,
     by_deadline: bool,
-    /// By DAG, under static priorities.
-    least: Vec<((u64, usize), bool)>,
+    /// By DAG, under static priorities, the least urgent rank that counts and whether the DAG is in
+    /// a band.
+    least_counting: Vec<((u64, usize), bool)>,
 }
 
 impl<'a> CoreDemand<'a> {
@@ -193,8 +195,8 @@ impl<'a> CoreDemand<'a> {
             }
         }
         let members = 0..if by_deadline { 0 } else { case.members.len() };
-        let least = members.map(|dag| Self::least_of(case, dag)).collect();
-        Self { case, levels, by_deadline, least }
+        let least_counting = members.map(|dag| Self::least_of(case, dag)).collect();
+        Self { case, levels, by_deadline, least_counting }
     }
 
     fn period_ns(&self, dag: usize) -> u64 {
@@ -207,8 +209,7 @@ impl<'a> CoreDemand<'a> {
         let own = case.relation.ranks(dag);
         let mut least = own[1];
         loop {
-            // Until nothing more comes in: what may delay one of these may delay the job through
-            // it.
+            // Until nothing more comes in: a DAG that delays one of these delays the job, too.
             let ranks = (0..case.members.len()).map(|other| case.relation.ranks(other));
             let outrank = ranks.filter(|&[most, _]| most < least);
             match outrank.map(|[_, lower]| lower).max() {
@@ -218,24 +219,29 @@ impl<'a> CoreDemand<'a> {
         }
     }
 
+    /// Returns the steps of one sum: under EDF one for each term.
+    fn step(&self) -> u64 {
+        if self.by_deadline { self.levels.len() as u64 } else { 1 }
+    }
+
     /// Reports whether long steps or a device take time from the core.
     fn has_losses(&self) -> bool {
         self.case.set.bursts.during(0) > 0
     }
 
     fn is_band(&self, dag: usize) -> bool {
-        self.by_deadline || self.least[dag].1
+        self.by_deadline || self.least_counting[dag].1
     }
 
     /// Reports whether work of a DAG counts for another one, or for itself.
     fn counts(&self, other: usize, dag: usize) -> bool {
         let most = || self.case.relation.ranks(other)[0];
-        other == dag || self.by_deadline || most() < self.least[dag].0
+        other == dag || self.by_deadline || most() < self.least_counting[dag].0
     }
 
     /// Returns the subtasks of a DAG in the order in which each of its jobs starts them; in their
     /// place the whole job, if the DAG is in no band.
-    fn order(&self, dag: usize) -> Vec<TargetSubtask> {
+    fn start_order(&self, dag: usize) -> Vec<TargetSubtask> {
         let (task, subtasks) = (self.case.tasks[dag], self.case.dag(dag).subtasks());
         if !self.is_band(dag) {
             return vec![TargetSubtask {
@@ -277,8 +283,8 @@ impl<'a> CoreDemand<'a> {
     }
 
     /// Returns those of a DAG's subtasks whose responses are the longest: the last of each level.
-    fn last(&self, dag: usize) -> Vec<TargetSubtask> {
-        let order = self.order(dag);
+    fn last_of_levels(&self, dag: usize) -> Vec<TargetSubtask> {
+        let order = self.start_order(dag);
         let is_last = |&place: &usize| {
             let mut later = order[place + 1..].iter();
             later.all(|of| of.due_ns != order[place].due_ns)
@@ -289,9 +295,9 @@ impl<'a> CoreDemand<'a> {
     /// Returns the response time of a DAG's jobs if it is of use, found within so many steps.
     fn response(&self, dag: usize, steps: &mut u64) -> Option<u64> {
         let (busy, limit_ns) = (self.busy(dag, steps)?, self.case.set.figures[dag].limit_ns());
-        let mut most = 0;
-        for target in self.last(dag) {
-            most = self.solve(&target, most, (busy, limit_ns), steps)?;
+        let (mut most, mut left) = (0, RELEASE_LIMIT);
+        for target in self.last_of_levels(dag) {
+            most = self.solve(&target, most, [busy, limit_ns], (&mut left, steps))?;
         }
         Some(most)
     }
@@ -309,7 +315,7 @@ impl<'a> CoreDemand<'a> {
             false => responses[dag].is_some(),
         };
         let busy = is_known.then(|| self.busy(dag, steps)).flatten();
-        let order = self.order(dag);
+        let order = self.start_order(dag);
         let mut places = vec![0; self.case.dag(dag).subtasks().len()];
         for (place, target) in order.iter().enumerate() {
             if let Some(of) = places.get_mut(target.subtask) {
@@ -321,7 +327,7 @@ impl<'a> CoreDemand<'a> {
         let bounds = targets.map(|target| {
             let is_band = target.subtask != usize::MAX;
             let bound = busy.filter(|_| is_band).and_then(|busy| {
-                self.solve(&target, 0, (busy, u64::MAX), steps)
+                self.solve(&target, 0, [busy, u64::MAX], (&mut { RELEASE_LIMIT }, steps))
             });
             (target, bound)
         });
@@ -350,7 +356,7 @@ impl<'a> CoreDemand<'a> {
             ReleasedWork { first_ns: 0, period_ns, most: u64::MAX, work_ns }
         };
         let released: Vec<ReleasedWork> = all.map(release).collect();
-        self.fixed_point(blocking_ns.max(1), blocking_ns, &released, false, steps)
+        self.fixed_point([blocking_ns.max(1), u64::MAX], (blocking_ns, &released, false), steps)
     }
 
     /// Returns the longest WCET of those that keep the core and do not count for a DAG.
@@ -359,72 +365,86 @@ impl<'a> CoreDemand<'a> {
         below.map(|level| level.keeps_ns).max().unwrap_or(0)
     }
 
-    /// Returns the response time of a subtask, or `most` if that is more; `None` if it is beyond
-    /// the
-    /// limit.
+    /// Returns the response time of a subtask, or `most` if that is more; `None` if the time is
+    /// beyond the limit, or not found within so many releases and steps.
     fn solve(
         &self,
         target: &TargetSubtask,
         mut most: u64,
-        (busy, limit_ns): (u64, u64),
-        steps: &mut u64,
+        [busy, limit_ns]: [u64; 2],
+        (left, steps): (&mut u32, &mut u64),
     ) -> Option<u64> {
-        let mut after = 0_u64;
+        let (mut after, mut released, mut known_ns) = (0_u64, Vec::new(), 0);
         while after.saturating_add(most) <= busy {
+            *left = left.checked_sub(1)?;
+            *steps = steps.checked_sub(self.step())?;
             for blocker in self.blockers(target, after) {
-                let finish_ns = self.finish(target, after, blocker, steps)?;
+                let latest_ns = after.saturating_add(limit_ns);
+                // Under EDF most of them lengthen nothing, which one sum shows.
+                let enough_ns = if self.by_deadline { after.saturating_add(most) } else { 0 };
+                let range_ns = [enough_ns, known_ns, latest_ns];
+                let of = (target, after, blocker);
+                let finish_ns = self.finish(of, range_ns, &mut released, steps)?;
                 most = most.max(finish_ns.saturating_sub(after));
+                // Of a later job all that counts is more, but for a blocking one under EDF.
+                if !self.by_deadline {
+                    known_ns = finish_ns - target.wcet_ns;
+                }
             }
             if most > limit_ns {
                 return None;
             }
-            *steps = steps.checked_sub(1)?;
-            after = self.next(target, after);
+            after = self.next_candidate(target, after);
         }
         Some(most)
     }
 
-    /// Writes the points of that.
-    fn write(&self, target: &TargetSubtask, bound_ns: u64, busy: u64, text: &mut WitnessText) {
+    /// Writes the releases that are looked at, each with the finishes.
+    fn write_points(&self, target: &TargetSubtask, bound_ns: u64, busy: u64, text: &mut WitnessText) {
         if target.subtask != usize::MAX {
             text.line(format_args!("target {}", target.subtask));
         }
         let mut after = 0_u64;
         while after.saturating_add(bound_ns) <= busy {
-            let finish = |blocker| self.finish(target, after, blocker, &mut { u64::MAX });
-            let finishes = self.blockers(target, after).into_iter().map(finish);
+            let mut released = Vec::new();
+            let finishes = self.blockers(target, after).map(|blocker| {
+                let of = (target, after, blocker);
+                self.finish(of, [0, 0, u64::MAX], &mut released, &mut { u64::MAX })
+            });
             let finishes = finishes.map(|finish_ns| finish_ns.unwrap_or(u64::MAX));
             let numbers = core::iter::once(after).chain(finishes);
             text.list("at", numbers.map(i128::from));
-            after = self.next(target, after);
+            after = self.next_candidate(target, after);
         }
     }
 
     /// Returns what may keep the core as a stretch begins, by how long after it the job is
     /// released.
-    fn blockers(&self, target: &TargetSubtask, after: u64) -> Vec<CoreBlocker> {
-        if !self.by_deadline {
-            return vec![(self.blocked_below(target.dag), None)];
-        }
+    fn blockers(&self, target: &TargetSubtask, after: u64) -> impl Iterator<Item = CoreBlocker> {
+        let first_ns = match self.by_deadline {
+            true => 0,
+            false => self.blocked_below(target.dag),
+        };
         let period = i128::from(self.period_ns(target.dag));
         let due = i128::from(after) + target.due_ns;
         let next = target.due_ns + (i128::from(after) / period + 1) * period;
-        let mut found = vec![(0, None)];
-        for level in self.levels.iter().filter(|level| level.keeps_ns > 0) {
-            let since = due + i128::from(level.dag < target.dag) - level.due_ns;
-            if level.dag == target.dag && level.due_ns > next {
-                found.push((level.keeps_ns, None));
-            } else if level.dag != target.dag && since < 0 {
-                let first = since + i128::from(self.period_ns(level.dag));
-                let first_ns = u64::try_from(first).unwrap_or(0);
-                found.push((level.keeps_ns, Some((level.dag, first_ns))));
+        let dag = target.dag;
+        let keeping = self.levels.iter();
+        let keeping = keeping.filter(|level| self.by_deadline && level.keeps_ns > 0);
+        let found = keeping.filter_map(move |level| {
+            let since = due + i128::from(level.dag < dag) - level.due_ns;
+            if level.dag == dag {
+                return (level.due_ns > next).then_some((level.keeps_ns, None));
             }
-        }
-        found
+            let first = since + i128::from(self.period_ns(level.dag));
+            let late = (level.dag, u64::try_from(first).unwrap_or(0));
+            (since < 0).then_some((level.keeps_ns, Some(late)))
+        });
+        core::iter::once((first_ns, None)).chain(found)
     }
 
     /// Returns the next instant at which more counts for a subtask.
-    fn next(&self, target: &TargetSubtask, after: u64) -> u64 {
+    fn next_candidate(&self, target: &TargetSubtask, after: u64) -> u64 {
         let now = i128::from(after);
         let next = self.levels.iter().filter_map(|level| {
             let period = i128::from(self.period_ns(level.dag));
@@ -439,42 +459,48 @@ impl<'a> CoreDemand<'a> {
         next.min().and_then(|next| u64::try_from(next).ok()).unwrap_or(u64::MAX)
     }
 
-    /// Returns when a subtask is complete whose job is released so long after the stretch's begin.
+    /// Returns when a subtask is complete whose job is released so long after the stretch's begin,
+    /// or the first of three times if the subtask is complete by then. The others are known to be
+    /// before its start, and of no use after.
     fn finish(
         &self,
-        target: &TargetSubtask,
-        after: u64,
-        (blocking_ns, late): CoreBlocker,
+        (target, after, (blocking_ns, late)): (&TargetSubtask, u64, CoreBlocker),
+        [enough_ns, known_ns, latest_ns]: [u64; 3],
+        released: &mut Vec<ReleasedWork>,
         steps: &mut u64,
     ) -> Option<u64> {
-        let (mut released, earlier_ns) = self.released(target, after, late);
-        released.retain(|work| work.most > 0);
+        released.clear();
+        let earlier_ns = self.released(target, after, late, released);
+        let is_closed = target.keeps_core && blocking_ns == 0;
+        let own_ns = target.wcet_ns * u64::from(!target.keeps_core);
         let base_ns = blocking_ns.checked_add(earlier_ns)?.checked_add(target.before_ns)?;
-        match target.keeps_core {
-            true => {
-                let is_closed = blocking_ns == 0;
-                let start_ns = self.fixed_point(base_ns, base_ns, &released, is_closed, steps)?;
-                start_ns.checked_add(target.wcet_ns)
-            }
-            false => {
-                let base_ns = base_ns.checked_add(target.wcet_ns)?;
-                self.fixed_point(base_ns, base_ns, &released, false, steps)
+        let base_ns = base_ns.checked_add(own_ns)?;
+        let rest_ns = target.wcet_ns - own_ns;
+        let of = (base_ns, &released[..], is_closed);
+        if let Some(end_ns) = enough_ns.checked_sub(rest_ns) {
+            *steps = steps.checked_sub(self.step())?;
+            // If a sum is no more than its time, so is the least that equals it.
+            if self.sum(end_ns, of)? <= end_ns {
+                return Some(enough_ns);
             }
         }
+        let range_ns = [base_ns.max(known_ns), latest_ns];
+        self.fixed_point(range_ns, of, steps)?.checked_add(rest_ns)
     }
 
-    /// Returns what counts for a subtask, and the work of its DAG's earlier jobs in the stretch.
+    /// Adds what counts for a subtask, and returns the work of its DAG's earlier jobs in the stretch.
     fn released(
         &self,
         target: &TargetSubtask,
         after: u64,
         late: Option<(usize, u64)>,
-    ) -> (Vec<ReleasedWork>, u64) {
+        released: &mut Vec<ReleasedWork>,
+    ) -> u64 {
         let own_ns = self.period_ns(target.dag);
         let jobs = i128::from(after / own_ns);
         let [high, low] = self.case.relation.ranks(target.dag);
         let younger_may_win = !self.by_deadline && high.0 != low.0;
-        let (mut released, mut earlier_ns) = (Vec::new(), 0_u64);
+        let mut earlier_ns = 0_u64;
         for level in &self.levels {
             let (work_ns, period_ns) = (level.work_ns, self.period_ns(level.dag));
             let period = i128::from(period_ns);
@@ -497,34 +523,43 @@ impl<'a> CoreDemand<'a> {
                 (0, i128::MAX * i128::from(self.counts(level.dag, target.dag)))
             };
             let most = u64::try_from(most.max(0)).unwrap_or(u64::MAX);
-            released.push(ReleasedWork { first_ns, period_ns, most, work_ns });
+            if most > 0 {
+                released.push(ReleasedWork { first_ns, period_ns, most, work_ns });
+            }
         }
-        (released, earlier_ns)
+        earlier_ns
     }
 
-    /// Returns the least time from one on that equals a base and all work that is released before
-    /// it, or until it if that is closed.
+    /// Returns the least time of a range that equals its sum.
     fn fixed_point(
         &self,
-        mut time_ns: u64,
-        base_ns: u64,
-        released: &[ReleasedWork],
-        is_closed: bool,
+        [mut time_ns, latest_ns]: [u64; 2],
+        of: (u64, &[ReleasedWork], bool),
         steps: &mut u64,
     ) -> Option<u64> {
         loop {
-            *steps = steps.checked_sub(1)?;
-            let end_ns = time_ns.checked_add(is_closed.into())?;
-            let bursts = self.case.set.bursts.during(time_ns.into());
-            let mut after = u64::try_from(bursts).ok()?.checked_add(base_ns)?;
-            for work in released {
-                let jobs = end_ns.saturating_sub(work.first_ns).div_ceil(work.period_ns);
-                after = after.checked_add(jobs.min(work.most).checked_mul(work.work_ns)?)?;
+            *steps = steps.checked_sub(self.step()).filter(|_| time_ns <= latest_ns)?;
+            match self.sum(time_ns, of)? {
+                same if same == time_ns => return Some(same),
+                after => time_ns = after,
             }
-            if after == time_ns {
-                return Some(after);
-            }
-            time_ns = after;
         }
+    }
+
+    /// Returns a base and all work that is released before a time, or until the time if that is
+    /// closed.
+    fn sum(
+        &self,
+        time_ns: u64,
+        (base_ns, released, is_closed): (u64, &[ReleasedWork], bool),
+    ) -> Option<u64> {
+        let end_ns = time_ns.checked_add(is_closed.into())?;
+        let bursts = self.case.set.bursts.during(time_ns.into());
+        let mut sum = u64::try_from(bursts).ok()?.checked_add(base_ns)?;
+        for work in released {
+            let jobs = end_ns.saturating_sub(work.first_ns).div_ceil(work.period_ns);
+            sum = sum.checked_add(jobs.min(work.most).checked_mul(work.work_ns)?)?;
+        }
+        Some(sum)
     }
 }

@@ -1,11 +1,15 @@
 //! The tests of one core are exact: in virtual time their worst case comes.
 
 use random::Random;
-use sched_dag::analysis::{AnalysisResult, SchedulabilityTest, answer};
+use sched_dag::analysis::{AnalysisResult, NotProvenReason, SchedulabilityTest, answer};
 use sched_dag::{DagSpec, Policy, Preemption, TaskSet};
 
 use super::simulate::{commit, responses, spec};
 use super::{FP, answered, bounds, settings};
+
+const EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Enabled);
+const NON_PREEMPTIVE_FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Disabled);
+const NON_PREEMPTIVE_EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Disabled);
 
 /// Draws DAGs of one subtask that are all released at once, and again after 120, and that are no
 /// overload in the long run; answers, and observes the longest responses.
@@ -85,4 +89,71 @@ fn what_a_carry_in_would_count_twice_is_proven() {
         specs.map(|(priority, (period, wcet))| spec(period, period, &[wcet], &[], priority));
     let answer = answered(&specs.collect::<Vec<_>>(), &settings(FP, 1));
     assert_eq!(bounds(&answer), [Some(42), Some(771), Some(772)]);
+}
+
+/// Units of the published examples, and DAGs of one subtask, the most urgent one first.
+const MS: u64 = 1_000_000;
+
+fn sequential(dags: &[[u64; 3]]) -> Vec<DagSpec> {
+    let dags = (0..).zip(dags);
+    let specs = dags.map(|(priority, &[wcet_ns, period_ns, deadline_ns])| {
+        spec(period_ns, deadline_ns, &[wcet_ns], &[], priority)
+    });
+    specs.collect()
+}
+
+/// Answers for DAGs given by WCET, period and deadline in half milliseconds.
+fn published(dags: &[[u64; 3]], kind: (Policy, Preemption), cores: u32) -> AnalysisResult {
+    let dags: Vec<[u64; 3]> = dags
+        .iter()
+        .map(|dag| dag.map(|time| time * MS / 2))
+        .collect();
+    answered(&sequential(&dags), &settings(kind, cores))
+}
+
+/// The bounds in half milliseconds, rounded.
+fn halves(answer: &AnalysisResult) -> Vec<Option<u64>> {
+    let rounded = |bound: Option<u64>| bound.map(|bound_ns| (bound_ns + MS / 4) / (MS / 2));
+    bounds(answer).into_iter().map(rounded).collect()
+}
+
+#[test]
+fn published_examples_of_one_core_have_their_response_times() {
+    // Davis, Burns, Bril and Lukkien 2007: 2, 3 and 3.5 ms.
+    let can = published(&[[2, 5, 5], [2, 7, 7], [2, 7, 7]], NON_PREEMPTIVE_FP, 1);
+    assert_eq!(halves(&can), [Some(4), Some(6), Some(7)]);
+    // SchedCAT's tests of Guan and Yi: 8, 11, 3 and 1, 2, 6 ms.
+    for (dags, [a, b, c]) in [
+        ([[4, 18, 18], [6, 24, 24], [4, 8, 8]], [16, 22, 6]),
+        ([[2, 8, 8], [2, 24, 24], [6, 32, 32]], [2, 4, 12]),
+    ] {
+        let found = published(&dags, EDF, 1);
+        assert_eq!(halves(&found), [Some(a), Some(b), Some(c)]);
+    }
+    // Nasri and Brandenburg 2017, figure 1a: a run on one core is late, so none may be proven.
+    let dags = [[4, 20, 20], [16, 60, 60], [26, 120, 120]];
+    assert!(!published(&dags, NON_PREEMPTIVE_EDF, 1).is_proven());
+}
+
+#[test]
+fn published_examples_of_two_cores_have_bounds() {
+    // SchedCAT's tests of Guan et al. 2009: 1, 1, 4 and, as equations close at 16, 16 ms.
+    let dags = |last_due| [[2, 8, 8], [2, 10, 10], [6, 18, 18], [18, 36, last_due]];
+    let found = published(&dags(36), FP, 2);
+    assert_eq!(halves(&found), [Some(2), Some(2), Some(8), Some(32)]);
+    let found = published(&dags(30), FP, 2);
+    assert_eq!(halves(&found), [Some(2), Some(2), Some(8), None]);
+    assert_eq!(found.reasons[3], Some(NotProvenReason::NoBound));
+    // As many sequential DAGs as cores: nobody ever waits.
+    for kind in [FP, EDF, NON_PREEMPTIVE_FP, NON_PREEMPTIVE_EDF] {
+        let found = published(&[[2, 8, 8], [2, 10, 2]], kind, 2);
+        assert_eq!(bounds(&found), [Some(MS), Some(MS)]);
+        let tests = found.bounds.iter().flatten().map(|bound| bound.test);
+        let widths = tests.filter(|&test| test == SchedulabilityTest::Widths);
+        // Alone the first one has its length as well.
+        assert!(widths.count() > usize::from(kind != FP), "{kind:?}");
+    }
+    // One core less than they are wide: then the second one may wait.
+    let found = published(&[[2, 8, 8], [2, 10, 2]], NON_PREEMPTIVE_EDF, 1);
+    assert!(!found.is_proven());
 }

@@ -149,13 +149,14 @@ fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
 
 #[test]
 fn under_edf_what_has_a_shorter_deadline_may_block_too() {
-    // The second DAG may be released during the chain and be due after it, and keep its core
-    // when the chain goes on: 6 at either subtask of the chain, besides the jobs that are due
-    // before it.
+    // The second DAG may be released during the chain and be due after it, and keep its cores
+    // when the chain goes on: 6 + 6 at its first subtask and 6 at the second, besides two jobs of 12
+    // that are due before it, makes 42 on two cores. It waits for 3 + 2, next to 6 and a chain that
+    // is due before it: 16 on two cores.
     let chain = spec(40, 40, &[2, 3], &[(0, 1)], 0);
-    let short = spec(20, 20, &[6], &[], 1);
+    let short = spec(20, 20, &[6, 6], &[], 1);
     let answer = answered(&[chain, short], &settings(NON_PREEMPTIVE_EDF, 2));
-    assert_eq!(bounds(&answer), [Some(14), Some(9)]);
+    assert_eq!(bounds(&answer), [Some(26), Some(14)]);
 }
 
 #[test]

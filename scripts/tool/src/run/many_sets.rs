@@ -1,13 +1,13 @@
 //! `run --on host` with many sets: those of a file, or of all files of a folder, in one CSV.
 //!
-//! A program for each processor of this computer runs its share of the sets. The table has a row
-//! for each DAG, under the set and its file; a set that is refused has one row with the reason, and
-//! so has a file that cannot be read.
+//! A program for each processor of this computer runs its share of the next sets, and their rows
+//! are printed before the others are run. The table has a row for each DAG, under the set and its
+//! file; a set that is refused has one row with the reason, and so has a file that cannot be read,
+//! or a set at which the program died.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::thread::{self, ScopedJoinHandle};
 use std::time::Duration;
 
@@ -32,16 +32,68 @@ const COLUMNS: &str = "file,set,verdict,dag,subtasks,period_ns,relative_deadline
 /// A set that is run, or the reasons why a file is not.
 type Part<'f> = (&'f Path, Result<Set, String>);
 
+/// The rows of a part.
+struct PartRows {
+    verdict: &'static str,
+    /// Whether each of the DAGs has a bound.
+    is_proven: bool,
+    rows: String,
+}
+
+/// So many parts are run by one program at most.
+const SHARE: usize = 16;
+
 /// Runs all sets of the files, and prints the table.
 pub(super) fn run(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let why = "is for one set; name a file of one with `--dag`";
     let apart = [&FOR_ONE_FILE[..], &[name::KEEP, name::JSON]].concat();
     let for_several = options.check_without(&apart, why);
     for_several.map_err(Refusal::Usage)?;
-    let (mut parts, mut told) = (Vec::<Part<'_>>::new(), Vec::new());
-    for file in files {
+    let (parts, words) = read(options, files)?;
+    let program = image::build_host().map_err(Refusal::Failure)?;
+    let seconds = options.number(name::TIMEOUT).unwrap_or(86_400);
+    let run = |share: &[Part<'_>]| run_share(&program, &words, seconds, share);
+    let processors = thread::available_parallelism().map_or(1, usize::from);
+    let mut progress = Progress::new(parts.len() as u64, "sets");
+    let mut all = Vec::new();
+    println!("{COLUMNS}");
+    for next in parts.chunks(SHARE * processors) {
+        progress.show(all.len() as u64);
+        let shares = next.chunks(next.len().div_ceil(processors));
+        let ended: Vec<_> = thread::scope(|scope| {
+            let running: Vec<_> = shares.map(|share| scope.spawn(|| run(share))).collect();
+            let ended = running.into_iter().map(ScopedJoinHandle::join);
+            ended.collect()
+        });
+        progress.wipe();
+        for share in ended {
+            let share = share.unwrap_or_else(|_| Err("a thread has panicked".into()));
+            let share = share.map_err(Refusal::Failure)?;
+            share.iter().for_each(|part| print!("{}", part.rows));
+            all.extend(share);
+        }
+    }
+    let count = |verdict| all.iter().filter(|part| part.verdict == verdict).count();
+    let (refused, failed) = (count("refused"), count("failed"));
+    if !options.is_given(name::QUIET) {
+        let (count, proven) = (all.len(), all.iter().filter(|part| part.is_proven).count());
+        eprintln!("{count} sets: {proven} proven, {refused} refused, {failed} failed");
+    }
+    Ok(worst(refused, failed))
+}
+
+/// Reads all files. Returns their sets, and the words for the program.
+fn read<'f>(
+    options: &Parsed,
+    files: &'f [PathBuf],
+) -> Result<(Vec<Part<'f>>, Vec<String>), Refusal> {
+    let mut progress = Progress::new(files.len() as u64, "files read");
+    let (mut parts, mut told) = (Vec::<Part<'f>>::new(), Vec::new());
+    for (number, file) in (0..).zip(files) {
+        progress.show(number);
         match prepare(&options.with(name::DAG, file)) {
             Ok(Some(dags)) => {
+                // They follow from the options alone, so those of any file are those of all.
                 told = words(options, Some(&dags), on_linux::own_words(options));
                 parts.extend(dags.file.sets.into_iter().map(|set| (&**file, Ok(set))));
             }
@@ -50,134 +102,109 @@ pub(super) fn run(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refus
             Err(other) => return Err(other),
         }
     }
-    let lines = run_sets(options, &parts, told)?;
-    let mut of_parts = lines.split_inclusive(|line| line.kind == "verdict");
-    println!("{COLUMNS}");
-    let (mut refused, mut failed) = (0, 0);
-    for (path, part) in &parts {
-        let verdict = match part {
-            Ok(set) => of_set(path, set, of_parts.next().unwrap_or_default()),
-            Err(lines) => {
-                row(&files::shown_path(path), "", "refused", lines, None);
-                "refused"
-            }
-        };
-        refused += usize::from(verdict == "refused");
-        failed += usize::from(verdict == "failed");
-    }
-    let count = parts.len();
-    if !options.is_given(name::QUIET) {
-        eprintln!("{count} sets: {refused} refused, {failed} failed");
-    }
-    Ok(worst(refused, failed))
+    progress.wipe();
+    told.retain(|word| word != "tests=on");
+    Ok((parts, told))
 }
 
-/// Runs the sets by a program for each processor; returns the machine lines of all.
-fn run_sets(
-    options: &Parsed,
-    parts: &[Part<'_>],
-    mut words: Vec<String>,
-) -> Result<Vec<MachineLine>, Refusal> {
-    let sets = parts.iter().filter_map(|(_, part)| part.as_ref().ok());
-    let of_set = |set: &Set| {
-        DagFile {
-            sets: vec![set.clone()],
-        }
-        .to_string()
-    };
-    let texts: Vec<String> = sets.map(of_set).collect();
-    if texts.is_empty() {
-        return Ok(Vec::new());
-    }
-    words.retain(|word| word != "tests=on");
-    let program = image::build_host()?;
-    let seconds = options.number(name::TIMEOUT).unwrap_or(86_400);
-    let progress = Mutex::new((0, Progress::new(texts.len() as u64, "sets")));
-    let run = |texts: &[String]| {
+/// Runs parts by one program after the other, of which each goes on behind the set at which the one
+/// before has died. `seconds` is how long a set may take.
+fn run_share(
+    program: &Path,
+    words: &[String],
+    seconds: u64,
+    share: &[Part<'_>],
+) -> Result<Vec<PartRows>, String> {
+    let sets = share.iter().filter_map(|(_, part)| part.clone().ok());
+    let texts = sets.map(|set| DagFile { sets: vec![set] }.to_string());
+    let texts: Vec<String> = texts.collect();
+    let mut ends = Vec::new();
+    while ends.len() < texts.len() {
+        let left = &texts[ends.len()..];
         let log = Temporary(Some(system::new_log("dag-file")?));
         let module = Temporary(Some(log.path().with_extension("dags")));
-        files::write(module.path(), texts.join("\x0c"))?;
-        let mut words: Vec<OsString> = words.iter().map(OsString::from).collect();
+        files::write(module.path(), left.join("\x0c"))?;
         let mut word = OsString::from("module=");
         word.push(module.path());
-        words.push(word);
+        let words: Vec<OsString> = words.iter().map(OsString::from).chain([word]).collect();
         let order = ProgramOrder {
-            program: &program,
+            program,
             words: &words,
             is_live: false,
             stops: false,
             log: log.path(),
-            limit: Duration::from_secs(seconds),
+            limit: Duration::from_secs(seconds.saturating_mul(left.len() as u64)),
         };
-        let outcome = program::run(&order, &mut |line| {
-            if line.starts_with("{\"kind\":\"verdict\"")
-                && let Ok(mut progress) = progress.lock()
-            {
-                progress.0 += 1;
-                let over = progress.0;
-                progress.1.show(over);
-            }
-        })?;
-        let count = outcome.transcript.of_kind("verdict").count();
-        match count == texts.len() {
-            true => Ok(outcome.transcript.machine),
-            false => Err(format!("{count} sets were run: {}", outcome.ending)),
+        let outcome = program::run(&order, &mut |_| ())?;
+        let lines = &outcome.transcript.machine;
+        let of_sets = lines.split_inclusive(|line| line.kind == "verdict");
+        let is_whole = |lines: &&[MachineLine]| lines.iter().any(|line| line.kind == "verdict");
+        ends.extend(
+            of_sets
+                .filter(is_whole)
+                .map(|lines| (lines.to_vec(), String::new())),
+        );
+        if ends.len() < texts.len() {
+            ends.push((Vec::new(), outcome.ending.to_string()));
         }
-    };
-    let processors = thread::available_parallelism().map_or(1, usize::from);
-    let shares = texts.chunks(texts.len().div_ceil(processors));
-    let all: Result<Vec<_>, String> = thread::scope(|scope| {
-        let running: Vec<_> = shares.map(|share| scope.spawn(|| run(share))).collect();
-        let ended = running.into_iter().map(ScopedJoinHandle::join);
-        ended
-            .map(|lines| lines.unwrap_or_else(|_| Err("a thread has panicked".into())))
-            .collect()
-    });
-    if let Ok((_, progress)) = progress.into_inner() {
-        progress.wipe();
     }
-    Ok(all.map_err(Refusal::Failure)?.concat())
+    let mut ends = ends.into_iter();
+    let rows = share.iter().map(|(path, part)| match part {
+        Ok(set) => of_set(path, set, &ends.next().unwrap_or_default()),
+        Err(lines) => PartRows {
+            verdict: "refused",
+            is_proven: false,
+            rows: row(path, "", "refused", lines, None),
+        },
+    });
+    Ok(rows.collect())
 }
 
-/// Prints the rows of a set; returns its verdict.
-fn of_set(path: &Path, set: &Set, lines: &[MachineLine]) -> &'static str {
-    let file = &*files::shown_path(path);
+/// Returns the rows of a set by its machine lines, or by the way in which the program died at it.
+fn of_set(path: &Path, set: &Set, (lines, died): &(Vec<MachineLine>, String)) -> PartRows {
     let of_kind = |kind| lines.iter().filter(move |line| line.kind == kind);
     let end = of_kind("verdict").next();
-    let text = |name| end.and_then(|end| end.text_at(name)).unwrap_or_default();
+    let text = |name| end.and_then(|end| end.text_at(name));
     let verdict = match text("status") {
-        "success" => "ok",
-        "usage" => "refused",
+        Some("success") => "ok",
+        Some("usage") => "refused",
         _ => "failed",
     };
     let violations = of_kind("dag_set").find_map(|line| line.number_at("violations"));
-    let reason = text("reason");
+    let reason = text("reason").unwrap_or(died);
     let sets = vec![set.clone()];
     let of_file = (verdict == "refused").then(|| translate(reason, path, &DagFile { sets }));
     let reason = of_file
         .flatten()
         .map_or(reason.into(), |lines| lines.replace('\n', "; "));
-    let mut dags = set.dags.iter();
-    for line in of_kind("dag_run") {
-        let of = dags.next().map(|dag| (&dag.spec, line, violations));
-        row(file, &set.name, verdict, &reason, of);
+    let of_dags = set.dags.iter().zip(of_kind("dag_run"));
+    let of_dags = of_dags.map(|(dag, line)| Some((&dag.spec, line, violations)));
+    let mut of_dags: Vec<_> = of_dags.collect();
+    let is_proven =
+        !of_dags.is_empty() && of_kind("dag_run").all(|line| line.number_at("bound_ns").is_some());
+    if of_dags.is_empty() {
+        of_dags.push(None);
     }
-    if of_kind("dag_run").next().is_none() {
-        row(file, &set.name, verdict, &reason, None);
+    let rows = of_dags.into_iter();
+    PartRows {
+        verdict,
+        is_proven,
+        rows: rows
+            .map(|of| row(path, &set.name, verdict, &reason, of))
+            .collect(),
     }
-    verdict
 }
 
-/// Prints a row, by the names of the columns.
+/// Returns a row, by the names of the columns.
 fn row(
-    file: &str,
+    path: &Path,
     set: &str,
     verdict: &str,
     reason: &str,
     dag: Option<(&sched_dag::DagSpec, &MachineLine, Option<u64>)>,
-) {
+) -> String {
     let cell = |name: &str| match (name, dag) {
-        ("file", _) => file.into(),
+        ("file", _) => files::shown_path(path),
         ("set", _) => set.into(),
         ("verdict", _) => verdict.into(),
         ("reason", _) => reason.into(),
@@ -193,7 +220,7 @@ fn row(
         },
     };
     let cells: Vec<String> = COLUMNS.split(',').map(|name| quoted(cell(name))).collect();
-    println!("{}", cells.join(","));
+    cells.join(",") + "\n"
 }
 
 fn number(number: Option<u64>) -> String {

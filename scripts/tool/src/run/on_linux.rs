@@ -214,7 +214,8 @@ pub(super) fn run_app(
         program: &image,
         words: &words,
         is_live: handed::is_live(options) || options.is_given(name::CONSOLE),
-        stops: true,
+        // In virtual time nothing listens, and nothing has to end in order.
+        stops: !is_on_host(options),
         log: &log.path,
         limit,
     };

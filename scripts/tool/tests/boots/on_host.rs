@@ -32,6 +32,7 @@ fn the_commit_on_the_host_is_the_machines() {
         };
         let [host, machine] = ["host", "machine"].map(commit);
         assert!(!host.0.is_empty(), "{file}");
+        assert_eq!(host.1.is_empty(), !words.contains("auto"), "{file}");
         assert_eq!(host, machine, "{file}");
     }
 }

@@ -116,11 +116,34 @@ file set verdict dag bound_ns completed deadline_misses response_time_ns.max vio
     ] {
         assert!(called.out.contains(why), "{}", called.out);
     }
-    let told = "3 sets: 2 refused, 0 failed";
+    let told = "3 sets: 1 proven, 2 refused, 0 failed";
     assert!(called.complaint.contains(told), "{}", called.complaint);
     // The same file alone is a table, too.
     let alone = call(&folder, format!("run {words} b.dag").split(' ')).out;
     assert_eq!(alone.lines().count(), called.out.lines().count() - 1);
+}
+
+#[test]
+fn a_set_without_an_end_has_a_row_and_keeps_no_other_from_being_run() {
+    let folder = folder("endless");
+    let set =
+        |jobs: &str| format!("set of{jobs}\ndag x period 1ms jobs {jobs}\nsubtask a wcet 1us\n");
+    let sets = ["3", "1000000000", "2"].map(set).concat();
+    fs::write(folder.join("sets.dag"), sets + "end\n").expect("a file");
+    let run = "run --on host --timeout 1 --dag sets.dag";
+    let called = call(&folder, run.split(' '));
+    assert_eq!(called.code, Some(1), "{}", called.complaint);
+    let rows = called.out.lines().skip(1);
+    let begins = rows.map(|row| row.split(',').take(4).collect::<Vec<_>>().join(" "));
+    let expected = [
+        "sets.dag of3 ok x",
+        "sets.dag of1000000000 failed ",
+        "sets.dag of2 ok x",
+    ];
+    assert_eq!(begins.collect::<Vec<_>>(), expected, "{}", called.out);
+    assert!(called.out.contains("\"no end within "), "{}", called.out);
+    let told = "3 sets: 2 proven, 0 refused, 1 failed";
+    assert!(called.complaint.contains(told), "{}", called.complaint);
 }
 
 #[test]
@@ -139,7 +162,7 @@ fn a_workflow_of_a_thousand_tasks_is_bounded() {
         text += &format!("edge {one} -> {diff}\nedge {other} -> {diff}\nedge {diff} -> model\n");
     }
     for (project, correct) in project.iter().zip(&correct) {
-        text += &format!("edge project -> {correct}\n").replace("project", project);
+        text += &format!("edge {project} -> {correct}\n");
         text += &format!("edge model -> {correct}\nedge {correct} -> add\n");
     }
     fs::write(folder.join("montage.dag"), text + "end\n").expect("a file");
@@ -182,6 +205,10 @@ run --on host --dag sets.dag --keep x.rec | `--keep` is for one set; name a file
         (
             "jbos=3",
             "command line: `jbos` is no option; there are overheads, ",
+        ),
+        (
+            "idle=halt",
+            "command line: `idle` means nothing here; leave it out",
         ),
     ] {
         let called = call(&folder, format!("{run} --append {words}").split(' '));
