@@ -28,7 +28,7 @@ use fass::edge::Replay;
 use fass::log::LogLine;
 use fass::platform::{Buffer, Plan, SubtaskRunner};
 use fass::shared::{DeviceEnd, Wire};
-use sched_dag::engine::{Alternate, FaultCost};
+use sched_dag::engine::{Alternate, FaultCost, ProvenBounds, Run};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Request, WaitId};
 use sched_dag::virtual_time::{RunOutcome, VirtualTime as Driver, Workload};
@@ -204,6 +204,7 @@ pub(crate) struct Session {
     may_shut_down: bool,
     /// Up to when it has run.
     until_ns: u64,
+    proven: ProvenBounds,
 }
 
 fn dags(task_set: &TaskSet) -> impl Iterator<Item = (DagId, &Dag)> + Clone {
@@ -228,7 +229,13 @@ impl Session {
             driver: driver.with_lifecycle(plan.lifecycle)?.recording(),
             calls: Calls::new(&task_set, machine),
             until_ns: 0,
+            proven: plan.proven,
         })
+    }
+
+    fn run_so_far(&self) -> Run {
+        let run = self.driver.run_so_far();
+        run.with_proven(self.proven.clone())
     }
 
     /// Returns the number of the DAG of this name.
@@ -301,7 +308,7 @@ impl Session {
         let now_ns = self.driver.now_ns();
         let is_over = end == RunOutcome::Finished;
         let outcome = (machine.edge).of_replay(|replay| replay.outcome(is_over));
-        let (run, calls) = (self.driver.run_so_far(), &self.calls);
+        let (run, calls) = (self.run_so_far(), &self.calls);
         let report = Report {
             panics: calls.panics.clone(),
             degraded: calls.degraded.clone(),
@@ -350,7 +357,7 @@ impl Session {
     /// Returns the recording of the run so far.
     pub(crate) fn recording(&self) -> Vec<u8> {
         let edge = &self.calls.machine.edge;
-        edge.recording(&self.driver.run_so_far())
+        edge.recording(&self.run_so_far())
     }
 }
 

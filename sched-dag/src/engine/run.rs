@@ -93,8 +93,13 @@ impl Run {
         cores: u32,
     ) -> Self {
         let journal = core::mem::take(&mut engine.scheduler.log.journal);
-        let run = Self::so_far(engine, journal, cores);
-        Self { proven, ..run }
+        Self::so_far(engine, journal, cores).with_proven(proven)
+    }
+
+    /// Returns the same with what the commit has proven.
+    #[must_use]
+    pub fn with_proven(self, proven: ProvenBounds) -> Self {
+        Self { proven, ..self }
     }
 
     /// Makes one of an engine that may go on, and of a copy of its journal.

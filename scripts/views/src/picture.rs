@@ -139,7 +139,7 @@ pub fn graphs(view: &View<'_>) -> String {
     picture.svg.into_text((picture.right, height))
 }
 
-/// Returns the part of a name that fits into a box: its end, where generated names differ.
+/// Shortens a name for a box: its end stays, where generated names differ.
 fn fitted(name: &str) -> String {
     let (count, most) = (name.chars().count(), ((BOX.0 - LETTER) / LETTER) as usize);
     let end: String = name

@@ -3,7 +3,7 @@
 //! A program for each processor of this computer runs its share of the next sets, and their rows
 //! are printed before the others are run. The table has a row for each DAG, under the set and its
 //! file; a set that is refused has one row with the reason, and so has a file that cannot be read,
-//! or a set at which the program died.
+//! or a set that ended the program.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -107,8 +107,8 @@ fn read<'f>(
     Ok((parts, told))
 }
 
-/// Runs parts by one program after the other, of which each goes on behind the set at which the one
-/// before has died. `seconds` is how long a set may take.
+/// Runs parts by a program. Where the program dies at a set, another goes on behind the set. A set
+/// may take `seconds`.
 fn run_share(
     program: &Path,
     words: &[String],
@@ -160,7 +160,7 @@ fn run_share(
     Ok(rows.collect())
 }
 
-/// Returns the rows of a set by its machine lines, or by the way in which the program died at it.
+/// Returns the rows of a set by its machine lines, or by the program's death at it.
 fn of_set(path: &Path, set: &Set, (lines, died): &(Vec<MachineLine>, String)) -> PartRows {
     let of_kind = |kind| lines.iter().filter(move |line| line.kind == kind);
     let end = of_kind("verdict").next();

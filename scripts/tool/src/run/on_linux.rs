@@ -200,7 +200,7 @@ pub(super) fn run_app(
         options,
         guest.is_some().then_some(mode),
     );
-    if guest.is_none() {
+    if guest.is_none() && !is_on_host(options) {
         kept.introduce(&screen);
     }
     let mut show = |line: &str| {

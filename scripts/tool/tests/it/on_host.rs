@@ -72,6 +72,24 @@ fn a_late_set_fails_where_deadlines_are_strict() {
     assert!(strict.complaint.contains(told), "{}", strict.complaint);
 }
 
+#[test]
+fn a_response_beyond_its_bound_is_a_failure() {
+    let folder = folder("beyond");
+    fs::write(
+        folder.join("late.dag"),
+        format!("{LATE}end\n").replace("0ms", "ms"),
+    )
+    .expect("a file");
+    let run = "run --on host --dag late.dag";
+    let shorter = "--execution uniform:0.1..0.2 --keep shorter.rec";
+    succeed(&folder, &format!("{run} {shorter}"));
+    succeed(&folder, "recording shorter.rec --observe small.wcets");
+    let called = call(&folder, format!("{run} --wcets small.wcets").split(' '));
+    assert_eq!(called.code, Some(1), "{}", called.complaint);
+    let told = "dag `cam` took 10.000 ms in job 49, beyond its proven bound of ";
+    assert!(called.complaint.contains(told), "{}", called.complaint);
+}
+
 /// The columns `file`, `set`, `verdict`, `dag`, `bound_ns`, `completed`, `deadline_misses`,
 /// `response_time_ns.max` and `violations` of a row.
 const COLUMNS: [usize; 9] = [0, 1, 2, 3, 7, 11, 12, 16, 18];
