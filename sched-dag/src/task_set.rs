@@ -40,6 +40,7 @@ pub struct TaskSet {
     /// The number of vertices.
     vertices: usize,
     tables: Box<[Table]>,
+    certificate: Option<Box<str>>,
 }
 
 /// A verified DAG task.
@@ -118,6 +119,7 @@ impl TaskSet {
             dags,
             clusters: clusters.into(),
             tables: Box::default(),
+            certificate: None,
         }
     }
 
@@ -125,6 +127,17 @@ impl TaskSet {
     #[doc(hidden)]
     pub fn set_tables(&mut self, tables: Vec<Table>) {
         self.tables = tables.into();
+    }
+
+    /// Fixes the set: no DAG is paused, resumed or ended from outside, and no mode entered. The text is
+    /// a certificate for its analysis, which `certify` makes there.
+    pub fn fix(&mut self, certificate: &str) {
+        self.certificate = Some(certificate.into());
+    }
+
+    /// Returns the certificate of a fixed set.
+    pub fn certificate(&self) -> Option<&str> {
+        self.certificate.as_deref()
     }
 
     /// Returns the tables.

@@ -53,6 +53,13 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     let file = read(machine, wishes.settings.length)?;
     let mut reports = Vec::new();
     for set in &file.sets {
+        // A person may pause DAGs.
+        let certificate = if machine.has_console() {
+            ""
+        } else {
+            &set.certificate
+        };
+        machine.fix(certificate);
         // What is wrong with the DAGs is wrong with the file that we were given.
         let commit =
             commit(set, &wishes.settings).map_err(|error| usage(format!("DAG file: {error}")))?;

@@ -8,8 +8,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagFault, DagSpec, MOST_FAULTS, SubtaskId, SubtaskLabel,
-    sorted_by_key, verify,
+    CommitOptions, ConstructionPolicy, DagFault, DagSpec, MOST_FAULTS, RejectedDags, SubtaskId,
+    SubtaskLabel, VerifiedDags, sorted_by_key, verify,
 };
 use text::Malformed;
 use text::of_file;
@@ -23,17 +23,7 @@ use crate::length::Length;
 ///
 /// Every fault, with its line; of very many the first, and their number.
 pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), Vec<Malformed>> {
-    let length = length.of(set);
-    let specs = set.dags.iter().map(|dag| DagSpec {
-        jobs: Some(length.jobs(&dag.spec)),
-        ..dag.spec.clone()
-    });
-    let specs: Vec<DagSpec> = specs.collect();
-    let options = machine
-        .clone()
-        .with_construction(ConstructionPolicy::any_graph())
-        .with_lists(&set.core_lists());
-    let Err(rejected) = verify(&specs, &options) else {
+    let Err(rejected) = verified(set, machine, length) else {
         return Ok(());
     };
     let faults = of_file(&rejected);
@@ -54,6 +44,29 @@ pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), V
         }
     });
     Err(told.collect())
+}
+
+/// Verifies a set as [`check`] does, and returns its model.
+///
+/// # Errors
+///
+/// Every fault.
+pub fn verified(
+    set: &Set,
+    machine: &CommitOptions,
+    length: Length,
+) -> Result<VerifiedDags, RejectedDags> {
+    let length = length.of(set);
+    let specs = set.dags.iter().map(|dag| DagSpec {
+        jobs: Some(length.jobs(&dag.spec)),
+        ..dag.spec.clone()
+    });
+    let specs: Vec<DagSpec> = specs.collect();
+    let options = machine
+        .clone()
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_lists(&set.core_lists());
+    verify(&specs, &options)
 }
 
 /// Returns the line that a fault is about; 1 if it is about no line in particular.

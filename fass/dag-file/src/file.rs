@@ -25,6 +25,8 @@ pub struct Set {
     pub dags: Vec<FileDag>,
     /// The lists of cores, each with its line.
     pub lists: Vec<(usize, String)>,
+    /// The certificate, a line each; empty if there is none.
+    pub certificate: String,
 }
 
 impl Set {

@@ -25,7 +25,7 @@ mod parse;
 pub mod time;
 mod write;
 
-pub use check::check;
+pub use check::{check, verified};
 pub use execution::{Execution, WHOLE, kernel_overheads_ns};
 pub use file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 pub use length::Length;

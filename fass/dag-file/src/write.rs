@@ -22,6 +22,7 @@ impl Display for DagFile {
             for (_, list) in &set.lists {
                 writeln!(out, "{list}")?;
             }
+            out.write_str(&set.certificate)?;
         }
         writeln!(out, "end")
     }

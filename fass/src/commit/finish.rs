@@ -29,7 +29,7 @@ use super::tie::tie;
 use crate::api::dag::Dag;
 use crate::api::lifecycle::dags_of_modes;
 use crate::draft::fault::{CommitError, Fault};
-use crate::draft::part::{CheckedDag, CommitCheck, Drafts, one_of_each};
+use crate::draft::part::{CheckedDag, CommitCheck, Drafts, PartKind, Planner, one_of_each};
 use crate::platform;
 use crate::platform::{LaunchError, RunConfig};
 
@@ -184,6 +184,9 @@ pub fn finish_create_dags_in_order(
     if let Err(error) = divide(&mut task_set, &terms, &drafts, !lists.is_empty()) {
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
+    if let Err(error) = fix(&mut task_set, &terms, &drafts) {
+        return Err(CommitError::of(Fault::NotLaunched(error), warnings));
+    }
     let answers = CommitAnswers::new(&task_set, &terms);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
@@ -210,6 +213,24 @@ pub fn finish_create_dags_in_order(
         }),
         Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
     }
+}
+
+/// Fixes the set if it has a certificate, which goes with nothing that changes what runs.
+fn fix(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) -> Result<(), LaunchError> {
+    let Some(certificate) = &terms.certificate else {
+        return Ok(());
+    };
+    let planners = one_of_each::<Planner>(drafts);
+    if planners
+        .iter()
+        .any(|(kind, _)| *kind == PartKind::Lifecycle)
+    {
+        let why = "a certificate fixes the set, but a subtask may pause a DAG, enter a mode or end the \
+                   run, or a DAG starts paused; leave that out, or the certificate";
+        return Err(LaunchError::new(why));
+    }
+    task_set.fix(certificate);
+    Ok(())
 }
 
 /// Divides the cores if the commit is to, or if that alone gives a proof that is demanded. Stated

@@ -56,6 +56,11 @@ pub struct RunConfig {
     /// A file of WCETs that were observed, if there is one; the commit takes what it has for its
     /// DAGs in place of what they state. `sched_dag::wcets` has the format.
     pub wcets: Option<Cow<'static, str>>,
+    /// The word of an app that its next commit is of a *fixed* set: all jobs are released, on time, and
+    /// no DAG is paused, resumed or ended by functions, modes or persons. The text is a certificate of
+    /// that set ([`certify`](sched_dag::analysis::certify())), by which the commit may bound responses
+    /// that depend on it. A fault, or an execution beyond its WCET, voids the bounds of all.
+    pub certificate: Option<Cow<'static, str>>,
     /// The budget of a subtask that states a WCET only, in WCETs; 0 for none.
     pub budget_factor: u64,
     /// The most events that journals have room for; 0: nothing is written down.
@@ -77,6 +82,7 @@ impl RunConfig {
             overheads: Overheads::NONE,
             overhead_source: OverheadSource::Stated,
             wcets: None,
+            certificate: None,
             budget_factor: 0,
             most_events: u64::MAX,
         }

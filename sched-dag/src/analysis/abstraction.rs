@@ -15,16 +15,24 @@
 //! [`explore()`](super::explore()) looks for such a list; [`check_closed`] checks a list in one
 //! pass, and trusts nothing of the search.
 //!
-//! Assumes: each DAG is periodic, all jobs are released, each within the jitter after its nominal
+//! Where DAGs have a last job, some state is the last before a candidate is cut off. From there on states
+//! count the *laps* (hyperperiods) that are over, and a job at or beyond the limit is no candidate.
+//! A state without laps stands for any number of these, so a list needs the few ends that its states
+//! have, not each lap.
+//!
+//! Assumes: each DAG is periodic, all stated jobs are released, each within the jitter after its nominal
 //! release; no instance loses its core or waits; nothing else executes. *Fewer* jobs than stated are a
-//! different set: the bounds do not hold beside pauses, modes, or the end of one DAG. No release waits for
-//! room in flight: the bound and the jitter of a DAG are at most its limit of jobs times the period.
+//! different set: the bounds do not hold beside pauses, modes, faults, or the early end of one DAG. No
+//! release waits for room in flight: the bound and the jitter of a DAG are at most its limit of jobs in
+//! flight times the period.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::ratio::greatest_common_divisor;
+use crate::fnv::{EMPTY, fnv_1a};
 use crate::order::{sort, sorted};
+use crate::worded::texts;
 
 /// The largest time of a set, in nanoseconds: 13 days; sums of a few stay far below an `i64`.
 const MOST_NS: u64 = 1 << 50;
@@ -44,6 +52,8 @@ pub struct AbstractionDag {
     pub offset_ns: u64,
     /// The longest time from a nominal release to the release, below the period.
     pub jitter_ns: u64,
+    /// The number of jobs; of all DAGs or of none.
+    pub jobs: Option<u64>,
     /// The subtasks.
     pub subtasks: Vec<AbstractionSubtask>,
     /// The edges.
@@ -63,32 +73,32 @@ pub struct AbstractionSubtask {
     pub deadline_ns: Option<u64>,
 }
 
-/// The reason for a set without a closed list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotClosed {
-    /// A sink may finish after its deadline, as far as states tell: no proof of a miss.
-    Late {
-        /// The DAG.
-        dag: usize,
-        /// The sink.
-        subtask: usize,
-    },
-    /// No core, no period, a WCET of 0 or below the shortest execution, a jitter as long as the period,
-    /// edges in a circle or to no subtask, or a sink without a deadline.
-    NotCovered,
-    /// More states than the limit, or a hyperperiod of too many instances or too long.
-    Limit,
-    /// A listed state is none of this set: of other numbers of subtasks or cores, out of order, or
-    /// beyond all times.
-    Malformed {
-        /// The state.
-        state: usize,
-    },
-    /// The list does not include a state that a run may reach.
-    Open {
-        /// The state with that successor; `None`: the initial state.
-        state: Option<usize>,
-    },
+texts! {
+    /// The reason for a set without a closed list.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum NotClosed {
+        /// A sink may finish after its deadline, as far as states tell: no proof of a miss.
+        Late { dag: usize, subtask: usize } =
+            "subtask {subtask} of dag {dag} may be late, as far as states tell; relax its deadline";
+        /// No core, no period, a WCET of 0 or below the shortest execution, a jitter as long as the
+        /// period, edges in a circle or to no subtask, a sink without a deadline, or a last job of some
+        /// DAGs only.
+        NotCovered =
+            "none covers this set; let all DAGs be periodic and end, or none, and subtasks keep their \
+             cores without waits, locks, groups and lists";
+        /// More states than the limit, or a hyperperiod of too many instances or too long.
+        Limit = "it has too many states, or a hyperperiod too many instances; use fewer periods";
+        /// The text is of another set, of other cores, or of other charges.
+        Foreign = "it is of another set, of other cores or of other overheads; explore this one";
+        /// A listed state is none of this set: of other numbers of subtasks or cores, out of order, or
+        /// beyond all times.
+        Malformed { state: usize } = "state {state} is none of this set; explore it again";
+        /// The list does not include the initial state.
+        NoFirst = "no listed state includes the first one; explore the set again";
+        /// The list does not include a state that a run may reach next.
+        Open { state: usize } =
+            "state {state} has a successor that no listed state includes; explore the set again";
+    }
 }
 
 /// A set of DAGs on the cores of one cluster, ready to be explored.
@@ -96,11 +106,14 @@ pub enum NotClosed {
 pub struct AbstractionSet {
     pub(super) cores: usize,
     adds_release: bool,
-    /// Whether executions are real numbers, as on a machine; else they are whole nanoseconds.
+    /// Whether executions are real numbers, and a release is seen together with all that were due no
+    /// later, as on a machine; else they are whole nanoseconds, and releases are late one by one.
     is_real: bool,
     hyperperiod_ns: i64,
     /// By DAG: period, offset, jitter, jobs in a hyperperiod.
     dags: Vec<[i64; 4]>,
+    /// By DAG, the number of all jobs; empty: there is no end.
+    limits: Vec<i64>,
     /// DAG by DAG.
     vertices: Vec<AbstractVertex>,
 }
@@ -126,6 +139,8 @@ pub(super) struct FinishInterval {
 /// A state, in normal form where it is in a list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AbstractState {
+    /// The laps that are over, if jobs are cut off; `None`: any number.
+    pub(super) laps: Option<i64>,
     /// By vertex, the number of dispatched jobs.
     pub(super) counts: Vec<i64>,
     /// The earliest and the latest times at which cores become free, each sorted.
@@ -135,10 +150,11 @@ pub struct AbstractState {
 }
 
 impl AbstractState {
-    /// Returns numbers for [`AbstractionSet::state`]: the counts, the earliest and the latest times
-    /// of cores, and four numbers of each finish.
+    /// Returns numbers for [`AbstractionSet::state`]: 0, or 1 more than the laps; the counts, the earliest
+    /// and the latest times of cores, and four numbers of each finish.
     pub fn numbers(&self) -> Vec<i64> {
-        let mut numbers = self.counts.clone();
+        let mut numbers = vec![self.laps.map_or(0, |laps| laps + 1)];
+        numbers.extend(&self.counts);
         self.free_ns.iter().for_each(|times| numbers.extend(times));
         for of in &self.finishes {
             let vertex = i64::try_from(of.vertex).unwrap_or(i64::MAX);
@@ -152,8 +168,12 @@ impl AbstractState {
 struct Candidate {
     vertex: usize,
     key: (i128, usize, i64, usize),
+    /// The nominal release.
+    release_ns: i64,
     earliest_ns: i64,
     latest_ns: i64,
+    /// The latest finish of all that it waits for besides its release.
+    finished_ns: i64,
 }
 
 impl AbstractionDag {
@@ -181,7 +201,8 @@ impl AbstractionDag {
 
 impl AbstractionSet {
     /// Prepares a set. `adds_release` says whether the policy adds the nominal release to the numbers,
-    /// `is_real` whether executions are real numbers.
+    /// `is_real` whether executions are real numbers, and a release is seen together with all that were
+    /// due no later.
     ///
     /// # Errors
     ///
@@ -208,6 +229,7 @@ impl AbstractionSet {
             is_real,
             hyperperiod_ns: whole(hyperperiod_ns)?,
             dags: Vec::new(),
+            limits: Vec::new(),
             vertices: Vec::new(),
         };
         let mut instances = 0_u64;
@@ -217,6 +239,10 @@ impl AbstractionSet {
             let times = [dag.period_ns, dag.offset_ns, dag.jitter_ns].map(whole);
             let [period, offset, jitter] = times;
             set.dags.push([period?, offset?, jitter?, whole(jobs)?]);
+            if let Some(limit) = dag.jobs {
+                whole(limit.saturating_mul(dag.period_ns))?;
+                set.limits.push(whole(limit)?);
+            }
             let first = set.vertices.len();
             for (subtask, terms) in dag.subtasks.iter().enumerate() {
                 let times_ns = terms.wcet_ns.max(terms.best_ns);
@@ -235,9 +261,42 @@ impl AbstractionSet {
             }
         }
         match instances {
+            // The end of some DAGs beside others that go on.
+            _ if !set.limits.is_empty() && set.limits.len() < dags.len() => {
+                Err(NotClosed::NotCovered)
+            }
             ..=INSTANCE_LIMIT => Ok(set),
             _ => Err(NotClosed::Limit),
         }
+    }
+
+    /// Returns a hash of all that makes the set.
+    pub(super) fn hash(&self) -> u64 {
+        let mut hash = EMPTY;
+        let mut add = |number: u64| hash = fnv_1a(hash, &number.to_le_bytes());
+        add(self.cores as u64);
+        add(u64::from(self.adds_release) + 2 * u64::from(self.is_real));
+        for (dag, times) in self.dags.iter().enumerate() {
+            times.iter().for_each(|time| add(time.cast_unsigned()));
+            add(self
+                .limits
+                .get(dag)
+                .map_or(0, |limit| limit.cast_unsigned() + 1));
+        }
+        for of in &self.vertices {
+            let AbstractionSubtask {
+                best_ns,
+                wcet_ns,
+                number,
+                deadline_ns,
+            } = of.terms;
+            let deadline_ns = deadline_ns.map_or(0, |ns| ns + 1);
+            let terms = [of.dag as u64, best_ns, wcet_ns, number, deadline_ns];
+            terms.into_iter().for_each(&mut add);
+            add(of.predecessors.len() as u64);
+            of.predecessors.iter().for_each(|&of| add(of as u64));
+        }
+        hash
     }
 
     /// Returns zeros by DAG and subtask.
@@ -252,6 +311,7 @@ impl AbstractionSet {
     /// Returns the state before anything has been dispatched.
     pub(super) fn initial(&self) -> AbstractState {
         self.normal(AbstractState {
+            laps: None,
             counts: vec![0; self.vertices.len()],
             free_ns: [vec![0; self.cores], vec![0; self.cores]],
             finishes: vec![],
@@ -260,7 +320,8 @@ impl AbstractionSet {
 
     /// Returns the state of such [numbers](AbstractState::numbers), if the set can have it.
     pub fn state(&self, numbers: &[i64]) -> Option<AbstractState> {
-        let (counts, rest) = numbers.split_at_checked(self.vertices.len())?;
+        let (laps, rest) = numbers.split_first()?;
+        let (counts, rest) = rest.split_at_checked(self.vertices.len())?;
         let (low_ns, rest) = rest.split_at_checked(self.cores)?;
         let (high_ns, rest) = rest.split_at_checked(self.cores)?;
         let (finishes, []) = rest.as_chunks() else {
@@ -275,6 +336,7 @@ impl AbstractionSet {
             })
         };
         let state = AbstractState {
+            laps: (*laps != 0).then(|| laps.saturating_sub(1)),
             counts: counts.to_vec(),
             free_ns: [low_ns.to_vec(), high_ns.to_vec()],
             finishes: finishes.iter().map(finish).collect::<Option<_>>()?,
@@ -296,8 +358,11 @@ impl AbstractionSet {
                 && is_time(&of.low_ns)
                 && is_time(&of.high_ns)
         };
+        let over_ns = state.laps.unwrap_or(0).checked_mul(self.hyperperiod_ns);
         let mut counts = state.counts.iter().zip(&self.vertices);
-        state.counts.len() == self.vertices.len()
+        over_ns.is_some_and(|ns| (0..=LATEST_NS).contains(&ns))
+            && (state.laps.is_none() || !self.limits.is_empty())
+            && state.counts.len() == self.vertices.len()
             && counts.all(is_count)
             && (state.free_ns.iter()).all(|times| {
                 times.len() == self.cores && times.is_sorted() && times.iter().all(is_time)
@@ -308,25 +373,70 @@ impl AbstractionSet {
                 .all(|of| (of[0].vertex, of[0].job) < (of[1].vertex, of[1].job))
     }
 
+    /// Returns the number of jobs of a DAG behind so many laps.
+    fn limit(&self, dag: usize, laps: i64) -> i64 {
+        self.limits[dag] - laps * self.dags[dag][3]
+    }
+
+    /// Returns a state at each end that cuts off one of its candidates.
+    fn ends(&self, state: &AbstractState) -> Vec<AbstractState> {
+        let mut ends = Vec::new();
+        if state.laps.is_some() || self.limits.is_empty() {
+            return ends;
+        }
+        for candidate in self.candidates(state) {
+            let dag = self.vertices[candidate.vertex].dag;
+            let left = self.limits[dag] - state.counts[candidate.vertex];
+            let laps = left / self.dags[dag][3];
+            let mut counts = self.vertices.iter().zip(&state.counts);
+            let is_end = left >= 0
+                && left == laps * self.dags[dag][3]
+                && counts.all(|(of, count)| *count <= self.limit(of.dag, laps));
+            if is_end
+                && !ends
+                    .iter()
+                    .any(|end: &AbstractState| end.laps == Some(laps))
+            {
+                let mut end = state.clone();
+                end.laps = Some(laps);
+                ends.push(end);
+            }
+        }
+        ends
+    }
+
+    /// Calls `each` with the normal successors of a state, and of its ends, as
+    /// [`transitions`](Self::transitions) does.
+    pub(super) fn successors(
+        &self,
+        state: &AbstractState,
+        bounds: &mut [Vec<u64>],
+        each: &mut dyn FnMut(AbstractState) -> Result<(), NotClosed>,
+    ) -> Result<(), NotClosed> {
+        self.transitions(state, bounds, each)?;
+        let mut ends = self.ends(state).into_iter();
+        ends.try_for_each(|end| self.transitions(&end, bounds, each))
+    }
+
     /// Returns the next job of each vertex, of which all predecessors have been dispatched.
     fn candidates(&self, state: &AbstractState) -> Vec<Candidate> {
         let mut candidates = Vec::new();
         for (position, vertex) in self.vertices.iter().enumerate() {
             let job = state.counts[position];
-            if vertex
-                .predecessors
-                .iter()
-                .any(|&of| state.counts[of] <= job)
-            {
+            let mut before = vertex.predecessors.iter();
+            let is_cut = state
+                .laps
+                .is_some_and(|laps| job >= self.limit(vertex.dag, laps));
+            if is_cut || before.any(|&of| state.counts[of] <= job) {
                 continue;
             }
             let [period_ns, offset_ns, jitter_ns, _] = self.dags[vertex.dag];
             let release_ns = offset_ns + job * period_ns;
-            let [mut earliest_ns, mut latest_ns] = [release_ns, release_ns + jitter_ns];
+            let [mut earliest_ns, mut finished_ns] = [release_ns, -LATEST_NS];
             for finish in &state.finishes {
                 if self.precedes(finish, position, job) {
                     earliest_ns = earliest_ns.max(finish.low_ns);
-                    latest_ns = latest_ns.max(finish.high_ns);
+                    finished_ns = finished_ns.max(finish.high_ns);
                 }
             }
             let added_ns = if self.adds_release { release_ns } else { 0 };
@@ -334,8 +444,10 @@ impl AbstractionSet {
             candidates.push(Candidate {
                 vertex: position,
                 key: (number, vertex.dag, job, vertex.subtask),
+                release_ns,
                 earliest_ns,
-                latest_ns,
+                latest_ns: finished_ns.max(release_ns + jitter_ns),
+                finished_ns,
             });
         }
         candidates
@@ -357,7 +469,7 @@ impl AbstractionSet {
     /// # Errors
     ///
     /// A sink may be late, or `each` fails.
-    pub(super) fn transitions(
+    fn transitions(
         &self,
         state: &AbstractState,
         bounds: &mut [Vec<u64>],
@@ -365,13 +477,18 @@ impl AbstractionSet {
     ) -> Result<(), NotClosed> {
         let candidates = self.candidates(state);
         let first_ready = candidates.iter().map(|of| of.latest_ns).min();
-        let busy_until_ns = state.free_ns[1][0].max(first_ready.unwrap_or(0));
+        let busy_until_ns = state.free_ns[1][0].max(first_ready.unwrap_or(i64::MIN));
         for chosen in &candidates {
             let start_ns = chosen.earliest_ns.max(state.free_ns[0][0]);
             let more_urgent = candidates.iter().filter(|of| of.key < chosen.key);
             // What is ready at the same instant and more urgent goes first; the instants just before
             // that readiness are whole ones only where executions are.
-            let first = more_urgent.map(|of| of.latest_ns).min().unwrap_or(i64::MAX);
+            // Once one is released, all are that were due no later.
+            let latest = more_urgent.map(|of| match of.release_ns <= chosen.release_ns {
+                true if self.is_real => of.finished_ns,
+                _ => of.latest_ns,
+            });
+            let first = latest.min().unwrap_or(i64::MAX);
             let latest_ns = busy_until_ns.min(first - i64::from(!self.is_real));
             if start_ns > latest_ns || start_ns >= first {
                 continue;
@@ -449,6 +566,7 @@ impl AbstractionSet {
         let laps = laps.map(|(number, count)| count.div_euclid(jobs(number)));
         let laps = laps.min().unwrap_or(0);
         let back_ns = laps * self.hyperperiod_ns;
+        state.laps = state.laps.map(|over| over + laps);
         for (number, count) in state.counts.iter_mut().enumerate() {
             *count -= laps * jobs(number);
         }
@@ -469,7 +587,7 @@ impl AbstractionSet {
     /// Returns a time before which nothing starts.
     pub(super) fn now_ns(&self, state: &AbstractState) -> i64 {
         let earliest = self.candidates(state).into_iter().map(|of| of.earliest_ns);
-        state.free_ns[0][0].max(earliest.min().unwrap_or(0))
+        state.free_ns[0][0].max(earliest.min().unwrap_or(i64::MIN))
     }
 
     /// Reports whether each run of a normal state is in another one, too.
@@ -480,7 +598,7 @@ impl AbstractionSet {
             let same = |one: &&FinishInterval| (one.vertex, one.job) == (finish.vertex, finish.job);
             state.finishes.iter().find(same).copied()
         };
-        outer.counts == inner.counts
+        (outer.laps, &outer.counts) == (inner.laps, &inner.counts)
             && outer_ns[0].iter().zip(&inner_ns[0]).all(is_earlier)
             && inner_ns[1].iter().zip(&outer_ns[1]).all(is_earlier)
             && inner.finishes.iter().all(|finish| {
@@ -517,16 +635,13 @@ pub fn check_closed(
         same.any(|&of| set.includes(&states[of], state))
     };
     if !has(&set.initial()) {
-        return Err(NotClosed::Open { state: None });
+        return Err(NotClosed::NoFirst);
     }
     let mut bounds = set.no_bounds();
     for (number, state) in states.iter().enumerate() {
-        let state_number = Some(number);
-        set.transitions(state, &mut bounds, &mut |next| match has(&next) {
+        set.successors(state, &mut bounds, &mut |next| match has(&next) {
             true => Ok(()),
-            false => Err(NotClosed::Open {
-                state: state_number,
-            }),
+            false => Err(NotClosed::Open { state: number }),
         })?;
     }
     Ok(bounds)

@@ -8,6 +8,8 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::abstraction::{AbstractionSet, NotClosed};
+use super::certificate::{check_certificate, graph_of};
 use super::features::Features;
 use super::ranks::{InstanceOrder, PreemptionMix, RankRelation};
 use super::set::{EquationSet, constrained};
@@ -25,7 +27,7 @@ use crate::task_set::{Dag, Subtask};
 /// others of these cannot be. There are no other DAGs on the cores of the settings, and no other
 /// tables.
 pub(super) fn with_case(
-    (dags, tables): (&[Dag], &[&Table]),
+    (dags, tables, certificate): (&[Dag], &[&Table], Option<&str>),
     own: &[usize],
     settings: &AnalysisSettings,
     reasons: &mut [Option<NotProvenReason>],
@@ -42,6 +44,8 @@ pub(super) fn with_case(
     let tasks: Vec<&Task> = known.collect();
     let relation = relation.among(&members);
     let mut case = AnalysisInput::new(places, own, (&members, &tasks), relation, settings);
+    case.certificate = certificate;
+    case.closed = certificate.map(|text| check_certificate(&case.graph()?, text));
     let verdict = case.settle();
     work(&case, verdict, reasons);
 }
@@ -138,6 +142,9 @@ pub(super) struct AnalysisInput<'a> {
     pub(super) tables: Vec<CaseTable<'a>>,
     /// By DAG, the features that enter it: its own, and those of all that may delay it.
     pub(super) entering: Vec<Features>,
+    pub(super) certificate: Option<&'a str>,
+    /// By DAG and subtask, the bounds of sinks by a certificate, if there is one.
+    pub(super) closed: Option<Result<Vec<Vec<u64>>, NotClosed>>,
 }
 
 impl<'a> AnalysisInput<'a> {
@@ -163,6 +170,8 @@ impl<'a> AnalysisInput<'a> {
             set: EquationSet::new(tasks, settings.cores),
             tables: Vec::new(),
             entering: Vec::new(),
+            certificate: None,
+            closed: None,
         };
         let tables = case.places.tables.iter();
         case.tables = tables.map(|table| case.checked(table)).collect();
@@ -227,6 +236,15 @@ impl<'a> AnalysisInput<'a> {
             times: check_table(table, &of_table).map_err(NotProvenReason::NotRight),
             dags,
         }
+    }
+
+    /// Returns the schedule-abstraction graph, of all DAGs or of none.
+    pub(super) fn graph(&self) -> Result<AbstractionSet, NotClosed> {
+        if self.members.len() < self.own.len() || self.tells_cores() {
+            return Err(NotClosed::NotCovered);
+        }
+        let dags = (0..self.members.len()).map(|dag| (self.dag(dag), self.tasks[dag]));
+        graph_of(&mut dags.into_iter(), self.settings, &self.set.bursts)
     }
 
     /// Returns by DAG the features that enter it.

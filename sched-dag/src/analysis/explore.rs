@@ -28,7 +28,7 @@ pub fn explore(set: &AbstractionSet, limit: usize) -> Result<Vec<AbstractState>,
             if expanded.len() >= limit {
                 return Err(NotClosed::Limit);
             }
-            set.transitions(&state, &mut bounds, &mut |state| {
+            set.successors(&state, &mut bounds, &mut |state| {
                 let place = next.iter().position(|other| touch(other, &state));
                 match place {
                     Some(place) => next[place] = set.normal(hull(set, &next[place], &state)),
@@ -47,7 +47,7 @@ pub fn explore(set: &AbstractionSet, limit: usize) -> Result<Vec<AbstractState>,
 fn touch(one: &AbstractState, other: &AbstractState) -> bool {
     let [low, high] = &one.free_ns;
     let [other_low, other_high] = &other.free_ns;
-    one.counts == other.counts
+    (one.laps, &one.counts) == (other.laps, &other.counts)
         && (0..low.len())
             .all(|core| low[core] <= other_high[core] + 1 && other_low[core] <= high[core] + 1)
 }
@@ -82,6 +82,7 @@ fn hull(set: &AbstractionSet, one: &AbstractState, other: &AbstractState) -> Abs
         }
     }
     AbstractState {
+        laps: one.laps,
         counts: one.counts.clone(),
         free_ns: [pairs(0, i64::min), pairs(1, i64::max)],
         finishes,

@@ -162,8 +162,8 @@ impl Features {
             locks,
             name: _,
             graph_hash: _,
-            // Bounds hold for any offsets, but those of tables, which are made for them; and for
-            // any of the jobs.
+            // Bounds hold for any offsets and any of the jobs; but those of tables, which are made
+            // for their offsets, and of graphs, whose certificates have both.
             offset_ns: _,
             first_job: _,
             jobs: _,

@@ -5,10 +5,14 @@
 //! (missing WCETs, a path longer than the deadline, a subtask longer than the period, more work
 //! than cores) is said instead of what a test says.
 
+use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::abstraction::NotClosed;
 use super::case::{AnalysisInput, dag_id, of_cluster, with_case};
+use super::certificate::write_certificate;
+use super::explore::{STATE_LIMIT, explore};
 use super::ratio::Ratio;
 use super::schedulability::{JobBounds, bound_by_each, bound_jobs, bound_sinks};
 use super::task::Task;
@@ -69,6 +73,29 @@ pub fn bounds_by_test(task_set: &TaskSet, settings: &AnalysisSettings) -> Vec<Ve
     found
 }
 
+/// Explores a set whose cores are not divided, and returns its certificate for a later commit with the
+/// same settings.
+///
+/// # Errors
+///
+/// The set is not covered, or has no closed list within the limit.
+pub fn certify(task_set: &TaskSet, settings: &AnalysisSettings) -> Result<String, NotClosed> {
+    let (mut found, mut reasons) = (
+        Err(NotClosed::NotCovered),
+        vec![None; task_set.dags().len()],
+    );
+    each_case(task_set, settings, &mut reasons, &mut |_, case, _, _| {
+        found = case.graph().and_then(|graph| {
+            let states = explore(&graph, STATE_LIMIT)?;
+            Ok(write_certificate(&graph, &states))
+        });
+    });
+    match task_set.is_divided() {
+        true => Err(NotClosed::NotCovered),
+        false => found,
+    }
+}
+
 /// Calls `work` for the case of each cluster, with the positions of all its DAGs.
 fn each_case(
     task_set: &TaskSet,
@@ -85,7 +112,7 @@ fn each_case(
         let tables = task_set.tables().iter();
         let tables: Vec<&Table> = tables.filter(|table| table.cluster == cluster).collect();
         with_case(
-            (dags, &tables),
+            (dags, &tables, task_set.certificate()),
             &own,
             &settings,
             reasons,

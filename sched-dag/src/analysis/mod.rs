@@ -29,6 +29,7 @@
 //! | `lending`, `lent_cores` | tables of DAGs, and what these leave to others | derived here |
 //! | `table_making`, `table_check` | tables of several DAGs; whether a table keeps its times | derived here |
 //! | `abstraction`, `explore` | the schedule-abstraction graph of periodic DAGs that keep cores; its search | Nasri, Nelissen, Brandenburg 2019 |
+//! | `certificate` | closed lists of these graphs, which travel with a set | |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -72,6 +73,7 @@ mod abstraction;
 mod assign;
 mod blocking;
 mod case;
+mod certificate;
 mod cover;
 mod explore;
 mod features;
@@ -116,7 +118,7 @@ pub use cover::{covers, parallelism, width};
 pub use explore::{STATE_LIMIT, explore};
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
-pub use judge::{answer, bounds_by_test};
+pub use judge::{answer, bounds_by_test, certify};
 pub use lending::{CoreOwner, LendingAnswer, LendingPlan, LentGroup, lend};
 pub use lent_cores::CoreSupply;
 pub use list_schedule::{ListSchedule, ScheduledSubtask};
@@ -220,6 +222,8 @@ texts! {
         Widths = "widths that fit the cores";
         /// The times of its entries in a table: nothing else can delay them.
         Table = "its entries in a table";
+        /// A certificate of the schedule-abstraction graph.
+        Graph = "a certificate of its schedule-abstraction graph (Nasri et al. 2019)";
         /// The rest of cores that tables leave, under fixed priorities.
         Member = "what tables leave of its cores";
         /// The multi-path bound on the cores of its group.
@@ -316,6 +320,8 @@ texts! {
         UnboundedLock { dag: DagId, subtask: SubtaskId } =
             "subtask {} of dag {} enters a lock without a longest section, in which it keeps what \
              shares its cores waiting; state one by `Lock::longest`", subtask.0, dag.0;
+        /// The set has a certificate that proves nothing.
+        NoCertificate(fault: NotClosed) = "certificate: {fault}";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

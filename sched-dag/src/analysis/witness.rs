@@ -20,6 +20,7 @@
 //! grid PHASE                                  of a periodic one in a table: its first release, modulo T
 //! affinity CORE..                             of the cluster, counted from 0; without it all
 //! due SUBTASK DEADLINE                        of a sink that is due before its job
+//! releases OFFSET JOBS                        after the dags, of each, if the set is fixed; 0: no end
 //! table LAP                                   after the dags; then the list of each of its cores
 //! list CORE {DAG JOB SUBTASK START FINISH DEPTH}..
 //! hash FNV_1A                                 of all above
@@ -56,6 +57,10 @@
 //! bound DAG R sequence OWNED                  of a member, on one core
 //! bound DAG R lent CHAINS CLIPPED LEFT OWNED  of a member, on several; OWNED: by their tables
 //! chain SUBTASK.. / other DAG R WORK          as above
+//!
+//! state LAPS COUNT.. FREE.. {VERTEX JOB LOW HIGH}..   before all bounds, of a certificate
+//! bound DAG R graph
+//! latest DAG SUBTASK R                        a sink that is complete before its job
 //!
 //! bound DAG R priorities CORES
 //! path SUBTASK..                              each path of the DAG
@@ -97,7 +102,7 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let tables = part_of_tables(task_set, cluster);
         let settings = of_cluster(settings, cores, &mut dags.iter());
         let tables: Vec<&Table> = tables.iter().collect();
-        whole((&dags, &tables), place, &settings)
+        whole((&dags, &tables, task_set.certificate()), place, &settings)
     });
     parts.collect()
 }
@@ -120,7 +125,7 @@ fn part_of_tables(task_set: &TaskSet, cluster: ClusterId) -> Vec<Table> {
 }
 
 fn whole(
-    (dags, tables): (&[Dag], &[&Table]),
+    (dags, tables, certificate): (&[Dag], &[&Table], Option<&str>),
     place: Option<(u32, usize)>,
     settings: &AnalysisSettings,
 ) -> String {
@@ -128,13 +133,13 @@ fn whole(
     let all: Vec<usize> = (0..dags.len()).collect();
     let mut reasons = vec![None; dags.len()];
     with_case(
-        (dags, tables),
+        (dags, tables, certificate),
         &all,
         settings,
         &mut reasons,
         |case, verdict, reasons| {
             text.machine(place, case);
-            text.statement((dags, tables), case);
+            text.statement((dags, tables), certificate.is_some(), case);
             text.hash("hash");
             let bounds = verdict.bounds;
             for dag in 0..case.members.len() {
@@ -198,7 +203,12 @@ impl WitnessText {
         }
     }
 
-    fn statement(&mut self, (dags, tables): (&[Dag], &[&Table]), case: &AnalysisInput<'_>) {
+    fn statement(
+        &mut self,
+        (dags, tables): (&[Dag], &[&Table]),
+        is_fixed: bool,
+        case: &AnalysisInput<'_>,
+    ) {
         let (settings, bursts) = (case.settings, &case.set.bursts);
         for (id, dag) in dags.iter().enumerate() {
             let edges = dag.graph.successors.edges();
@@ -247,6 +257,11 @@ impl WitnessText {
                 }
             }
         }
+        let fixed = dags.iter().filter(|_| is_fixed);
+        fixed.for_each(|dag| {
+            let jobs = dag.jobs().unwrap_or(0);
+            self.line(format_args!("releases {} {jobs}", dag.offset_ns()));
+        });
         tables.iter().for_each(|table| self.table(dags, table));
     }
 

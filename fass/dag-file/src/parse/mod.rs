@@ -24,7 +24,7 @@ use crate::file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 use crate::time::{Time, parse_ns};
 
 /// The words that may stand where a record begins.
-const RECORDS: &str = "`set`, `dag`, `subtask`, `edge`, `core` or `end`";
+const RECORDS: &str = "`set`, `dag`, `subtask`, `edge`, `core`, `certificate`, `state` or `end`";
 
 /// Reads a file.
 ///
@@ -121,6 +121,7 @@ impl<'a> Reader<'a> {
             "subtask" => self.take_subtask(line),
             "edge" => self.take_edge(line),
             "core" => self.take_list(line),
+            "certificate" | "state" => self.take_certificate(line),
             other => {
                 let remedy = match self.file.sets.is_empty() {
                     // Perhaps no line of it is meant for this reader.
@@ -210,6 +211,20 @@ impl<'a> Reader<'a> {
         let list = format!("core {}", line.words.join(" "));
         if let Some(set) = self.file.sets.last_mut() {
             set.lists.push((line.number, list));
+        }
+        Ok(())
+    }
+
+    /// Takes a line of a certificate as it is: only the commit can tell what it proves.
+    fn take_certificate(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+        self.open_dag(line)?;
+        if let Some(set) = self.file.sets.last_mut() {
+            set.certificate.push_str(line.kind);
+            for word in &line.words {
+                set.certificate.push(' ');
+                set.certificate.push_str(word);
+            }
+            set.certificate.push('\n');
         }
         Ok(())
     }

@@ -6,6 +6,7 @@
 //!
 //! An image has the code of those services alone that its app asks for.
 
+use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
@@ -514,6 +515,13 @@ impl<S: System> Machine<S> {
     /// ([`fass::Dag::cluster`]).
     pub fn divide(&self, sizes: &[u32]) {
         self.system.change(|terms| terms.divide(sizes));
+    }
+
+    /// Gives the next commit a certificate, and so [fixes](RunConfig::certificate) its set; an empty text
+    /// does neither.
+    pub fn fix(&self, certificate: &str) {
+        let text = (!certificate.is_empty()).then(|| certificate.to_owned().into());
+        self.system.change(|terms| terms.certificate = text);
     }
 
     /// Leaves that to the command line's word `clusters`: `clusters=2,2` divides the cores so;

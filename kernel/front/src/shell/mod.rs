@@ -262,6 +262,9 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
         ("pause" | "resume", "") => {
             wants("the name or the number of a DAG; `dags` lists them", refuse)
         }
+        ("pause" | "resume", _) if task_set.certificate().is_some() => refuse(
+            &"a certificate fixes the set, whose bounds a pause would void; run it without one",
+        ),
         ("pause", dag) => {
             let what = "releases no more jobs";
             change::<R>(task_set, dag, Request::Pause, what, refuse);

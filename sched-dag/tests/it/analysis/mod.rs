@@ -4,6 +4,7 @@
 //! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
 mod abstraction;
+mod certificates;
 mod climb;
 mod forged;
 mod one_core;

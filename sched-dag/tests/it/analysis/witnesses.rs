@@ -167,7 +167,7 @@ fn the_checker_has_help_and_refuses_command_lines() {
 }
 
 /// Returns how the lines begin that the checker is to say.
-fn lines(task_set: &TaskSet, answer: &AnalysisResult) -> Vec<String> {
+pub(crate) fn lines(task_set: &TaskSet, answer: &AnalysisResult) -> Vec<String> {
     let mut lines = Vec::new();
     for cluster in task_set.clusters() {
         let place = match task_set.clusters().count() > 1 {

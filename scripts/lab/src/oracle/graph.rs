@@ -120,6 +120,7 @@ fn parse_dag(lines: &mut Lines<'_>, is_edf: bool) -> Result<AbstractionDag, Malf
         }
     }
     Ok(AbstractionDag {
+        jobs: None,
         period_ns: header.number(period)?,
         offset_ns: header.number(offset)?,
         jitter_ns: header.number(jitter)?,

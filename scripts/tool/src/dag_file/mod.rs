@@ -157,6 +157,8 @@ pub struct Prepared {
     pub path: PathBuf,
     /// Its content.
     pub file: DagFile,
+    /// The length of the run.
+    pub length: Length,
     /// The memory that it needs, in MiB.
     pub memory_mib: u64,
     /// Words for the guest besides those of options.
@@ -247,6 +249,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         words.push(overheads(cores));
     }
     Ok(Some(Prepared {
+        length,
         memory_mib,
         limit_s: limit_s.min(MOST_S),
         path: path.into(),

@@ -14,7 +14,7 @@ use std::time::Duration;
 use fass_dag_file::{DagFile, Set};
 
 use super::several::{FOR_ONE_FILE, worst};
-use super::{name, on_linux, prepare, words};
+use super::{certificate, name, on_linux, prepare, words};
 use crate::dag_file::translate;
 use crate::files::{self, Temporary};
 use crate::image;
@@ -95,7 +95,11 @@ fn read<'f>(
             Ok(Some(dags)) => {
                 // They follow from the options alone, so those of any file are those of all.
                 told = words(options, Some(&dags), on_linux::own_words(options));
-                parts.extend(dags.file.sets.into_iter().map(|set| (&**file, Ok(set))));
+                let sets = dags.file.sets.into_iter().map(|mut set| {
+                    certificate::give(&mut set, &told, options, dags.length);
+                    (&**file, Ok(set))
+                });
+                parts.extend(sets);
             }
             Ok(None) => {}
             Err(Refusal::Usage(lines)) => parts.push((file, Err(lines.replace('\n', "; ")))),

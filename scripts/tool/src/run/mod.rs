@@ -9,6 +9,7 @@
 //! the guest's), 130 a run that a person has ended.
 
 mod boot;
+mod certificate;
 mod debug;
 mod handed;
 mod kept;
@@ -97,6 +98,7 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     {
         return many_sets::run(options, std::slice::from_ref(&dags.path));
     }
+    let dags = dags.map(|dags| certified(options, dags));
     let booted = boot_app(options, dags.as_ref(), true)?;
     Ok(conclude(&booted, dags.as_ref(), options))
 }
@@ -104,6 +106,20 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
 /// Reads the file that `--dag` names, if there is one.
 fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
     dag_file::prepare(options).map_err(|lines| Refusal::Usage(lines.join("\n")))
+}
+
+/// Gives the sets of a file certificates, and tells so.
+fn certified(options: &Parsed, mut dags: Prepared) -> Prepared {
+    let words = words(options, Some(&dags), on_linux::own_words(options));
+    for set in &mut dags.file.sets {
+        let states = certificate::give(set, &words, options, dags.length);
+        // The guest reads the text, and keeps it while it checks the states.
+        dags.memory_mib += set.certificate.len() as u64 >> 15;
+        if let Some(states) = states.filter(|_| !options.is_given(name::QUIET)) {
+            eprintln!("certificate: {states} states");
+        }
+    }
+    dags
 }
 
 /// Makes sure of all files that the options name, before any is opened.

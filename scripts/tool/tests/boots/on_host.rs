@@ -7,9 +7,15 @@ use views::protocol::{MachineLine, Transcript};
 #[test]
 fn the_commit_on_the_host_is_the_machines() {
     let folder = folder("same-commit");
+    let kept = folder.join("kept.dag");
+    let text = "dag a period 10ms\nsubtask s wcet 2ms non-preemptive\n\
+        dag b period 30ms\nsubtask s wcet 8ms non-preemptive\n\
+        dag c period 60ms\nsubtask s wcet 13ms non-preemptive\nend\n";
+    std::fs::write(&kept, text).unwrap();
     let examples = tool::system::workspace().join("apps/dag-file/examples");
     for (file, words) in [
         ("vision.dag", "--policy edf --cores 4"),
+        (&*kept.to_string_lossy(), "--policy edf --cores 2"),
         ("hogs.dag", "--policy static --cores 4 --clusters auto"),
     ] {
         let run = format!(
@@ -33,6 +39,10 @@ fn the_commit_on_the_host_is_the_machines() {
         let [host, machine] = ["host", "machine"].map(commit);
         assert!(!host.0.is_empty(), "{file}");
         assert_eq!(host.1.is_empty(), !words.contains("auto"), "{file}");
+        // Only a certificate proves what keeps its core there.
+        let tests = host.0.iter().filter_map(|(texts, _)| texts[2].as_ref());
+        let by_graph = tests.filter(|test| test.contains("certificate")).count();
+        assert_eq!(by_graph > 0, file.ends_with("kept.dag"), "{file}");
         assert_eq!(host, machine, "{file}");
     }
 }

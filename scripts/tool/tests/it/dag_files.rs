@@ -41,7 +41,7 @@ fn a_broken_file_is_named_with_its_line() {
 fn what_is_repeated_of_a_file_can_be_seen_and_of_many_faults_a_part_is_told() {
     let folder = folder("escape");
     fs::write(folder.join("escape.dag"), "\u{1b}[2J\u{202e}\n").expect("a file");
-    let rows = r"run --dag escape.dag | escape.dag:1: expected `set`, `dag`, `subtask`, `edge`, `core` or `end`, found `\u{1b}[2J\u{202e}`";
+    let rows = r"run --dag escape.dag | escape.dag:1: expected `set`, `dag`, `subtask`, `edge`, `core`, `certificate`, `state` or `end`, found `\u{1b}[2J\u{202e}`";
     assert_refused(&folder, rows);
     let subtask = |number: u32| format!("subtask s{number} wcet 2s\n");
     let subtasks: String = (0..1000).map(subtask).collect();

@@ -1,0 +1,57 @@
+//! Certificates for the sets of a DAG file, which this computer explores before the run.
+//!
+//! A set gets one where no other test proves it, and it stands behind the set's records: so it travels
+//! wherever the file does. The commit checks it again.
+
+use fass_dag_file::{Length, Set, verified};
+use sched_dag::analysis::{AnalysisSettings, Overheads, answer, certify};
+use sched_dag::{CommitOptions, Policy, Preemption, SchedulerOptions};
+
+use super::name;
+use crate::options::Parsed;
+
+/// Gives a set its certificate for a run with these words, if it needs and can have one. Returns the
+/// number of states.
+pub(super) fn give(
+    set: &mut Set,
+    words: &[String],
+    options: &Parsed,
+    length: Length,
+) -> Option<usize> {
+    let cores = u32::try_from(options.number(name::CORES).unwrap_or(1)).ok()?;
+    let word = |name: &str| {
+        let mut values = words.iter().rev().filter_map(|word| word.split_once('='));
+        values.find(|(of, _)| *of == name).map(|(_, value)| value)
+    };
+    // Persons may pause DAGs; measured times are not known yet.
+    let apart = ["console", "clusters", "overheads", "wcets"];
+    if !set.certificate.is_empty() || apart.iter().any(|name| word(name).is_some()) {
+        return None;
+    }
+    let mut terms_ns = Overheads::NONE.terms_ns();
+    let stated = word("overheads_ns").unwrap_or_default().split(',');
+    for (term_ns, stated) in terms_ns.iter_mut().zip(stated) {
+        *term_ns = stated.parse().unwrap_or(0);
+    }
+    let scheduler = SchedulerOptions {
+        policy: word("policy").map_or(Some(Policy::StaticPriority), Policy::of_word)?,
+        preemption: match word("preemption") {
+            Some("off") => Preemption::Disabled,
+            _ => Preemption::Enabled,
+        },
+        cores,
+    };
+    let keeps = scheduler.preemption == Preemption::Disabled;
+    let mut subtasks = set.dags.iter().flat_map(|dag| &dag.spec.subtasks);
+    if !subtasks.all(|of| keeps || of.non_preemptive) {
+        return None;
+    }
+    let settings = AnalysisSettings::new(scheduler, Overheads::of_terms_ns(terms_ns));
+    let options = CommitOptions::new(scheduler.policy, cores);
+    let task_set = verified(set, &options, length).ok()?.task_set;
+    if answer(&task_set, &settings).is_proven() {
+        return None;
+    }
+    set.certificate = certify(&task_set, &settings).ok()?;
+    Some(set.certificate.lines().count() - 1)
+}
