@@ -115,7 +115,8 @@ impl Control {
     ///
     /// # Panics
     ///
-    /// If there is no such DAG, or the request is another one, which a DAG may not take.
+    /// If there is no such DAG, the request is another one, which a DAG may not take, or a certificate
+    /// fixes the set.
     #[track_caller]
     pub fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
         let dag = self.office.task_set.find(dag);
@@ -124,6 +125,10 @@ impl Control {
         assert!(
             matches!(request, Pause(of) | Resume(of) | Close(of) | End(of) if of == dag),
             "a DAG is asked for {request:?}; pause, resume, close or end it"
+        );
+        assert!(
+            self.office.task_set.certificate().is_none(),
+            "a certificate fixes the set, whose bounds {request:?} would void; run it without one"
         );
         self.office.send(None, request);
     }

@@ -56,7 +56,7 @@ pub struct RunConfig {
     /// A file of WCETs that were observed, if there is one; the commit takes what it has for its
     /// DAGs in place of what they state. `sched_dag::wcets` has the format.
     pub wcets: Option<Cow<'static, str>>,
-    /// The word of an app that its next commit is of a *fixed* set: all jobs are released, on time, and
+    /// The word of an app that its commits to come are of a *fixed* set: all jobs are released, on time, and
     /// no DAG is paused, resumed or ended by functions, modes or persons. The text is a certificate of
     /// that set ([`certify`](sched_dag::analysis::certify())), by which the commit may bound responses
     /// that depend on it. A fault, or an execution beyond its WCET, voids the bounds of all.

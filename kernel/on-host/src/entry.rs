@@ -17,6 +17,7 @@
 //! end with its verdict.
 
 use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
 use std::process::ExitCode;
 
 use fass::platform::RunConfig;
@@ -26,7 +27,7 @@ use front::json;
 use front::options::{CommandLine, UsageError};
 pub use front::output;
 
-use crate::host_system::{HostSystem, Machine};
+use crate::host_system::{HostSystem, Machine, with_terms};
 use crate::program;
 pub use crate::program::write_as;
 
@@ -70,7 +71,7 @@ pub fn start(name: &'static str, app: App) -> ExitCode {
         .fold(ExitCode::SUCCESS, |_, part| run(part))
 }
 
-/// What stands between the parts of a file.
+/// The character between the parts of a file.
 const FORM_FEED: u8 = 0x0c;
 
 fn attempt(
@@ -90,7 +91,11 @@ fn attempt(
     terms.wcets = wcets.map(Cow::Borrowed);
     chosen.apply(&mut terms);
     let [keep, events] = ["keep", "events"].map(|word| options.text(word));
-    let tells_tests = options.choice("tests", &[("off", false), ("on", true)])?;
+    let system = HostSystem {
+        machine: RefCell::new(with_terms(terms)),
+        record_to: Cell::new(keep.or(events)),
+        tells_tests: options.choice("tests", &[("off", false), ("on", true)])?,
+    };
     json::report("boot", |object| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
@@ -100,7 +105,6 @@ fn attempt(
             .text("clock", "virtual")
             .text("command_line", line);
     });
-    let system = HostSystem::new(terms, keep.or(events), tells_tests);
     let verdict = RunVerdict::new(chosen.judges_bounds, false);
     Machine::serve(system, options, module, verdict, app)
 }

@@ -28,30 +28,24 @@ pub type Machine = front::app::machine::Machine<HostSystem>;
 #[derive(Debug)]
 pub struct HostSystem {
     /// The machine of the next run: each has its own.
-    machine: RefCell<VirtualTime>,
+    pub(crate) machine: RefCell<VirtualTime>,
     /// The file for the record of the run; `on` is for lines of the output.
-    record_to: Cell<Option<&'static str>>,
+    pub(crate) record_to: Cell<Option<&'static str>>,
     /// Whether each test is asked for its own bounds.
-    tells_tests: bool,
+    pub(crate) tells_tests: bool,
 }
 
-impl HostSystem {
-    /// Makes a machine with these terms.
-    pub(crate) fn new(
-        terms: RunConfig,
-        record_to: Option<&'static str>,
-        tells_tests: bool,
-    ) -> Self {
-        Self {
-            machine: RefCell::new(with_terms(terms)),
-            record_to: Cell::new(record_to),
-            tells_tests,
-        }
-    }
+/// The most DAGs whose bounds are told test by test.
+const MOST_TOLD: usize = 32;
 
+impl HostSystem {
     /// Tells of each DAG the bound that each test gives.
     fn tell_tests(&self, run: &Run) {
         let task_set = run.task_set();
+        // For each of very many DAGs the tests would take minutes.
+        if task_set.dags().len() > MOST_TOLD {
+            return;
+        }
         let found = analysis::bounds_by_test(task_set, &self.terms().settings());
         for (model, bounds) in task_set.dags().iter().zip(found) {
             let dag = model.name();
@@ -67,7 +61,8 @@ impl HostSystem {
     }
 }
 
-fn with_terms(terms: RunConfig) -> VirtualTime {
+/// Makes a machine with these terms.
+pub(crate) fn with_terms(terms: RunConfig) -> VirtualTime {
     let machine = VirtualTime::new().contain_panics();
     machine.change(|own| *own = terms);
     machine
@@ -102,31 +97,29 @@ impl System for HostSystem {
         let machine = self.machine.replace(next);
         let report = machine.try_run();
         let report = report.map_err(|error| failure(error.to_string()))?;
-        report
-            .logs
-            .iter()
-            .for_each(|line| crate::println!("{line}"));
+        for line in &report.logs {
+            crate::println!("{line}");
+        }
         let run = Run::clone(&report);
         if self.tells_tests {
             self.tell_tests(&run);
         }
-        match self.record_to.take() {
-            Some("on") => {
+        if let Some(path) = self.record_to.take() {
+            let bytes = machine.recording();
+            if path == "on" {
                 let mut lines = RecordLines::new();
-                lines.put(&machine.recording());
+                lines.put(&bytes);
                 lines.flush();
+            } else {
+                fs::write(path, bytes).map_err(|why| failure(format!("`{path}`: {why}")))?;
             }
-            Some(path) => {
-                let written = fs::write(path, machine.recording());
-                written.map_err(|why| failure(format!("`{path}`: {why}")))?;
-            }
-            None => {}
         }
         // What the app counts leaves out R5, which on the machine needs a tolerance.
         let late = run.dispatch_violations(0);
         let late = late.expect("in virtual time no event is lost");
-        late.iter()
-            .for_each(|of| crate::println!("violation: {of}"));
+        for violation in &late {
+            crate::println!("violation: {violation}");
+        }
         AppError::of_violations(late.len() as u64).map(|()| run)
     }
 

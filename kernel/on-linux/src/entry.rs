@@ -104,23 +104,6 @@ fn run(
     result.and_then(|()| kept.map_err(|why| AppError::Failure(format!("the record: {why}"))))
 }
 
-/// The kernel's words that are about its machine, or about what Linux does not do yet.
-const FOREIGN: [(&str, &str); 13] = [
-    ("trace_events", "the journal takes what memory it needs"),
-    ("measure", "interrupts are Linux's"),
-    ("idle", "idle cores are Linux's"),
-    ("status", "the console tells it, by `stats`"),
-    ("mode", "time is real"),
-    ("probe", "there is no machine to look at"),
-    ("end", "the program ends, and Linux goes on"),
-    ("clock", "the clock is Linux's"),
-    ("avx", "Linux saves all registers"),
-    ("x2apic", "interrupts are Linux's"),
-    ("smt", "processors are Linux's"),
-    ("net", "the network is Linux's"),
-    ("latest", "a run is recorded from its begin, by `keep=FILE`"),
-];
-
 /// Takes the words, and makes the machine that they describe. Returns what they say besides, and
 /// the app's file.
 #[allow(clippy::too_many_lines, reason = "one word after the other")]
@@ -128,13 +111,6 @@ pub(crate) fn apply(
     app: &'static str,
     options: &CommandLine<'static>,
 ) -> Result<(Linux, Option<&'static [u8]>), UsageError> {
-    if let Some((word, why)) = FOREIGN
-        .iter()
-        .find(|(word, _)| options.text(word).is_some())
-    {
-        let line = format!("`{word}` is for the bare machine: on Linux {why}; leave it out");
-        return Err(UsageError::new(line));
-    }
     let chosen = RunTerms::read(options)?;
     let mechanisms = [
         ("fifo", Mechanism::Fifo),

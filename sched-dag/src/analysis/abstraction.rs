@@ -40,6 +40,9 @@ const MOST_NS: u64 = 1 << 50;
 /// The latest time and the latest release of a state; far from where sums overflow.
 const LATEST_NS: i64 = 1 << 53;
 
+/// The most steps of comparisons in a check, which forged lists would take: a second or so.
+const STEP_LIMIT: u64 = 1 << 30;
+
 /// The most instances of a hyperperiod.
 pub const INSTANCE_LIMIT: u64 = 1 << 12;
 
@@ -89,7 +92,7 @@ texts! {
         /// More states than the limit, or a hyperperiod of too many instances or too long.
         Limit = "it has too many states, or a hyperperiod too many instances; use fewer periods";
         /// The text is of another set, of other cores, or of other charges.
-        Foreign = "it is of another set, of other cores or of other overheads; explore this one";
+        Foreign = "it is of another set, of other cores or of other overheads; leave its lines out, and `run` explores this one";
         /// A listed state is none of this set: of other numbers of subtasks or cores, out of order, or
         /// beyond all times.
         Malformed { state: usize } = "state {state} is none of this set; explore it again";
@@ -180,22 +183,32 @@ impl AbstractionDag {
     /// Reports whether executions are in order, edges lead on, and each sink has a deadline.
     fn is_whole(&self) -> bool {
         let count = self.subtasks.len();
-        let mut subtasks = self.subtasks.iter().enumerate();
-        let is_timed = subtasks.all(|(number, of)| {
-            let is_sink = !self.edges.iter().any(|edge| edge.0 == number);
-            of.wcet_ns > 0 && of.best_ns <= of.wcet_ns && (!is_sink || of.deadline_ns.is_some())
-        });
-        let edges = self.edges.iter();
-        let are_inside = edges.clone().all(|&(from, to)| from < count && to < count);
-        // Without a circle each round settles a subtask at least: none is left after as many.
-        let mut is_left = vec![true; count];
-        for _ in 0..if are_inside { count } else { 0 } {
-            for subtask in 0..count {
-                let waits = |&&(from, to): &&(usize, usize)| to == subtask && is_left[from];
-                is_left[subtask] &= edges.clone().any(|edge| waits(&edge));
+        let (mut after, mut missing) = (vec![Vec::new(); count], vec![0_usize; count]);
+        for &(from, to) in &self.edges {
+            if from >= count || to >= count {
+                return false;
             }
+            after[from].push(to);
+            missing[to] += 1;
         }
-        is_timed && are_inside && !is_left.contains(&true)
+        let mut subtasks = self.subtasks.iter().zip(&after);
+        let is_timed = subtasks.all(|(of, after)| {
+            let is_due = of.deadline_ns.is_some() || !after.is_empty();
+            of.wcet_ns > 0 && of.best_ns <= of.wcet_ns && is_due
+        });
+        // In a circle nothing is ever ready.
+        let mut ready: Vec<usize> = (0..count).filter(|&of| missing[of] == 0).collect();
+        let mut place = 0;
+        while let Some(&from) = ready.get(place) {
+            for &to in &after[from] {
+                missing[to] -= 1;
+                if missing[to] == 0 {
+                    ready.push(to);
+                }
+            }
+            place += 1;
+        }
+        is_timed && ready.len() == count
     }
 }
 
@@ -215,6 +228,10 @@ impl AbstractionSet {
         is_real: bool,
     ) -> Result<Self, NotClosed> {
         let mut hyperperiod_ns = 1_u64;
+        let mut subtasks = dags.iter().map(|dag| dag.subtasks.len() as u64);
+        if subtasks.try_fold(0_u64, |sum, of| sum.checked_add(of)) > Some(INSTANCE_LIMIT) {
+            return Err(NotClosed::Limit);
+        }
         for dag in dags {
             if cores == 0 || dag.jitter_ns >= dag.period_ns || !dag.is_whole() {
                 return Err(NotClosed::NotCovered);
@@ -606,8 +623,14 @@ impl AbstractionSet {
                     known.low_ns <= finish.low_ns && finish.high_ns <= known.high_ns
                 })
             })
-            && (outer.finishes.iter())
-                .all(|finish| of(inner, finish).is_some() || finish.low_ns <= self.now_ns(inner))
+            && {
+                let unknown = outer
+                    .finishes
+                    .iter()
+                    .filter(|of_outer| of(inner, of_outer).is_none());
+                let latest_ns = unknown.map(|finish| finish.low_ns).max();
+                latest_ns.is_none_or(|latest_ns| latest_ns <= self.now_ns(inner))
+            }
     }
 }
 
@@ -628,18 +651,27 @@ pub fn check_closed(
     sort(&mut by_counts, &mut |one, other| {
         states[one].counts.cmp(&states[other].counts)
     });
-    let has = |state: &AbstractState| {
+    let mut steps_left = STEP_LIMIT;
+    let mut has = |state: &AbstractState| {
         let first = by_counts.partition_point(|&of| states[of].counts < state.counts);
-        let same = by_counts[first..].iter();
-        let mut same = same.take_while(|&&of| states[of].counts == state.counts);
-        same.any(|&of| set.includes(&states[of], state))
+        for of in by_counts[first..].iter().map(|&of| &states[of]) {
+            if of.counts != state.counts {
+                break;
+            }
+            let steps = (of.finishes.len() * state.finishes.len() + set.vertices.len()) as u64;
+            steps_left = steps_left.checked_sub(steps).ok_or(NotClosed::Limit)?;
+            if set.includes(of, state) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     };
-    if !has(&set.initial()) {
+    if !has(&set.initial())? {
         return Err(NotClosed::NoFirst);
     }
     let mut bounds = set.no_bounds();
     for (number, state) in states.iter().enumerate() {
-        set.successors(state, &mut bounds, &mut |next| match has(&next) {
+        set.successors(state, &mut bounds, &mut |next| match has(&next)? {
             true => Ok(()),
             false => Err(NotClosed::Open { state: number }),
         })?;

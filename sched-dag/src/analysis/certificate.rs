@@ -12,8 +12,8 @@
 //!
 //! Assumes that the set is *fixed*: all jobs are released, none is paused, cut or aborted. A commit
 //! with a certificate refuses what would change that. Charges of the platform lengthen executions, and
-//! the lateness of releases is the jitter: a step of the scheduler sees a release together with all
-//! that were due no later.
+//! releases may be late by as much (the jitter): a step of the scheduler sees a release together with
+//! all that were due no later.
 
 use alloc::format;
 use alloc::string::String;
@@ -28,7 +28,20 @@ use super::explore::STATE_LIMIT;
 use super::task::Task;
 use super::workload::WorkloadBursts;
 use crate::policy::Preemption;
-use crate::task_set::Dag;
+use crate::task_set::{Dag, Subtask};
+
+/// Returns how late a step may see a release. A charge may be of lateness, too, which changes the order
+/// of instances, as a longer execution does not.
+pub(super) fn lateness_ns(settings: &AnalysisSettings, bursts: &WorkloadBursts) -> u64 {
+    let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption);
+    bursts.late_ns.max(charge_ns.unwrap_or(u64::MAX))
+}
+
+/// Reports whether an instance may end within its WCET, if that was observed.
+fn is_cut(of: &Subtask) -> bool {
+    of.budget_ns
+        .is_some_and(|budget_ns| of.wcet_ns.is_none_or(|wcet_ns| budget_ns < wcet_ns))
+}
 
 /// Returns the graph of DAGs that share the cores of the settings, and no core with others.
 ///
@@ -45,7 +58,7 @@ pub(super) fn graph_of(
         let keeps = settings.preemption == Preemption::Disabled;
         let mut subtasks = dag.subtasks().iter();
         let is_covered = subtasks
-            .all(|of| of.waits().is_empty() && (keeps || of.is_non_preemptive()))
+            .all(|of| of.waits().is_empty() && (keeps || of.is_non_preemptive()) && !is_cut(of))
             && !dag.is_sporadic()
             && !dag.is_confined()
             && dag.locks().is_empty()
@@ -56,7 +69,7 @@ pub(super) fn graph_of(
         let mut of_dag = AbstractionDag {
             period_ns: dag.period_ns(),
             offset_ns: dag.offset_ns(),
-            jitter_ns: bursts.late_ns,
+            jitter_ns: lateness_ns(settings, bursts),
             jobs: dag.jobs(),
             subtasks: Vec::new(),
             edges: Vec::new(),

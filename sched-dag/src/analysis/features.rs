@@ -10,7 +10,6 @@
 use alloc::vec::Vec;
 
 use super::AnalysisSettings;
-use super::overheads::Overheads;
 use super::ranks::{InstanceOrder, PreemptionMix, RankRelation};
 use super::workload::WorkloadBursts;
 use crate::policy::Activation;
@@ -116,17 +115,18 @@ impl Features {
         let AnalysisSettings {
             // Both are in the relation, with what subtasks state.
             policy: _,
-            preemption: _,
+            preemption,
             cores,
             overheads,
         } = settings;
+        let is_charged = overheads.of_an_instance_ns(*preemption) != Some(0);
         let count = if *cores == 1 {
             Self::ONE_CORE
         } else {
             Self::CORES
         };
         count
-            .and(Self::OVERHEADS.if_so(*overheads != Overheads::default()))
+            .and(Self::OVERHEADS.if_so(is_charged))
             .and(Self::DEVICE.if_so(overheads.device_ns > 0))
             .and(Self::BURSTS.if_so(!bursts.are_none()))
             .and(Self::GROUPS.if_so(tells_cores))

@@ -14,7 +14,7 @@ use super::case::{AnalysisInput, dag_id, of_cluster, with_case};
 use super::certificate::write_certificate;
 use super::explore::{STATE_LIMIT, explore};
 use super::ratio::Ratio;
-use super::schedulability::{JobBounds, bound_by_each, bound_jobs, bound_sinks};
+use super::schedulability::{JobBounds, bound_by_each, bound_jobs, bound_sinks, is_graph_asked};
 use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason};
 use crate::ids::{SubtaskId, to_u32};
@@ -85,6 +85,9 @@ pub fn certify(task_set: &TaskSet, settings: &AnalysisSettings) -> Result<String
         vec![None; task_set.dags().len()],
     );
     each_case(task_set, settings, &mut reasons, &mut |_, case, _, _| {
+        if !is_graph_asked(case) {
+            return;
+        }
         found = case.graph().and_then(|graph| {
             let states = explore(&graph, STATE_LIMIT)?;
             Ok(write_certificate(&graph, &states))

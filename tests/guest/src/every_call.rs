@@ -12,6 +12,7 @@ const PERIOD: Duration = Duration::from_millis(10);
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.configure(Policy::Edf, Preemption::Enabled);
     machine.offer_clusters()?;
+    machine.fix("");
     machine.divide(&[1, machine.cores() - 1]);
     machine.offer_overheads()?;
     machine.set_coincidence(Duration::ZERO);

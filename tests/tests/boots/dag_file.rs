@@ -265,7 +265,7 @@ fn what_only_the_guest_finds_has_the_line_of_the_persons_file() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     let reason = format!("run: {path}:1: the deadline of the last job of dag");
-    assert!(said.starts_with(&reason), "{said}");
+    assert!(said.contains(&reason), "{said}");
 }
 
 #[test]
@@ -290,7 +290,7 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
             .collect::<Vec<_>>()
     });
     let commands: Vec<_> = commands.collect();
-    assert_eq!(commands.len(), 5);
+    assert_eq!(commands.len(), 7);
     for words in &commands {
         let path = system::workspace().join(words[1]);
         assert!(path.exists(), "{} is not there", words[1]);

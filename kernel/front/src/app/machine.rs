@@ -517,8 +517,8 @@ impl<S: System> Machine<S> {
         self.system.change(|terms| terms.divide(sizes));
     }
 
-    /// Gives the next commit a certificate, and so [fixes](RunConfig::certificate) its set; an empty text
-    /// does neither.
+    /// Gives the commits to come a certificate, and so [fixes](RunConfig::certificate) their set; an
+    /// empty text does neither.
     pub fn fix(&self, certificate: &str) {
         let text = (!certificate.is_empty()).then(|| certificate.to_owned().into());
         self.system.change(|terms| terms.certificate = text);

@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 
 use super::{BoundTest, BoundWitness, JobBounds};
 use crate::analysis::case::AnalysisInput;
+use crate::analysis::certificate::lateness_ns;
 use crate::analysis::features::covers;
 use crate::analysis::{NotProvenReason, SchedulabilityTest};
 
@@ -62,6 +63,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
                 found.offer(dag, latest(of_dag), SchedulabilityTest::Graph);
             }
         }
+        // More telling than that no other test has a bound.
         Err(Some(reason)) => found.reasons.fill(Some(reason)),
         Err(None) => {}
     }
@@ -87,7 +89,8 @@ fn bounds<'c>(
         let in_flight = model.in_flight();
         let room_ns = u128::from(in_flight) * u128::from(model.period_ns());
         // A release that finds no room is put off, or lost.
-        if u128::from(latest(of_dag)) + u128::from(case.set.bursts.late_ns) > room_ns {
+        let late_ns = lateness_ns(case.settings, &case.set.bursts);
+        if u128::from(latest(of_dag)) + u128::from(late_ns) > room_ns {
             return Err(Some(NotProvenReason::InFlightTooFew { in_flight }));
         }
     }

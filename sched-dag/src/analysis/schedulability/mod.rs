@@ -152,6 +152,11 @@ pub(super) fn bound_jobs(case: &AnalysisInput<'_>) -> JobBounds {
     found
 }
 
+/// Reports whether the test of graphs covers all DAGs of a case.
+pub(super) fn is_graph_asked(case: &AnalysisInput<'_>) -> bool {
+    (0..case.members.len()).all(|dag| graph::TEST.is_for(case, dag))
+}
+
 /// Returns the bounds of each DAG of a case by each test, where the smallest ones of the others are
 /// known that tests before have found.
 pub(super) fn bound_by_each(case: &AnalysisInput<'_>) -> Vec<Vec<DagBound>> {

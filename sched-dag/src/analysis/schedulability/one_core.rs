@@ -9,12 +9,12 @@
 //! started before. So a job that is released `a` after the stretch's begin completes the subtask
 //! within the least `X > 0` with
 //!
-//! `X = blocking + own(a) + sum over S of min(ceil(max(0, X - first) / T), most) work`
+//! `X = blocking + own(a) + C + sum over S of min(ceil(max(0, X - first) / T), most) work`
 //!
-//! and `R = max over a of X - a`, where `a` is a multiple of the own period or, under EDF, an
-//! instant at which another job joins S. A subtask that keeps its core has to *start*: its
-//! equation is without its own WCET, and also counts work that is released at its start, if nothing
-//! blocks. A blocking subtask has started before the stretch, so it ends before its WCET has passed.
+//! with own(a) the DAG's earlier work and C the job's up to the subtask, and `R = max over a of X - a`,
+//! where `a` is a multiple of the own period or, under EDF, an instant at which another job joins S. A
+//! subtask that keeps its core has to *start*: its equation is without its own WCET, and also counts
+//! work that is released at its start, if nothing blocks. A blocking subtask has started before the stretch, so it ends before its WCET has passed.
 //!
 //! M. Joseph, P. Pandya, The Computer Journal 29(5), 1986; J. P. Lehoczky, RTSS 1990; L. George,
 //! N. Rivierre, M. Spuri, INRIA RR-2966, 1996; R. Davis et al., Real-Time Systems 35, 2007;
@@ -43,6 +43,7 @@ use crate::analysis::ranks::InstanceOrder;
 use crate::analysis::ratio::Ratio;
 use crate::analysis::set::EvaluationBudget;
 use crate::analysis::witness_text::WitnessText;
+use crate::order::sorted_by_key;
 
 pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::OneCore, SchedulabilityTest::OneCoreEdf],
@@ -162,7 +163,7 @@ struct ReleasedWork {
     work_ns: u64,
 }
 
-/// What keeps the core as a stretch begins, and the first release in it of a DAG that is late.
+/// The WCET that keeps the core as a stretch begins, and the first release in it of a DAG that is late.
 type CoreBlocker = (u64, Option<(usize, u64)>);
 
 struct CoreDemand<'a> {
@@ -195,7 +196,11 @@ impl<'a> CoreDemand<'a> {
             }
         }
         let members = 0..if by_deadline { 0 } else { case.members.len() };
-        let least_counting = members.map(|dag| Self::least_of(case, dag)).collect();
+        let ranks: Vec<_> = members.map(|dag| case.relation.ranks(dag)).collect();
+        let by_most = sorted_by_key(ranks.len(), |dag| ranks[dag][0]);
+        let by_most: Vec<_> = by_most.into_iter().map(|dag| ranks[dag]).collect();
+        let least_counting = ranks.iter().map(|own| Self::least_of(&by_most, *own));
+        let least_counting = least_counting.collect();
         Self { case, levels, by_deadline, least_counting }
     }
 
@@ -205,18 +210,17 @@ impl<'a> CoreDemand<'a> {
 
     /// Returns the least urgent rank of all that counts for a DAG under static priorities, and
     /// whether it is in a band: nothing of these is less urgent than anything of it.
-    fn least_of(case: &AnalysisInput<'_>, dag: usize) -> ((u64, usize), bool) {
-        let own = case.relation.ranks(dag);
+    fn least_of(by_most: &[[(u64, usize); 2]], own: [(u64, usize); 2]) -> ((u64, usize), bool) {
         let mut least = own[1];
-        loop {
-            // Until nothing more comes in: a DAG that delays one of these delays the job, too.
-            let ranks = (0..case.members.len()).map(|other| case.relation.ranks(other));
-            let outrank = ranks.filter(|&[most, _]| most < least);
-            match outrank.map(|[_, lower]| lower).max() {
-                Some(lower) if lower > least => least = lower,
-                _ => return (least, own[0] == own[1] && least == own[1]),
+        // A DAG that delays one of these delays the job, too; those after the first that delays none
+        // are less urgent still.
+        for &[most, lower] in by_most {
+            if most >= least {
+                break;
             }
+            least = least.max(lower);
         }
+        (least, own[0] == own[1] && least == own[1])
     }
 
     /// Returns the steps of one sum: under EDF one for each term.

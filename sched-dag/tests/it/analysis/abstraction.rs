@@ -119,18 +119,21 @@ impl GraphSample {
         observe(&self.task_set, kind, until_ns, script).subtasks
     }
 
-    /// Returns the longest responses of a run whose releases are late by up to the jitter.
-    /// In order, releases that were due no later than one that is seen are seen, too.
-    fn with_jitter(
+    /// Returns by DAG the releases, each late by up to the jitter. In order, those that were due no
+    /// later than one that is seen are seen, too.
+    fn releases(
         &self,
         (draws, is_in_order): (Draws, bool),
         until_ns: u64,
         random: &mut Random,
-    ) -> Bounds {
+    ) -> Vec<Vec<u64>> {
         let releases = self.dags.iter().map(|dag| {
             let all = (0..).map(|job| dag.offset_ns + job * dag.period_ns);
             let nominal = all.take_while(|&ns| ns < until_ns);
-            let nominal = nominal.take(dag.jobs.unwrap_or(until_ns) as usize);
+            let last_ns = dag
+                .jobs
+                .map_or(until_ns, |jobs| dag.offset_ns + jobs * dag.period_ns);
+            let nominal = nominal.take_while(|&ns| ns < last_ns);
             nominal
                 .map(|ns| (ns, ns + draws.draw(random, 0, dag.jitter_ns)))
                 .collect()
@@ -142,7 +145,17 @@ impl GraphSample {
             later.map(|of| of.1).min().unwrap_or(own_ns)
         };
         let releases = drawn.iter().map(|of_dag| of_dag.iter().map(seen).collect());
-        let releases: Vec<Vec<u64>> = releases.collect();
+        releases.collect()
+    }
+
+    /// Returns the longest responses of a run whose releases are late by up to the jitter.
+    fn with_jitter(
+        &self,
+        (draws, is_in_order): (Draws, bool),
+        until_ns: u64,
+        random: &mut Random,
+    ) -> Bounds {
+        let releases = self.releases((draws, is_in_order), until_ns, random);
         let none = self.dags.iter().map(|dag| vec![vec![]; dag.subtasks.len()]);
         let mut finishes: Vec<Vec<Vec<u64>>> = none.collect();
         let mut free_ns = vec![0; self.cores as usize];

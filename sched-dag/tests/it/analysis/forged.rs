@@ -51,7 +51,7 @@ pub(crate) fn refused(file: &str) -> [usize; 3] {
     counts
 }
 
-/// Returns the text with each number one more, one less, and 0; and with all WCETs, priorities
+/// Returns the text with each number one more, one less, 0, and below 0; and with all WCETs, priorities
 /// or marks of keeping the core alike; and with a table more.
 fn altered(text: &str) -> Vec<String> {
     let mut all: Vec<String> = (1..=3)
@@ -63,7 +63,7 @@ fn altered(text: &str) -> Vec<String> {
     for word in text.split_inclusive([' ', '\n']) {
         let (before, after) = (&text[..at], &text[at + word.trim_end().len()..]);
         if let Ok(number) = word.trim_end().parse::<i128>() {
-            let others = [number + 1, number - 1, 0];
+            let others = [number + 1, number - 1, 0, -number];
             all.extend(others.map(|other| format!("{before}{other}{after}")));
         }
         at += word.len();

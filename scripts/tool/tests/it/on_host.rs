@@ -31,7 +31,7 @@ fn a_set_is_bounded_run_judged_and_kept_as_by_the_machine() {
         ]
     };
     let dags: Vec<_> = transcript.of_kind("dag_run").map(of_dag).collect();
-    let expected = [[13_000_000, 13_000_001, 20], [500_000, 500_001, 20]];
+    let expected = [[13_000_000, 13_000_000, 20], [500_000, 500_000, 20]];
     assert_eq!(dags, expected.map(|row| row.map(Some)), "{said}");
     // Each bound of the commit is one of a test's.
     let tests: Vec<_> = transcript.of_kind("test_bound").collect();
@@ -124,7 +124,7 @@ fn many_sets_are_a_table_with_a_row_for_each_dag_and_for_each_refusal() {
 file set verdict dag bound_ns completed deadline_misses response_time_ns.max violations
 ./a.dag  refused      
 ./b.dag one ok x 1000000 3 0 1000000 0
-./b.dag one ok y 2000001 3 0 2000000 0
+./b.dag one ok y 2000000 3 0 2000000 0
 ./b.dag two refused      ";
     assert_eq!(shown.collect::<Vec<_>>().join("\n"), expected);
     // Each reason has the line of the person's file.
