@@ -122,3 +122,28 @@ fn a_subtask_cannot_raise_a_signal_behind_the_models_back() {
     let said = &report.panics[0].message;
     assert!(said.contains("dag.using(signal.raising())"), "{said}");
 }
+
+#[test]
+fn a_certificate_goes_with_nothing_that_changes_what_runs() {
+    for is_paused in [false, true] {
+        let machine = VirtualTime::new();
+        machine.change(|terms| terms.certificate = Some("certificate v1 of 0\n".into()));
+        let dag = ticking("ticks", 1);
+        if is_paused {
+            dag.starts_paused();
+        }
+        match fass::finish_create_dags(&[dag]) {
+            Ok(commit) => {
+                let answer = commit.answers()[0].to_string();
+                assert!(!is_paused && !answer.contains("certificate"), "{answer}");
+            }
+            Err(error) => {
+                let text = error.to_string();
+                assert!(
+                    is_paused && text.contains("a certificate fixes the set"),
+                    "{text}"
+                );
+            }
+        }
+    }
+}

@@ -13,7 +13,7 @@ use sched_dag::{Policy, Preemption, TaskSet};
 use super::abstraction::{Draws, GraphSample};
 use super::forged::hashed;
 use super::simulate::{commit, spec};
-use super::witnesses::{accepted, lines, lines_about, output};
+use super::witnesses::{assert_says, lines, lines_about, output};
 
 fn fixed(task_set: &TaskSet, certificate: &str) -> TaskSet {
     let mut task_set = task_set.clone();
@@ -106,14 +106,7 @@ fn certified_bounds_hold_in_runs_and_before_the_checker_and_altered_texts_prove_
             );
         }
     }
-    let said = accepted(&files);
-    for (file, expected) in files.iter().zip(&expected) {
-        let said = lines_about(file, &said);
-        let agree = said.iter().zip(expected);
-        let agree = agree.filter(|(said, it)| said.starts_with(*it)).count();
-        let count = expected.len().max(said.len());
-        assert_eq!(agree, count, "{file}: {said:?} {expected:?}");
-    }
+    assert_says(&files, &expected);
     let count = files.len();
     println!("{count} certified, {by_graph} bounds by them; altered {altered:?}");
     assert!(count > 60 && by_graph > 100 && altered[0] > 30);
