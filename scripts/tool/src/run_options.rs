@@ -58,7 +58,7 @@ options! {
     MODULE: Takes::File("FILE");
     /// More words for the guest's command line.
     APPEND: Takes::Text("WORDS");
-    /// Platform.
+    /// On.
     ON in "where": Takes::OneOf(&["machine", "linux", "debian", "host"]), or "machine";
     /// Processors; 4 on debian.
     CORES: Takes::Number(1, MOST_CORES), or "8";
