@@ -16,7 +16,7 @@ use super::waiting::beside_span;
 use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
 
 /// Which interference the multi-path equations count; each is a bound, the later the tighter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum InterferenceBound {
     /// All that fits into the window.
     Window,
@@ -24,6 +24,8 @@ pub enum InterferenceBound {
     Waiting,
     /// And no more than that of each chain.
     Chains,
+    /// The same, without the excess of 1 (`schedulability/sharp_clip.rs`).
+    Sharp,
 }
 
 /// The figures of a DAG's graph that enter equations, its own and those of others.
@@ -141,7 +143,7 @@ impl InterferingDag {
         plain: &mut [WorkloadSegment],
         clipped: &mut [WorkloadSegment],
     ) {
-        let of_chains = (clip == InterferenceBound::Chains).then(|| self.of_chains(times));
+        let of_chains = (clip >= InterferenceBound::Chains).then(|| self.of_chains(times));
         let mut last = 0;
         let mut pieces = [WorkloadSegment::NONE; 2];
         for (j, (plain, clipped)) in plain.iter_mut().zip(clipped).enumerate() {
@@ -161,6 +163,19 @@ impl InterferingDag {
         let count = cores.min(self.whole.len());
         let pieces = self.pieces(times, count, Some(self.of_chains(times)));
         (count, pieces.map(|piece| piece.value))
+    }
+
+    /// Returns the clipped workload on at most `cores` cores as a function of the time that the job
+    /// waits alone, in the window as it is: exact until the end of its piece.
+    pub(super) fn ahead(&self, times: (u64, u64), cores: usize) -> WorkloadSegment {
+        let piece = |part: &InterferingWorkload| {
+            let all = WorkloadSegment::new(part.at(times.0).value, 0, None);
+            all.lower(part.over(times.1))
+        };
+        let place = cores.min(self.whole.len()) - 1;
+        let parts = self.chains.iter().chain(self.rest.get(place)).map(piece);
+        let sum = parts.fold(WorkloadSegment::NONE, WorkloadSegment::and);
+        piece(&self.whole[place]).lower(sum)
     }
 
     fn of_chains(&self, times: (u64, u64)) -> WorkloadSegment {

@@ -204,6 +204,8 @@ texts! {
         IntraTask = "intra-task priorities (He et al. 2019)";
         /// The multi-path bound under global fixed priorities.
         FixedPriority = "multiple paths under global fixed priorities";
+        /// The second form of the multi-path bound without its excess of 1.
+        SharpClip = "multiple paths without the excess of 1";
         /// The multi-path bound under global EDF.
         Edf = "multiple paths under global EDF";
         /// The multi-path bound of subtasks that keep their core.
@@ -275,6 +277,10 @@ texts! {
         NoBound =
             "no test bounds its response time by its relative deadline (it may still meet it); add \
              cores or let the commit divide them, shorten what outranks it or relax the deadline";
+        /// As [`NoBound`](Self::NoBound), but the equations give this bound.
+        BoundBeyondDeadline { bound_ns: u64 } =
+            "the least bound of its response time is {:?}, beyond its relative deadline (it may still \
+             meet it); add cores or relax the deadline", Duration::from_nanos(*bound_ns);
         /// As [`NoBound`](Self::NoBound), but with more jobs allowed in flight
         /// there might be one.
         InFlightTooFew { in_flight: u32 } =

@@ -91,9 +91,8 @@ impl MultiPathEquations<'_> {
         let mut window = start_ns.max(start.unwrap_or(0)).max(span);
         while window <= self.limit_ns {
             *steps = steps.checked_sub(1).ok_or(SolverFailure::Limit)?;
-            let waiting = u128::from(window - span);
             let forms = self.forms(delays, window);
-            let lacks = forms.map(|form| form.busy.lacks(form.cores, waiting));
+            let lacks = forms.map(|form| self.lacks(delays, window, &form));
             // Without subtasks there are no forms, and nothing to wait for.
             let Some(lack) = lacks.min().flatten() else {
                 return Ok(window);
@@ -102,6 +101,37 @@ impl MultiPathEquations<'_> {
             window = after.map_err(|_| SolverFailure::BeyondDeadline)?;
         }
         Err(SolverFailure::BeyondDeadline)
+    }
+
+    /// Returns how much longer a window of at least the span must be until a form may hold; `None`:
+    /// the form does.
+    pub(super) fn lacks(
+        &self,
+        delays: &DelaySources,
+        window_ns: u64,
+        form: &WaitInequality,
+    ) -> Option<u128> {
+        let waiting_ns = window_ns - self.task.span_ns();
+        let (cores, waiting) = (form.cores, u128::from(waiting_ns));
+        let published = form.busy.lacks(cores, waiting);
+        if self.clip != InterferenceBound::Sharp || !form.is_clipped || published.is_none() {
+            return published;
+        }
+        let count = usize::try_from(cores).unwrap_or(self.cores);
+        let others = delays.others.iter();
+        let others = others.map(|other| other.ahead((window_ns, waiting_ns), count));
+        let ahead = others.fold(WorkloadSegment::NONE, WorkloadSegment::and);
+        let (cover, value) = (self.covers.get(self.cores - count), ahead.value);
+        if cover != Some(&self.task.oblivious().volume_ns()) || form.busy.value != value + 1 {
+            return published;
+        }
+        // In a longer window workloads are no smaller. As long as they grow with the waiting, in this
+        // window, no slower than cores execute, the job may wait longer.
+        let is_steep = ahead.slope >= cores;
+        let steep = is_steep.then(|| ahead.span.map_or(u128::MAX, |span| span.max(1)));
+        let busy = WorkloadSegment { value, ..form.busy };
+        let beyond = ahead.lacks(cores, waiting).or(steep);
+        beyond.max(busy.lacks(cores, waiting))
     }
 
     /// Returns the forms at a window of at least the span.

@@ -30,6 +30,7 @@ use super::waiting::{Rounding, with_blocking};
 use super::workload::{InterferingWorkload, WorkloadBursts};
 
 /// DAGs with what enters their equations.
+#[derive(Clone)]
 pub(super) struct EquationSet<'a> {
     pub(super) tasks: &'a [&'a Task],
     pub(super) cores: u32,

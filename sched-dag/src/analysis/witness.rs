@@ -31,10 +31,11 @@
 //!
 //! bound DAG R paths CHAINS CORES LEFT BLOCKED BUSY
 //! bound DAG R waiting CHAINS CORES LEFT BLOCKED BUSY
+//! bound DAG R sharp CHAINS CORES 0 0 BUSY     whose excess of 1 is left out
 //! bound DAG R reserved CHAINS CORES LEFT BUSY     of subtasks that wait, as the next one
 //! bound DAG R blocked LEFT BUSY
 //! chain SUBTASK..                             as `cover`
-//! other DAG R CORES W CLIPPED                 clipped only if `waiting`
+//! other DAG R CORES W CLIPPED                 clipped if `waiting` or `sharp`
 //!
 //! bound DAG R overlap OWN
 //! window X BUSY                               and `other` lines with W in that window

@@ -245,15 +245,29 @@ impl WorkloadSegment {
         Some(ahead.max(gap.div_ceil(cores)))
     }
 
+    /// Returns the lower of two lines to the right of here; of equal values that with the smaller
+    /// slope.
+    pub(super) fn lower(self, other: Self) -> Self {
+        match (self.value, self.slope) <= (other.value, other.slope) {
+            true => self.until(other),
+            false => other.until(self),
+        }
+    }
+
     /// Returns this piece as far as it surely stays below a higher one.
     fn below(self, higher: Self) -> Self {
+        self.until(higher).or_one_flat_step()
+    }
+
+    /// Returns that, with an end at once if a higher one is met within 1 ns.
+    fn until(self, higher: Self) -> Self {
         let until = match self.slope.checked_sub(higher.slope) {
             None | Some(0) => u128::MAX,
             Some(approach) => (higher.value - self.value) / approach,
         };
         let spans = [Some(until), self.span, higher.span];
         let span = spans.into_iter().flatten().min();
-        Self { span, ..self }.or_one_flat_step()
+        Self { span, ..self }
     }
 
     /// Returns the sum of `count` equal pieces.

@@ -44,7 +44,8 @@ use crate::analysis::case::AnalysisInput;
 use crate::analysis::cover::covering;
 use crate::analysis::features::covers;
 use crate::analysis::interference::{DelaySources, InterferingDag};
-use crate::analysis::pipelined::{PipelineTerms, SolverFailure};
+use crate::analysis::multi_path::MultiPathEquations;
+use crate::analysis::pipelined::{OWN_STEPS, PipelineTerms, SolverFailure};
 use crate::analysis::ranks::{InstanceOrder, PreemptionMix};
 use crate::analysis::set::BoundFailure;
 use crate::analysis::waiting::reserved;
@@ -89,7 +90,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
                 // Numbers that overflow alone are no failure of an equation.
                 let limit = BoundFailure::Own(SolverFailure::Limit);
                 let failure = solution.failures[dag].unwrap_or(limit);
-                found.reasons[dag] = Some(reason(case, dag, failure));
+                found.reasons[dag] = Some(reason(case, dag, failure, &solution.responses));
             }
         }
     }
@@ -115,7 +116,12 @@ fn form(case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) -> SchedulabilityTe
     }
 }
 
-fn reason(case: &AnalysisInput<'_>, dag: usize, failure: BoundFailure) -> NotProvenReason {
+fn reason(
+    case: &AnalysisInput<'_>,
+    dag: usize,
+    failure: BoundFailure,
+    responses: Responses<'_>,
+) -> NotProvenReason {
     let task = case.tasks[dag];
     let in_flight = case.dag(dag).in_flight();
     let room = u128::from(in_flight) * u128::from(task.period_ns());
@@ -130,7 +136,7 @@ fn reason(case: &AnalysisInput<'_>, dag: usize, failure: BoundFailure) -> NotPro
             match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
                 (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
                 (false, true) => NotProvenReason::NoBoundByPeriod,
-                (false, false) => NotProvenReason::NoBound,
+                (false, false) => late(case, dag, responses),
             }
         }
         BoundFailure::Own(SolverFailure::BeyondDeadline)
@@ -140,7 +146,23 @@ fn reason(case: &AnalysisInput<'_>, dag: usize, failure: BoundFailure) -> NotPro
         {
             NotProvenReason::InFlightTooFew { in_flight }
         }
-        BoundFailure::Own(SolverFailure::BeyondDeadline) => NotProvenReason::NoBound,
+        BoundFailure::Own(SolverFailure::BeyondDeadline) => late(case, dag, responses),
+    }
+}
+
+/// Looks for a bound beyond the deadline that rests on bounds of others alone. One core has better
+/// bounds than the equations give.
+fn late(case: &AnalysisInput<'_>, dag: usize, responses: Responses<'_>) -> NotProvenReason {
+    let may_outrank = |other, dag| case.may_outrank(other, dag);
+    let delays = case.set.delays_of_job(dag, responses, may_outrank);
+    let equations = MultiPathEquations {
+        limit_ns: case.tasks[dag].period_ns(),
+        ..case.set.equations(dag)
+    };
+    let bound = delays.map(|delays| equations.solve(&delays, 0, &mut { OWN_STEPS }));
+    match bound {
+        Ok(Ok(bound_ns)) if case.settings.cores > 1 => NotProvenReason::BoundBeyondDeadline { bound_ns },
+        _ => NotProvenReason::NoBound,
     }
 }
 
@@ -161,31 +183,33 @@ fn write(
         let begin = format_args!("bound {} {bound_ns} overlap", case.members[dag]);
         overlap(text, begin, figures, bound_ns, &delays, &listed);
     } else {
-        paths(text, case, dag, bound_ns, &delays, &listed);
+        let equations = case.set.equations(dag);
+        paths(text, case.members[dag], bound_ns, &equations, &delays, &listed);
     }
 }
 
-fn paths(
+/// Writes the first of the forms that prove a bound.
+pub(super) fn paths(
     text: &mut WitnessText,
-    case: &AnalysisInput<'_>,
-    dag: usize,
+    id: usize,
     bound_ns: u64,
+    equations: &MultiPathEquations<'_>,
     delays: &DelaySources,
     listed: &[OutrankingDag<'_>],
 ) {
-    let (id, task) = (case.members[dag], case.tasks[dag]);
-    let equations = case.set.equations(dag);
+    let task = equations.task;
     let waiting = bound_ns - task.span_ns();
     let enough = |cores: u128| cores * u128::from(waiting);
     let mut forms = equations.forms(delays, bound_ns);
-    let Some(form) = forms.find(|form| form.busy.value <= enough(form.cores)) else {
+    let Some(form) = forms.find(|form| equations.lacks(delays, bound_ns, form).is_none()) else {
         return;
     };
-    let (cores, busy) = (form.cores, form.busy.value);
+    let is_sharp = form.busy.value > enough(form.cores);
+    let (cores, busy) = (form.cores, form.busy.value - u128::from(is_sharp));
     let chains = equations.cores + 1 - usize::try_from(cores).unwrap_or(0);
     let by_cover = equations.covers.get(chains - 1).map(|cover| {
         let left = task.oblivious().volume_ns() - cover;
-        if form.is_clipped { left.max(1) } else { left }
+        left.max(u64::from(form.is_clipped && !is_sharp))
     });
     let own = equations.left[chains - 1];
     match (delays.left_and_blocking, by_cover) {
@@ -193,7 +217,8 @@ fn paths(
             text.line(format_args!("bound {id} {bound_ns} blocked {left} {busy}"))
         }
         (None, Some(left)) if form.is_clipped || left == own => {
-            let word = if form.is_clipped { "waiting" } else { "paths" };
+            let place = usize::from(form.is_clipped) + usize::from(is_sharp);
+            let word = ["paths", "waiting", "sharp"][place];
             let blocked = delays
                 .blocking
                 .during(equations.cores, chains - 1, form.is_clipped);

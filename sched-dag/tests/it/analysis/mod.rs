@@ -9,6 +9,7 @@ mod climb;
 mod forged;
 mod one_core;
 mod random;
+mod sharp;
 mod simulate;
 mod together;
 mod waits;

@@ -140,10 +140,12 @@ fn published_examples_of_two_cores_have_bounds() {
     // SchedCAT's tests of Guan et al. 2009: 1, 1, 4 and, as equations close at 16, 16 ms.
     let dags = |last_due| [[2, 8, 8], [2, 10, 10], [6, 18, 18], [18, 36, last_due]];
     let found = published(&dags(36), FP, 2);
-    assert_eq!(halves(&found), [Some(2), Some(2), Some(8), Some(32)]);
+    assert_eq!(bounds(&found), [1, 1, 4, 16].map(|ms| Some(ms * MS)));
     let found = published(&dags(30), FP, 2);
     assert_eq!(halves(&found), [Some(2), Some(2), Some(8), None]);
-    assert_eq!(found.reasons[3], Some(NotProvenReason::NoBound));
+    let bound_ns = 16 * MS;
+    let late = NotProvenReason::BoundBeyondDeadline { bound_ns };
+    assert_eq!(found.reasons[3], Some(late));
     // As many sequential DAGs as cores: nobody ever waits.
     for kind in [FP, EDF, NON_PREEMPTIVE_FP, NON_PREEMPTIVE_EDF] {
         let found = published(&[[2, 8, 8], [2, 10, 2]], kind, 2);

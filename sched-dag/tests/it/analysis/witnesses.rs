@@ -78,6 +78,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     assert!(sound > 100, "no statement was altered: {sound}");
     for form in [
         "core", "sooner", "widths", "reached", "lent", "table", "sequence", "reserved", "blocked",
+        "sharp",
     ] {
         assert!(seen[form] > 3, "{form} is rare");
     }

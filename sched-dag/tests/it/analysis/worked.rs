@@ -134,7 +134,8 @@ fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
     // for 30 s and more.
     let edges = [(1, 3), (1, 2), (3, 0), (3, 4)];
     let urgent = spec(50_000, 60_000, &[10_000; 5], &edges, 0);
-    let path = [10_000_000_000; 3];
+    // What is next to the path keeps the second form with its excess.
+    let path = [10_000_000_000, 10_000_000_000, 10_000_000_000, 1];
     let slow = spec(
         150_000_000_000,
         150_000_000_000,
