@@ -95,6 +95,7 @@ fn attempt(
         machine: RefCell::new(with_terms(terms)),
         record_to: Cell::new(keep.or(events)),
         tells_tests: options.choice("tests", &[("off", false), ("on", true)])?,
+        has_window: Cell::new(false),
     };
     json::report("boot", |object| {
         object

@@ -33,6 +33,8 @@ pub struct HostSystem {
     pub(crate) record_to: Cell<Option<&'static str>>,
     /// Whether each test is asked for its own bounds.
     pub(crate) tells_tests: bool,
+    /// Whether the app wants events of a window taken together, not only those of an instant.
+    pub(crate) has_window: Cell<bool>,
 }
 
 /// The most DAGs whose bounds are told test by test.
@@ -85,12 +87,16 @@ impl System for HostSystem {
         self.machine.borrow().change(change);
     }
 
-    /// Events of one instant are taken together in any case.
-    fn set_coincidence(&self, _window: Duration) {}
+    fn set_coincidence(&self, window: Duration) {
+        self.has_window.set(window > Duration::ZERO);
+    }
 
-    fn run(&self, _epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError> {
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError> {
         if input.is_some() {
             return refused("a signal of input");
+        }
+        if epoch_ns.is_some() || self.has_window.get() {
+            return refused("a grid or a window of time");
         }
         let failure = AppError::Failure;
         let next = with_terms(self.terms());

@@ -100,7 +100,7 @@ options! {
     GRAPH in "--dag": Takes::Text("NAME");
     /// The unit of numbers where a format has none; 1ms.
     UNIT: Takes::Text("TIME");
-    /// wcet (if nothing is said), uniform:0.2..1, samples.
+    /// wcet (default), uniform:0.2..1, samples, sequence.
     EXECUTION: Takes::Text("MODEL");
     /// The jobs of so many seconds.
     SECONDS: Takes::Number(1, 1_000_000);

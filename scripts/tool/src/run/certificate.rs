@@ -10,8 +10,8 @@ use sched_dag::{CommitOptions, Policy, Preemption, SchedulerOptions};
 use super::name;
 use crate::options::Parsed;
 
-/// Gives a set its certificate for a run with these words, if it needs and can have one. Returns the
-/// number of states.
+/// Gives a set its certificate for a run with these words, if it needs and can have one, in place of
+/// one that is of other words or another set. Returns the number of states.
 pub(super) fn give(
     set: &mut Set,
     words: &[String],
@@ -34,7 +34,7 @@ pub(super) fn give(
     ];
     let has_other_cores = word("cores").is_some_and(|of| of.parse() != Ok(cores));
     let is_apart = has_other_cores || apart.iter().any(|name| word(name).is_some());
-    if !set.certificate.is_empty() || is_apart {
+    if is_apart {
         return None;
     }
     let mut terms_ns = Overheads::NONE.terms_ns();
@@ -57,7 +57,8 @@ pub(super) fn give(
     }
     let settings = AnalysisSettings::new(scheduler, Overheads::of_terms_ns(terms_ns));
     let options = CommitOptions::new(scheduler.policy, cores);
-    let task_set = verified(set, &options, length).ok()?.task_set;
+    let mut task_set = verified(set, &options, length).ok()?.task_set;
+    task_set.fix(&set.certificate);
     if answer(&task_set, &settings).is_proven() {
         return None;
     }

@@ -228,6 +228,14 @@ run --on host --dag sets.dag --keep x.rec | `--keep` is for one set; name a file
             "idle=halt",
             "command line: `idle` means nothing here; leave it out",
         ),
+        (
+            "grid_us=5",
+            "a grid or a window of time is for the machine; there is none",
+        ),
+        (
+            "window_us=5",
+            "a grid or a window of time is for the machine; there is none",
+        ),
     ] {
         let called = call(&folder, format!("{run} --append {words}").split(' '));
         let said = called.complaint;

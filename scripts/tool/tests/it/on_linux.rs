@@ -75,6 +75,46 @@ fn a_dag_file_is_run_and_drawn_with_its_cores_divided_as_on_the_machine() {
     }
 }
 
+/// Only a certificate proves the set on two cores.
+const KEPT: &str = "dag a period 10ms\nsubtask s wcet 2ms non-preemptive\n\
+    dag b period 30ms\nsubtask s wcet 8ms non-preemptive\n\
+    dag c period 60ms\nsubtask s wcet 13ms non-preemptive\nend\n";
+
+#[test]
+fn a_certificate_travels_with_its_set_and_is_made_anew_for_other_words() {
+    let folder = folder("certified");
+    fs::write(folder.join("kept.dag"), KEPT).expect("a file");
+    let run = "run --policy edf --cores 2 --jobs 2 --dag";
+    let printed = succeed(&folder, &format!("{run} kept.dag --print-dag"));
+    assert!(printed.contains("\ncertificate v1 of "), "{printed}");
+    fs::write(folder.join("printed.dag"), printed).expect("a file");
+    // Bounds by the certificate.
+    let commit = |on: &str, file: &str, word: &str| {
+        let said = succeed(&folder, &format!("{run} {file} --on {on} --append {word}"));
+        let transcript = Transcript::read(&said);
+        let of_dag = |line: &MachineLine| {
+            let test = line.text_at("test").unwrap_or_default();
+            assert!(test.starts_with("a certificate of "), "{said}");
+            line.number_at("bound_ns")
+        };
+        let bounds: Vec<_> = transcript.of_kind("dag_run").map(of_dag).collect();
+        assert_eq!(bounds.len(), 3, "{said}");
+        bounds
+    };
+    // On a busy host a run may be late.
+    let bounds = commit("host", "printed.dag", "bounds=observe");
+    if std::thread::available_parallelism().is_ok_and(|count| count.get() > 1) {
+        assert_eq!(commit("linux", "printed.dag", "bounds=observe"), bounds);
+    }
+    let free = commit("host", "printed.dag", "overheads_ns=0,0,0");
+    assert_eq!(commit("host", "kept.dag", "overheads_ns=0,0,0"), free);
+    assert!(
+        free.iter()
+            .zip(&bounds)
+            .all(|(free, charged)| free < charged)
+    );
+}
+
 #[test]
 fn what_is_wrong_has_the_exit_code_and_the_line_that_it_has_on_the_machine() {
     let rows = "\
