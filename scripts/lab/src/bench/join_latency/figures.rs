@@ -289,10 +289,10 @@ fn result_json(condition: Condition, figures: &ConditionFigures) -> String {
 /// Returns the table of the figures for each policy and N.
 pub(super) fn table(measured: &MeasuredConditions) -> String {
     let columns = "N:2| joined by:<23|joins/job:9.3|one job:8|across:8|missing:9|\
-                       latency:12|p99:12|cover:12|p99:12|response:12";
+                       latency:12|p99:12|cover:12|p99:12|start:12|response:12";
     let mut table = Table::new("", columns);
     for (condition, figures) in pooled(measured) {
-        let [latency, cover, _, response] = [0, 1, 2, 3].map(|metric| figures.distribution(metric));
+        let [latency, cover, start, response] = [0, 1, 2, 3].map(|metric| figures.distribution(metric));
         let [_, _, same_index, cross_index, missing, _] = figures.counts;
         table.row(&[
             &condition.subtasks,
@@ -305,6 +305,7 @@ pub(super) fn table(measured: &MeasuredConditions) -> String {
             &shown(latency.p99()),
             &shown(cover.median()),
             &shown(cover.p99()),
+            &shown(start.median()),
             &shown(response.median()),
         ]);
     }
