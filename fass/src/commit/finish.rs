@@ -184,8 +184,8 @@ pub fn finish_create_dags_in_order(
     if let Err(error) = divide(&mut task_set, &terms, &drafts, !lists.is_empty()) {
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
-    if let Err(error) = fix(&mut task_set, &terms, &drafts) {
-        return Err(CommitError::of(Fault::NotLaunched(error), warnings));
+    if !fix(&mut task_set, &terms, &drafts) {
+        return Err(CommitError::of(Fault::NotFixed, warnings));
     }
     let answers = CommitAnswers::new(&task_set, &terms);
     let certain = answers.certain_misses();
@@ -215,22 +215,17 @@ pub fn finish_create_dags_in_order(
     }
 }
 
-/// Fixes the set if it has a certificate, which goes with nothing that changes what runs.
-fn fix(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) -> Result<(), LaunchError> {
+/// Fixes the set if it has a certificate, unless something may change what runs.
+fn fix(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) -> bool {
     let Some(certificate) = &terms.certificate else {
-        return Ok(());
+        return true;
     };
-    let planners = one_of_each::<Planner>(drafts);
-    if planners
-        .iter()
-        .any(|(kind, _)| *kind == PartKind::Lifecycle)
-    {
-        let why = "a certificate fixes the set, but a subtask may pause a DAG, enter a mode or end the \
-                   run, or a DAG starts paused; leave that out, or the certificate";
-        return Err(LaunchError::new(why));
+    let mut planners = one_of_each::<Planner>(drafts).into_iter();
+    let may_change = planners.any(|(kind, _)| kind == PartKind::Lifecycle);
+    if !may_change {
+        task_set.fix(certificate);
     }
-    task_set.fix(certificate);
-    Ok(())
+    !may_change
 }
 
 /// Divides the cores if the commit is to, or if that alone gives a proof that is demanded. Stated

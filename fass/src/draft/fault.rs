@@ -91,6 +91,10 @@ worded! {
         Worded { code: &'static str, text: String } = of *code, "{text}";
         /// The commit is to find the clusters, and a DAG gets no cores.
         NotAssigned(error: LaunchError) = "not_assigned", "{error}";
+        /// A certificate fixes the set, and something may change what runs.
+        NotFixed = "not_fixed",
+            "a certificate fixes the set, but a subtask may pause a DAG, enter a mode or end the run, \
+             or a DAG starts paused; leave that out, or the certificate";
         /// The DAG demands a proof that it meets its deadlines, and there is none, for that
         /// reason. Found only where nothing else is wrong.
         NotProven { dag: DagLabel, unproven: UnprovenDag } = "not_proven",

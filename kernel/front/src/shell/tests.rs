@@ -115,9 +115,12 @@ fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
 
 /// Returns what a line is refused with, and nothing if it is not.
 fn refusal(line: &str) -> Option<String> {
-    let task_set = NoRun::task_set().expect("it is there");
+    refusal_of(line, &NoRun::task_set().expect("it is there"))
+}
+
+fn refusal_of(line: &str, task_set: &TaskSet) -> Option<String> {
     let mut refusal = None;
-    answer::<NoRun>(line, &task_set, &mut |why| refusal = Some(why.to_string()));
+    answer::<NoRun>(line, task_set, &mut |why| refusal = Some(why.to_string()));
     ASKED.take();
     refusal
 }
@@ -132,6 +135,17 @@ fn each_command_of_the_help_is_one() {
     assert_eq!(refusal("stats  0"), None);
     let no_room = "there is no room for events; boot without `trace_events=0`";
     assert_eq!(refusal("trace on").as_deref(), Some(no_room));
+}
+
+#[test]
+fn a_set_with_a_certificate_is_not_paused() {
+    let mut task_set = Arc::unwrap_or_clone(NoRun::task_set().expect("it is there"));
+    task_set.fix("certificate v1 of 0\n");
+    for line in ["pause lidar", "resume 0"] {
+        let refused = refusal_of(line, &task_set).expect("it is refused");
+        assert!(refused.starts_with("a certificate fixes the set"));
+    }
+    assert_eq!(refusal_of("dags", &task_set), None);
 }
 
 #[test]

@@ -79,6 +79,14 @@ fn not_assigned() -> fass::commit::CommitError {
     refused(machine, dag) // it needs 3 cores
 }
 
+fn not_fixed() -> fass::commit::CommitError {
+    let machine = virtual_time::VirtualTime::new();
+    machine.change(|terms| terms.certificate = Some("".into()));
+    let dag = starting("lidar");
+    dag.starts_paused();
+    refused(machine, dag)
+}
+
 /// A DAG of one subtask.
 fn starting(name: &str) -> fass::Dag {
     let dag = fass::create_dag();
@@ -152,6 +160,7 @@ fn every_fault_is_found_and_said_as_documented() {
         affinities_overlap(),
         core_list(),
         not_assigned(),
+        not_fixed(),
     ] {
         said.insert(refused.faults()[0].code().into(), refused.to_string());
     }
