@@ -122,6 +122,18 @@ fn what_was_asked_for_is_there_once_its_letter_is_taken() {
 }
 
 #[test]
+fn nobody_pauses_a_set_with_a_certificate() {
+    let alone = alone(1, Mechanism::Normal);
+    (alone.machine).change(|terms| terms.certificate = Some("certificate v1 of 0\n".into()));
+    finish_create_dags(&[chain("tick", 1, 3, ms(1), 10)]).unwrap();
+    let control = alone.machine.control().unwrap();
+    let asks = AssertUnwindSafe(|| control.change(DagId(0), Request::Pause));
+    assert!(catch_unwind(asks).is_err());
+    let run = alone.machine.run().unwrap();
+    assert_eq!(run.statistics("tick").completed, 3);
+}
+
+#[test]
 fn after_a_run_there_can_be_another() {
     for _ in 0..3 {
         let alone = alone(1, Mechanism::Normal);
