@@ -25,6 +25,7 @@ fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
         seed: 1,
         occupation: Occupation::Hold,
         length: Length::Jobs(1),
+        limit_s: 600,
         grid_ns: 0,
     };
     commit(graph, &settings).expect("it is a DAG");
@@ -45,6 +46,7 @@ fn virtual_time_finds_the_published_makespans() {
         cores: 16,
         clusters: sched_dag::CoreDivision::Undivided,
         length: Length::Jobs(1),
+        limit_s: 600,
     };
     let file = load(&path, &import).expect("it is well formed");
     assert_eq!((file.sets.len(), published.len()), (45, 45));

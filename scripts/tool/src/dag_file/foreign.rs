@@ -11,6 +11,7 @@ use fass_dag_file::time::Time;
 use fass_dag_file::{DagFile, parse};
 
 use super::Import;
+use crate::files;
 use crate::system::workspace;
 
 /// The comment by which the converter tells a record's line.
@@ -22,7 +23,10 @@ const LINE: &str = " # line ";
 ///
 /// The converter's lines, or the reason why it did not run.
 pub(super) fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
-    let mut convert = Command::new("python3");
+    let mut convert = Command::new("timeout");
+    let limit_s = import.limit_s.to_string();
+    // In the foreground, or ctrl-C would not reach it.
+    convert.args(["--foreground", &limit_s, "python3"]);
     convert.arg(workspace().join("scripts/convert"));
     convert.arg("--lines").stdin(Stdio::null());
     if let Some(unit_ns) = import.unit_ns {
@@ -33,10 +37,13 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>>
     }
     // No name begins with `-` once a folder stands before it.
     let output = convert.arg(Path::new(".").join(path)).output();
-    let output = output.map_err(|why| {
-        let remedy = "install Python 3, which reads all formats but ours";
-        vec![format!("`python3` did not start: {why}; {remedy}")]
-    })?;
+    let output = output.map_err(|why| vec![format!("`timeout` did not start: {why}")])?;
+    let refused = |why: &str| Err(vec![format!("{}: {why}", files::shown_path(path))]);
+    match output.status.code() {
+        Some(124) => return refused("its conversion took too long; `--timeout` gives it longer"),
+        Some(127) => return refused("no `python3`; install Python 3, which reads this format"),
+        _ => {}
+    }
     let said = String::from_utf8_lossy(&output.stderr);
     let said: Vec<&str> = said.lines().map(without_folder).collect();
     if !output.status.success() {

@@ -38,6 +38,8 @@ pub struct Import {
     pub clusters: CoreDivision,
     /// The length of the run.
     pub length: Length,
+    /// How long the conversion of another format may take, in seconds.
+    pub limit_s: u64,
 }
 
 /// The formats that a file may have.
@@ -211,6 +213,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         cores: u32::try_from(cores).unwrap_or(u32::MAX),
         clusters: clusters(options.text(name::CLUSTERS)).map_err(refuse)?,
         length,
+        limit_s: options.number(name::TIMEOUT).unwrap_or(600),
     };
     // In virtual time neither a guest's memory nor its time is a limit, and of many sets one that is
     // refused does not keep the others from being run: the program checks each.

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::thread::{self, ScopedJoinHandle};
 use std::time::Duration;
 
-use fass_dag_file::{DagFile, Set};
+use fass_dag_file::{DagFile, Length, Set};
 
 use super::several::{FOR_ONE_FILE, worst};
 use super::{certificate, name, on_linux, prepare, words};
@@ -49,10 +49,10 @@ pub(super) fn run(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refus
     let apart = [&FOR_ONE_FILE[..], &[name::KEEP, name::JSON]].concat();
     let for_several = options.check_without(&apart, why);
     for_several.map_err(Refusal::Usage)?;
-    let (parts, words) = read(options, files)?;
+    let (parts, words, length) = read(options, files)?;
     let program = image::build_host().map_err(Refusal::Failure)?;
     let seconds = options.number(name::TIMEOUT).unwrap_or(86_400);
-    let run = |share: &[Part<'_>]| run_share(&program, &words, seconds, share);
+    let run = |share: &[Part<'_>]| run_share(&program, (&words, options, length), seconds, share);
     let processors = thread::available_parallelism().map_or(1, usize::from);
     let mut progress = Progress::new(parts.len() as u64, "sets");
     let mut all = Vec::new();
@@ -82,24 +82,22 @@ pub(super) fn run(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refus
     Ok(worst(refused, failed))
 }
 
-/// Reads all files. Returns their sets, and the words for the program.
+/// Reads all files. Returns their sets, the words for the program, and the length of a run.
 fn read<'f>(
     options: &Parsed,
     files: &'f [PathBuf],
-) -> Result<(Vec<Part<'f>>, Vec<String>), Refusal> {
+) -> Result<(Vec<Part<'f>>, Vec<String>, Length), Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files read");
     let (mut parts, mut told) = (Vec::<Part<'f>>::new(), Vec::new());
+    let mut length = Length::Jobs(1);
     for (number, file) in (0..).zip(files) {
         progress.show(number);
         match prepare(&options.with(name::DAG, file)) {
             Ok(Some(dags)) => {
                 // They follow from the options alone, so those of any file are those of all.
+                length = dags.length;
                 told = words(options, Some(&dags), on_linux::own_words(options));
-                let sets = dags.file.sets.into_iter().map(|mut set| {
-                    certificate::give(&mut set, &told, options, dags.length);
-                    (&**file, Ok(set))
-                });
-                parts.extend(sets);
+                parts.extend(dags.file.sets.into_iter().map(|set| (&**file, Ok(set))));
             }
             Ok(None) => {}
             Err(Refusal::Usage(lines)) => parts.push((file, Err(lines.replace('\n', "; ")))),
@@ -108,19 +106,23 @@ fn read<'f>(
     }
     progress.wipe();
     told.retain(|word| word != "tests=on");
-    Ok((parts, told))
+    Ok((parts, told, length))
 }
 
 /// Runs parts by a program. Where the program dies at a set, another goes on behind the set. A set
 /// may take `seconds`.
 fn run_share(
     program: &Path,
-    words: &[String],
+    (words, options, length): (&[String], &Parsed, Length),
     seconds: u64,
     share: &[Part<'_>],
 ) -> Result<Vec<PartRows>, String> {
     let sets = share.iter().filter_map(|(_, part)| part.clone().ok());
-    let texts = sets.map(|set| DagFile { sets: vec![set] }.to_string());
+    let texts = sets.map(|mut set| {
+        // Explored here, on all processors.
+        certificate::give(&mut set, words, options, length);
+        DagFile { sets: vec![set] }.to_string()
+    });
     let texts: Vec<String> = texts.collect();
     let mut ends = Vec::new();
     while ends.len() < texts.len() {

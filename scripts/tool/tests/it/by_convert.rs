@@ -279,6 +279,8 @@ fn a_command_line_that_is_wrong_is_refused_in_a_line() {
         ("ours.dag --to yaml --unit 1s", 2, "give another --unit"),
         (zeros.as_str(), 0, ""),
         (nines.as_str(), 2, "is no time"),
+        // Never read, as it has no end.
+        ("/dev/zero", 2, "the ending of its name tells no format"),
         ("none.yaml", 2, "No such file or directory"),
         ("ours.dag -o none/a.dag", 1, "No such file or directory"),
         ("ours.dag --to sag", 2, "FILE.csv"),
@@ -326,7 +328,10 @@ fn a_run_converts_and_its_own_faults_have_the_lines_of_the_file() {
     let late = "# a comment\nnodes:\n- id: b\n  execution_time: 9\n  end_to_end_deadline: 500000000\n  \
                 period: 500000000\n  offset: 18000000000\n";
     fs::write(folder.join("late.yaml"), late).expect("a file");
+    let slow = format!("{{\"a\":[{}1]}}", "1,".repeat(2_000_000));
+    fs::write(folder.join("slow.json"), slow).expect("a file");
     let rows = "
+run --on host --timeout 1 --dag slow.json | slow.json: its conversion took too long; `--timeout` gives it longer
 run --dag branching.yaml | branching.yaml:16: `branch_unit_id`: conditional branches are not run
 run --dag cycle.yaml | cycle.yaml:9: dag `cycle` has a cycle
 run --dag graphs.json --graph d | graphs.json:1: there is no graph `d`; name one of the 2
