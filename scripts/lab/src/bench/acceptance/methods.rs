@@ -35,7 +35,7 @@ use sched_dag::{
     SchedulerOptions, SubtaskSpec, verify,
 };
 
-use super::sets::edges;
+use super::sets::{Deadlines, edges};
 
 /// A test of whether DAGs with `D <= T` can be executed on a number of cores.
 pub(super) struct Method {
@@ -89,6 +89,19 @@ pub(super) const METHODS: [Method; 8] = [
         title: "global EDF, not refuted by a run",
         accepts: is_unrefuted,
     },
+];
+
+/// The shares of small sets on 4 cores, by deadlines and utilization in percent, of He's analysis of
+/// global static priorities (IEEE TPDS 30(10), 2019) in the library mive93/DAG-scheduling, commit
+/// 7ccd59d5, measured once on other draws.
+pub(super) const HE: [(Deadlines, u64, u64); 7] = [
+    (Deadlines::Implicit, 50, 98),
+    (Deadlines::Implicit, 60, 83),
+    (Deadlines::Implicit, 70, 22),
+    (Deadlines::Constrained, 30, 73),
+    (Deadlines::Constrained, 40, 57),
+    (Deadlines::Constrained, 50, 33),
+    (Deadlines::Constrained, 60, 6),
 ];
 
 /// The length of a run that may refute a set.

@@ -2,7 +2,7 @@
 //! with a curve for each method.
 //!
 //! Methods differ by colour and by dashes. The lent cores' curve is the widest and lies below the
-//! others, so that one which coincides with it shows on it.
+//! others, so that one which coincides with it shows on it. A curve may be told from elsewhere.
 
 use super::methods::METHODS;
 use super::sets::Deadlines;
@@ -31,9 +31,14 @@ const STYLES: [&str; METHODS.len()] = [
 ];
 /// The curve that lies below the others.
 const LOWEST: usize = 4;
+/// A curve that is told from elsewhere: deadlines, and utilization and share in percent.
+type Told = [(Deadlines, u64, u64)];
+/// The style of a told curve.
+const ELSEWHERE: &str = "stroke=\"#c1121f\" stroke-width=\"2.2\" stroke-dasharray=\"4 2\"";
 
-/// Draws points, which are in the order of their cores, deadlines and utilizations.
-pub(super) fn draw(points: &[Point]) -> String {
+/// Draws points, which are in the order of their cores, deadlines and utilizations, and a method that
+/// was measured elsewhere.
+pub(super) fn draw(points: &[Point], told: &Told) -> String {
     let mut svg = Svg::default();
     let sets = points.first().map_or(0, |point| point.counts.sets);
     let title = format!("Random sets of DAGs that a method accepts, of {sets} a point");
@@ -41,7 +46,7 @@ pub(super) fn draw(points: &[Point]) -> String {
     let methods = points
         .first()
         .map_or(0, |point| point.counts.accepted.len());
-    legend(&mut svg, methods);
+    legend(&mut svg, methods, told);
     let kinds = Deadlines::ALL.len() as u64;
     let kind = |point: &Point| (point.cores, point.deadlines);
     let curves: Vec<_> = points
@@ -55,7 +60,7 @@ pub(super) fn draw(points: &[Point]) -> String {
         (numbers, kinds)
     };
     for (place, curve) in (0..).zip(curves) {
-        panel(&mut svg, (place / rows, place % rows), curve);
+        panel(&mut svg, (place / rows, place % rows), curve, told);
     }
     // The legend takes the room of three panels.
     let width = CORNER.0 + columns.max(3) * STEP.0 - 20;
@@ -63,16 +68,18 @@ pub(super) fn draw(points: &[Point]) -> String {
 }
 
 /// Draws the name of each method next to a piece of its curve, in three rows.
-fn legend(svg: &mut Svg, methods: usize) {
-    for (place, (method, style)) in (0..).zip(METHODS[..methods].iter().zip(STYLES)) {
+fn legend(svg: &mut Svg, methods: usize, told: &Told) {
+    let titles = METHODS[..methods].iter().map(|method| method.title);
+    let elsewhere = told.first().map(|_| ("He 2019, on other draws", ELSEWHERE));
+    for (place, (title, style)) in (0..).zip(titles.zip(STYLES).chain(elsewhere)) {
         let (x, y) = (CORNER.0 + place % 3 * 270, 44 + place / 3 * 20);
         svg.line((x, y), (x + 40, y), style);
-        svg.text((x + 48, y + 4), "start", method.title);
+        svg.text((x + 48, y + 4), "start", title);
     }
 }
 
 /// Draws the axes and curves of a panel at a place, by columns and rows.
-fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point]) {
+fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point], told: &Told) {
     let (left, top) = (CORNER.0 + column * STEP.0, CORNER.1 + row * STEP.1);
     let (right, bottom) = (left + FIELD.0, top + FIELD.1);
     let x = |percent: u64| left + (percent - ENDS.0) * FIELD.0 / (ENDS.1 - ENDS.0);
@@ -115,5 +122,15 @@ fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point]) {
         );
         let path = format!("M{}", ends.collect::<Vec<_>>().join(" L"));
         svg.path(&path, &format!("fill=\"none\" {}", STYLES[method]));
+    }
+    let deadlines = curve.first().map(|point| point.deadlines);
+    let here = told.iter().filter(|of| Some(of.0) == deadlines);
+    let ends = here.map(|&(_, percent, share)| format!("{} {}", x(percent), y(share, 100)));
+    let ends: Vec<String> = ends.collect();
+    if !ends.is_empty() {
+        svg.path(
+            &format!("M{}", ends.join(" L")),
+            &format!("fill=\"none\" {ELSEWHERE}"),
+        );
     }
 }
