@@ -43,7 +43,7 @@ use super::{BoundTest, BoundWitness, JobBounds, Responses};
 use crate::analysis::case::AnalysisInput;
 use crate::analysis::cover::covering;
 use crate::analysis::features::covers;
-use crate::analysis::interference::{DelaySources, InterferingDag};
+use crate::analysis::interference::{DelaySources, InterferenceBound, InterferingDag};
 use crate::analysis::multi_path::MultiPathEquations;
 use crate::analysis::pipelined::{OWN_STEPS, PipelineTerms, SolverFailure};
 use crate::analysis::ranks::{InstanceOrder, PreemptionMix};
@@ -72,7 +72,9 @@ pub(super) const TEST: BoundTest = BoundTest {
 };
 
 pub(super) const WITNESS: BoundWitness = BoundWitness {
-    job: write,
+    job: |case, responses, dag, bound_ns, text| {
+        write(case, responses, dag, (bound_ns, case.set.clip), text);
+    },
     ..BoundWitness::NONE
 };
 
@@ -166,11 +168,12 @@ fn late(case: &AnalysisInput<'_>, dag: usize, responses: Responses<'_>) -> NotPr
     }
 }
 
-fn write(
+/// Writes the first of the forms that prove a bound.
+pub(super) fn write(
     case: &AnalysisInput<'_>,
     responses: Responses<'_>,
     dag: usize,
-    bound_ns: u64,
+    (bound_ns, clip): (u64, InterferenceBound),
     text: &mut WitnessText,
 ) {
     let may_outrank = |other, dag| case.may_outrank(other, dag);
@@ -183,13 +186,12 @@ fn write(
         let begin = format_args!("bound {} {bound_ns} overlap", case.members[dag]);
         overlap(text, begin, figures, bound_ns, &delays, &listed);
     } else {
-        let equations = case.set.equations(dag);
+        let equations = MultiPathEquations { clip, ..case.set.equations(dag) };
         paths(text, case.members[dag], bound_ns, &equations, &delays, &listed);
     }
 }
 
-/// Writes the first of the forms that prove a bound.
-pub(super) fn paths(
+fn paths(
     text: &mut WitnessText,
     id: usize,
     bound_ns: u64,

@@ -19,14 +19,12 @@
 //!
 //! Assumes: as `multi_path`. What a platform costs is not covered: 1 ns is no matter there.
 
-use super::multiple_paths::{listed, paths};
-use super::{BoundTest, BoundWitness, JobBounds, Responses};
+use super::multiple_paths::write;
+use super::{BoundTest, BoundWitness, JobBounds};
 use crate::analysis::SchedulabilityTest;
 use crate::analysis::case::AnalysisInput;
 use crate::analysis::features::covers;
 use crate::analysis::interference::InterferenceBound;
-use crate::analysis::multi_path::MultiPathEquations;
-use crate::analysis::witness_text::WitnessText;
 
 pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::SharpClip],
@@ -39,7 +37,9 @@ pub(super) const TEST: BoundTest = BoundTest {
 };
 
 pub(super) const WITNESS: BoundWitness = BoundWitness {
-    job: write,
+    job: |case, responses, dag, bound_ns, text| {
+        write(case, responses, dag, (bound_ns, InterferenceBound::Sharp), text);
+    },
     ..BoundWitness::NONE
 };
 
@@ -63,23 +63,5 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
         if forms.all(|form| published.lacks(&delays, bound_ns, &form).is_some()) {
             found.offer(dag, bound_ns, SchedulabilityTest::SharpClip);
         }
-    }
-}
-
-fn write(
-    case: &AnalysisInput<'_>,
-    responses: Responses<'_>,
-    dag: usize,
-    bound_ns: u64,
-    text: &mut WitnessText,
-) {
-    let may_outrank = |other, dag| case.may_outrank(other, dag);
-    if let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) {
-        let equations = MultiPathEquations {
-            clip: InterferenceBound::Sharp,
-            ..case.set.equations(dag)
-        };
-        let listed = listed(case, dag, responses, &delays);
-        paths(text, case.members[dag], bound_ns, &equations, &delays, &listed);
     }
 }
