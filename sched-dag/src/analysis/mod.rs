@@ -218,6 +218,8 @@ texts! {
         OneCore = "response times on one core (Joseph and Pandya 1986)";
         /// Response-time analysis of one core under EDF.
         OneCoreEdf = "response times on one core under EDF (Guan and Yi 2014)";
+        /// Windows of segments on one core under static priorities.
+        Windows = "windows of segments on one core";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
         /// As many cores as can be needed at once: the longest path.

@@ -51,6 +51,9 @@
 //! demand BUSY TIME..                          before all bounds, if it proves some
 //! bound DAG R demand
 //!
+//! bound DAG R windows                         on one core, of a job's segments in a row
+//! group COUNT END OWN_END                     so many of them, 0 for all; by what may keep the core
+//!
 //! bound DAG R widths                          as many cores as its DAGs are wide
 //! reached DAG SUBTASK R                       a sink of such a DAG
 //!

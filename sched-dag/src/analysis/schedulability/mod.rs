@@ -82,8 +82,10 @@ macro_rules! tests {
 }
 
 // Those on whose bounds others rest stand before these. A DAG with a bound has none by `multiple_paths`,
-// so none before that may be longer than its own.
-tests!(one_core priorities tables members widths sharp_clip multiple_paths demand graph sink_paths);
+// so none before that may be longer than its own; `windows` says where its bounds may be.
+tests!(
+    one_core windows priorities tables members widths sharp_clip multiple_paths demand graph sink_paths
+);
 
 /// The bounds of jobs, as far as tests have found them.
 pub(super) struct JobBounds {

@@ -230,9 +230,13 @@ fn bounds_hold_whatever_features_come_together() {
 
 /// Sets of what few have by chance, each with fewer runs.
 #[test]
-fn bounds_hold_where_cores_are_lent_or_have_tables() {
+fn bounds_hold_where_cores_are_lent_or_have_tables_or_one_has_waits() {
     let all = Mutex::new(Coverage::default());
-    for names in [["lent", "preempt"], ["tables", "tables"]] {
+    for names in [
+        ["lent", "preempt"],
+        ["tables", "tables"],
+        ["waits", "one core"],
+    ] {
         let [one, other] = names.map(|name| bit(name).trailing_zeros());
         let pair = u64::from(one) * COUNT as u64 + u64::from(other);
         (1..=3_000).for_each(|number| climb(number * PAIRS + pair, [1, 1], &all));
@@ -250,6 +254,7 @@ fn bounds_hold_where_cores_are_lent_or_have_tables() {
         (SchedulabilityTest::Table, 1_000),
         (SchedulabilityTest::Member, 200),
         (SchedulabilityTest::InGroup, 50),
+        (SchedulabilityTest::Windows, 200),
     ] {
         assert!(all.by_test[&test.to_string()] > least, "{test}");
     }

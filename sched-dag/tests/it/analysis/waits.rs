@@ -3,7 +3,7 @@
 use std::slice;
 
 use sched_dag::analysis::{NotProvenReason, Overheads, SchedulabilityTest};
-use sched_dag::{DagId, DagSpec, Policy, Preemption, Wait};
+use sched_dag::{DagId, DagSpec, Policy, Preemption, Priority, Wait};
 
 use super::simulate::spec;
 use super::{DIAMOND, FP, answered, bounds, settings};
@@ -68,10 +68,61 @@ fn what_outranks_a_dag_that_waits_is_bounded_as_without_it() {
     let low = waiting(spec(50, 50, &[6], &[], 1), 0, 9, 3);
     let answer = answered(&[spec(20, 20, &[12], &[], 0), low], &settings(FP, 1));
     let tests = answer.bounds.iter().map(|bound| bound.unwrap().test);
-    let expected = [SchedulabilityTest::Alone, SchedulabilityTest::FixedPriority];
+    let expected = [SchedulabilityTest::Alone, SchedulabilityTest::Windows];
     assert_eq!(tests.collect::<Vec<_>>(), expected);
-    // Two jobs of the other one fit into the window, and one is carried in.
+    // Two jobs of the other one fit into the window of all, and one into that of each segment.
     assert_eq!(bounds(&answer), [Some(12), Some(39)]);
+}
+
+#[test]
+fn on_one_core_the_best_windows_of_segments_count() {
+    const MS: u64 = 1_000_000;
+    let high = spec(2 * MS, 2 * MS, &[MS], &[], 0);
+    let low = |wcet_ns, segment_ns| {
+        let low = spec(20 * MS, 20 * MS, &[wcet_ns], &[], 1);
+        waiting(low, 0, 5 * MS, segment_ns)
+    };
+    // Of 20 ms in one window, 4 + 5 + 6; and two windows of 10 ms and 1 ns would take 17 ms.
+    for (low, bound_ns) in [
+        (low(5 * MS, 3 * MS), 15 * MS),
+        (low(5 * MS + 1, 1), 16 * MS + 1),
+    ] {
+        let answer = answered(&[high.clone(), low], &settings(FP, 1));
+        assert_eq!(bounds(&answer), [Some(MS), Some(bound_ns)]);
+    }
+}
+
+#[test]
+fn a_window_begins_behind_what_keeps_the_core() {
+    let keeping = |mut spec: DagSpec| {
+        spec.subtasks[0].non_preemptive = true;
+        spec
+    };
+    let high = spec(8, 8, &[2], &[], 0);
+    let chain = keeping(spec(60, 60, &[6, 4], &[(0, 1)], 1));
+    let middle = waiting(chain.clone(), 1, 3, 3);
+    let low = keeping(spec(90, 90, &[4], &[], 2));
+    let on = |specs: &[DagSpec]| bounds(&answered(specs, &settings(FP, 1)))[1];
+    // The first subtask may keep `high` waiting before the last segment is eligible: not 19.
+    assert_eq!(on(&[high.clone(), middle.clone()]), Some(21));
+    // Below it 4 may block both before and after the wait; a wait of no time lets nothing in.
+    assert_eq!(on(&[high.clone(), middle.clone(), low.clone()]), Some(29));
+    let at_once = waiting(chain, 1, 0, 3);
+    assert_eq!(on(&[high.clone(), at_once, low.clone()]), Some(20));
+    // Of a DAG above that waits a job may be carried in.
+    let above = waiting(spec(6, 6, &[2], &[], 0), 0, 3, 1);
+    let below = answered(&[above, spec(50, 50, &[3], &[], 1)], &settings(FP, 1));
+    assert_eq!(bounds(&below), [Some(5), Some(7)]);
+    // Each other DAG has to be above or below, and no priorities of a DAG interleave with these.
+    let mut mixed = spec(90, 90, &[1, 1], &[], 0);
+    mixed.subtasks[1].priority = Some(Priority(2));
+    let waits = waiting(spec(60, 60, &[7], &[], 1), 0, 3, 1);
+    let test = |other: &DagSpec| {
+        let specs = [other.clone(), waits.clone()];
+        answered(&specs, &settings(FP, 1)).bounds[1].map(|bound| bound.test)
+    };
+    assert_eq!(test(&high), Some(SchedulabilityTest::Windows));
+    assert_eq!(test(&mixed), Some(SchedulabilityTest::FixedPriority));
 }
 
 #[test]
