@@ -339,8 +339,12 @@ impl<'a> AnalysisInput<'a> {
         self.set.keep_cores = !tells_cores && self.relation.preemption == PreemptionMix::None;
         self.set.deadlines_limit = !tells_cores
             && self.relation.order == InstanceOrder::ByDeadline
-            && self.relation.preemption != PreemptionMix::Some
-            && constrained(self.tasks, self.settings.cores);
+            && match self.relation.preemption {
+                PreemptionMix::All => true,
+                // Jobs that count in full would not block, so less could delay.
+                PreemptionMix::None => constrained(self.tasks, self.settings.cores),
+                PreemptionMix::Some => false,
+            };
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.places.all[self.members[dag]].in_flight());

@@ -38,7 +38,7 @@ pub(super) struct EquationSet<'a> {
     counted: Vec<u32>,
     pub(super) shapes: Vec<GraphSummary>,
     pub(super) figures: Vec<PipelineTerms>,
-    /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
+    /// Whether only jobs with deadlines no later count (EDF), where no jobs overlap.
     pub(super) deadlines_limit: bool,
     /// Whether each subtask keeps its core, so that lower-ranked ones may block.
     pub(super) keep_cores: bool,
@@ -177,9 +177,14 @@ impl<'a> EquationSet<'a> {
             is_done = true;
             for &dag in order {
                 let before = solution.responses[dag];
-                if known[dag].is_none() && before.is_some() {
-                    let delays = self.delays_of_job(dag, &solution.responses, &may_outrank);
-                    self.visit(dag, delays, &mut solution, &mut steps);
+                if known[dag].is_none()
+                    && let Some(start_ns) = before
+                {
+                    let responses = &solution.responses;
+                    match self.respond(dag, start_ns, responses, &may_outrank, &mut steps) {
+                        Ok(after_ns) => solution.responses[dag] = Some(after_ns),
+                        Err(failure) => solution.fail(dag, failure),
+                    }
                 }
                 // A response that has grown may delay all others, so everything is looked at again.
                 is_done &= solution.responses[dag] == before;
@@ -197,45 +202,31 @@ impl<'a> EquationSet<'a> {
         solution
     }
 
-    /// Raises the response time of a DAG among others to what its equations give, if none of
-    /// the others has failed.
-    fn visit(
-        &self,
-        dag: usize,
-        delays: Result<DelaySources, BoundFailure>,
-        solution: &mut DagSolution,
-        steps: &mut EvaluationBudget,
-    ) {
-        let start_ns = solution.responses[dag].unwrap_or(0);
-        let after = delays.and_then(|delays| {
-            let after = self.respond(dag, &delays, start_ns, steps);
-            after.map_err(BoundFailure::Own)
-        });
-        match after {
-            Ok(after_ns) => solution.responses[dag] = Some(after_ns),
-            Err(failure) => solution.fail(dag, failure),
-        }
-    }
-
-    /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
+    /// Returns the least response time of a DAG among others, if it is at least `start_ns`, or which
+    /// failure keeps it from one.
     fn respond(
         &self,
         dag: usize,
-        delays: &DelaySources,
         start_ns: u64,
+        responses: &[Option<u64>],
+        may_outrank: impl Fn(usize, usize) -> bool,
         steps: &mut EvaluationBudget,
-    ) -> Result<u64, SolverFailure> {
+    ) -> Result<u64, BoundFailure> {
         let (equations, figures) = (self.equations(dag), &self.figures[dag]);
-        steps.spend(dag, |steps| {
-            match equations.solve(delays, start_ns, steps) {
-                // Where jobs may overlap, the equation for several jobs in flight may still find a
-                // bound.
-                Err(SolverFailure::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
-                    figures.solve(delays, start_ns, steps)
-                }
-                solved => solved,
+        let overlapping = equations.limit_ns + 1;
+        let delays = |bound_ns| self.delays_of_job(dag, bound_ns, responses, &may_outrank);
+        let apart = delays(equations.limit_ns)?;
+        let solved = steps.spend(dag, |steps| equations.solve(&apart, start_ns, steps));
+        match solved {
+            // Where jobs may overlap, the equation for several jobs in flight may still find a
+            // bound.
+            Err(SolverFailure::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
+                let together = delays(overlapping)?;
+                steps.spend(dag, |steps| figures.solve(&together, start_ns, steps))
             }
-        })
+            solved => solved,
+        }
+        .map_err(BoundFailure::Own)
     }
 
     /// Returns the equations of a DAG's jobs one at a time.
@@ -278,8 +269,8 @@ impl<'a> EquationSet<'a> {
                 if known[dag].is_some() {
                     return known[dag];
                 }
-                let delays = self.delays_of_job(dag, &responses, &may_outrank).ok()?;
-                self.respond(dag, &delays, 0, &mut steps).ok()
+                self.respond(dag, 0, &responses, &may_outrank, &mut steps)
+                    .ok()
             });
             match lower.collect::<Option<Vec<u64>>>() {
                 // The bounds of the last whole round hold; a tighter one was not found in time.
@@ -292,37 +283,43 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Returns the sources of delay of a DAG's jobs, as [`delays`](Self::delays) does.
+    /// Returns the sources of delay of a DAG's jobs that have such a bound, as
+    /// [`delays`](Self::delays) does.
     pub(super) fn delays_of_job(
         &self,
         dag: usize,
+        bound_ns: u64,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Result<DelaySources, BoundFailure> {
         let deadline_ns = self.tasks[dag].relative_deadline_ns();
-        self.delays(dag, deadline_ns, responses, may_outrank)
+        self.delays(dag, (bound_ns, deadline_ns), responses, may_outrank)
     }
 
     /// Returns the sources of delay of a DAG's work that is due at a relative deadline, its job or
-    /// one sink of it; or the first DAG that may outrank it and has no bound that is of use.
+    /// one sink of it, where jobs have such a bound; or the first DAG that may outrank it and has no
+    /// bound that is of use.
     ///
     /// A DAG that may outrank this one counts with its jobs that are due by then, where that
     /// is a limit, and else in full. A DAG that does not count in full may block.
     pub(super) fn delays(
         &self,
         dag: usize,
-        deadline_ns: u64,
+        (bound_ns, deadline_ns): (u64, u64),
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Result<DelaySources, BoundFailure> {
-        let limit_ns = self.deadlines_limit.then_some(deadline_ns);
+        let is_apart = |dag: usize, bound_ns| bound_ns <= self.tasks[dag].period_ns();
+        let limit_ns =
+            Some(deadline_ns).filter(|_| self.deadlines_limit && is_apart(dag, bound_ns));
         let (mut others, mut blocking_ns) = (Vec::new(), Vec::new());
         for other in (0..self.tasks.len()).filter(|&other| other != dag) {
             let outranks = may_outrank(other, dag);
             if outranks {
                 // Without the other's response its carry-in is unknown, and so is this bound.
                 let response = responses[other].ok_or(BoundFailure::Other(other))?;
-                if self.waits_enter(dag) && response > self.tasks[other].period_ns() {
+                let limit_ns = limit_ns.filter(|_| is_apart(other, response));
+                if self.waits_enter(dag) && !is_apart(other, response) {
                     return Err(BoundFailure::Overlapping);
                 }
                 others.push(self.other(dag, other, response, limit_ns));

@@ -130,7 +130,7 @@ impl InterferingWorkload {
     /// Adds the limit that EDF gives with respect to a job of relative deadline
     /// `deadline_ns`; `own_deadline_ns` is the least of this task's.
     ///
-    /// Only for tasks with a relative deadline no longer than the period.
+    /// Only for tasks whose jobs do not overlap.
     pub(super) fn by_deadlines(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
         self.ceiling = Some(self.due(own_deadline_ns, deadline_ns));
         self

@@ -8,7 +8,7 @@
 //!   each other and each counts in full for the other. That is safe: while a
 //!   subtask of `k` waits, whatever runs on the cores belongs to `k` or wins
 //!   over that subtask, so its DAG is among those counted.
-//! - *EDF.* Every DAG may outrank every other. If `D <= T` for all DAGs, only
+//! - *EDF.* Every DAG may outrank every other. Of two DAGs whose jobs do not overlap, only
 //!   jobs with a deadline no later are counted: a subtask that waits is due no later than
 //!   its job, so what wins over it is, too. Where sinks have deadlines of their own, a job
 //!   counts as soon as the first of its deadlines is no later.
@@ -177,7 +177,7 @@ pub(super) fn write(
     text: &mut WitnessText,
 ) {
     let may_outrank = |other, dag| case.may_outrank(other, dag);
-    let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
+    let Ok(delays) = case.set.delays_of_job(dag, bound_ns, responses, may_outrank) else {
         return;
     };
     let listed = listed(case, dag, responses, &delays);

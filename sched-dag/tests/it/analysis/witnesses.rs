@@ -279,6 +279,34 @@ window 1 0
 seal 0
 ";
 
+/// A DAG that has two cores to itself.
+const ALONE: &str = "\
+machine 2 static 0
+dag 0 100 100 1 1 0 alone
+subtask 90 1 0
+hash 0
+graph 0 90 90
+levels 90
+cover 0
+part 0
+bound 0 90 paths 1 2 0 0 0
+chain 0
+seal 0
+";
+
+/// Any solution of the equations is a bound, not the least one alone.
+#[test]
+fn a_bound_above_the_least_is_proven_and_one_below_is_not() {
+    let file = std::env::temp_dir().join(format!("above-{}", std::process::id()));
+    for (bound_ns, is_proven) in [(89, false), (90, true), (91, true), (101, false)] {
+        let text = ALONE.replace("bound 0 90", &format!("bound 0 {bound_ns}"));
+        fs::write(&file, super::forged::hashed(&text)).expect("a file");
+        let output = output(&[file.display().to_string()]);
+        assert_eq!(output.status.success(), is_proven, "{bound_ns}");
+    }
+    fs::remove_file(&file).expect("it was written");
+}
+
 #[test]
 fn what_is_forged_of_groups_or_too_large_is_refused() {
     let many_cores = GROUPS_OVERLAP.replace("machine 2", "machine 1000000000000");

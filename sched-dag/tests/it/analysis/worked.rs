@@ -73,6 +73,14 @@ fn e2_e3_and_e13_two_dags() {
     assert_eq!(width(&fork_join()), Some(4));
 }
 
+/// Deadlines limit what counts, also those beyond periods, as long as no jobs overlap.
+#[test]
+fn deadlines_beyond_periods_limit_what_counts() {
+    let specs = [spec(10, 10, &[4, 4], &[], 0), spec(20, 29, &[9, 9], &[], 1)];
+    let answer = answered(&specs, &settings((Policy::Edf, Preemption::Enabled), 2));
+    assert_eq!(bounds(&answer), [Some(4), Some(17)]);
+}
+
 #[test]
 fn e5_intra_task_priorities() {
     let edges = [
