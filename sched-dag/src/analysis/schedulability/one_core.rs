@@ -431,7 +431,7 @@ impl<'a> CoreDemand<'a> {
         };
         let period = i128::from(self.period_ns(target.dag));
         let due = i128::from(after) + target.due_ns;
-        let next = target.due_ns + (i128::from(after) / period + 1) * period;
+        let next = target.due_ns + period.max(i128::from(after) + 1);
         let dag = target.dag;
         let keeping = self.levels.iter();
         let keeping = keeping.filter(|level| self.by_deadline && level.keeps_ns > 0);
@@ -453,7 +453,7 @@ impl<'a> CoreDemand<'a> {
         let next = self.levels.iter().filter_map(|level| {
             let period = i128::from(self.period_ns(level.dag));
             let from = match level.dag == target.dag {
-                true => 0,
+                true => Some(level.due_ns - target.due_ns).filter(|&apart| apart > period).unwrap_or(0),
                 false if !self.by_deadline => return None,
                 false => level.due_ns - target.due_ns + i128::from(level.dag > target.dag),
             };
@@ -501,7 +501,6 @@ impl<'a> CoreDemand<'a> {
         released: &mut Vec<ReleasedWork>,
     ) -> u64 {
         let own_ns = self.period_ns(target.dag);
-        let jobs = i128::from(after / own_ns);
         let [high, low] = self.case.relation.ranks(target.dag);
         let younger_may_win = !self.by_deadline && high.0 != low.0;
         let mut earlier_ns = 0_u64;
@@ -510,8 +509,10 @@ impl<'a> CoreDemand<'a> {
             let period = i128::from(period_ns);
             let sooner = target.due_ns - level.due_ns;
             let (first_ns, most) = if level.dag == target.dag {
-                let skipped = (-sooner + period - 1).div_euclid(period).max(1) - 1;
-                let count = u64::try_from(jobs - skipped).unwrap_or(0);
+                // A job that is older by more than a period may have this due no later.
+                let apart = period.max(-sooner);
+                let count = (i128::from(after) - apart).div_euclid(period) + 1;
+                let count = u64::try_from(count).unwrap_or(0);
                 earlier_ns = earlier_ns.saturating_add(count.saturating_mul(work_ns));
                 // Younger jobs win by a sooner deadline, or by priorities that differ.
                 let most = (sooner - 1).div_euclid(period);

@@ -168,6 +168,17 @@ fn under_edf_what_has_a_shorter_deadline_may_block_too() {
     assert_eq!(bounds(&answer), [Some(26), Some(14)]);
 }
 
+/// A job may be older by more than a period, and due no later in all of its sinks: released at 0 and
+/// 170, the sink of the second job waits for what is due at 220 of the first, from 208 to 218.
+#[test]
+fn a_sink_waits_for_an_older_job_that_came_long_before() {
+    let mut two_sinks = spec(100, 220, &[10, 39], &[], 0);
+    two_sinks.subtasks[0].relative_deadline_ns = Some(50);
+    let long = spec(10_000, 210, &[159], &[], 0);
+    let edf = settings((Policy::Edf, Preemption::Enabled), 1);
+    assert_eq!(answered(&[two_sinks, long], &edf).sinks_ns[0][0], Some(48));
+}
+
 #[test]
 fn a_sink_waits_for_what_is_due_later_and_keeps_its_core() {
     let mut quick = spec(100, 100, &[1, 1], &[], 0);
