@@ -82,7 +82,7 @@ macro_rules! tests {
 }
 
 // Those on whose bounds others rest stand before these. A DAG with a bound has none by `multiple_paths`,
-// so none before that may be longer than its own; `windows` says where its bounds may be.
+// so none before that may be longer than its own, but by `windows`.
 tests!(
     one_core windows priorities tables members widths sharp_clip multiple_paths demand graph sink_paths
 );

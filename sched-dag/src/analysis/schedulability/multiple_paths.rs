@@ -96,8 +96,34 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
             }
         }
     }
+    // A bound by windows of segments may be longer than by the equations.
+    let by_windows = |dag: usize| {
+        let bound = found.bounds[dag].filter(|of| of.test == SchedulabilityTest::Windows);
+        Some((dag, again(case, dag, &solution.responses, bound?.bound_ns)?))
+    };
+    let shorter: Vec<_> = (0..known.len()).filter_map(by_windows).collect();
+    for (dag, bound_ns) in shorter {
+        found.offer(dag, bound_ns, form(case, dag, bound_ns));
+    }
     let first = solution.first_failing.map(|(dag, _)| dag);
     found.first_failing = first.filter(|&dag| is_asked(dag));
+}
+
+/// Returns the bound of one DAG by its equations, of at most so much and a period, where those of the
+/// others are known.
+fn again(
+    case: &AnalysisInput<'_>,
+    dag: usize,
+    responses: Responses<'_>,
+    most_ns: u64,
+) -> Option<u64> {
+    let may_outrank = |other, dag| case.may_outrank(other, dag);
+    let equations = MultiPathEquations {
+        limit_ns: case.tasks[dag].period_ns().min(most_ns),
+        ..case.set.equations(dag)
+    };
+    let delays = case.set.delays_of_job(dag, equations.limit_ns, responses, may_outrank);
+    equations.solve(&delays.ok()?, 0, &mut { OWN_STEPS }).ok()
 }
 
 /// Names the form of a response time.
@@ -155,16 +181,9 @@ fn reason(
 /// Looks for a bound beyond the deadline that rests on bounds of others alone. One core has better
 /// bounds than the equations give.
 fn late(case: &AnalysisInput<'_>, dag: usize, responses: Responses<'_>) -> NotProvenReason {
-    let may_outrank = |other, dag| case.may_outrank(other, dag);
-    let delays = case.set.delays_of_job(dag, responses, may_outrank);
-    let equations = MultiPathEquations {
-        limit_ns: case.tasks[dag].period_ns(),
-        ..case.set.equations(dag)
-    };
-    let bound = delays.map(|delays| equations.solve(&delays, 0, &mut { OWN_STEPS }));
-    match bound {
-        Ok(Ok(bound_ns)) if case.settings.cores > 1 => NotProvenReason::BoundBeyondDeadline { bound_ns },
-        _ => NotProvenReason::NoBound,
+    match again(case, dag, responses, u64::MAX).filter(|_| case.settings.cores > 1) {
+        Some(bound_ns) => NotProvenReason::BoundBeyondDeadline { bound_ns },
+        None => NotProvenReason::NoBound,
     }
 }
 

@@ -53,9 +53,10 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let responses = set.solve(&known, &case.order, may_outrank).responses;
     for dag in (0..known.len()).filter(|&dag| known[dag].is_none()) {
         let within = responses[dag].filter(|&ns| ns <= case.tasks[dag].period_ns());
-        let (Some(bound_ns), Ok(delays)) =
-            (within, set.delays_of_job(dag, &responses, may_outrank))
-        else {
+        let Some(bound_ns) = within else {
+            continue;
+        };
+        let Ok(delays) = set.delays_of_job(dag, bound_ns, &responses, may_outrank) else {
             continue;
         };
         let published = case.set.equations(dag);

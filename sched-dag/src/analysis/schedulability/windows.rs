@@ -18,7 +18,7 @@
 //!
 //! DAGs above without waits thus need no jitter, unlike in `multiple_paths`, where they count as
 //! work that is carried in. A bound there may still be less, if a long segment of the own DAG keeps
-//! the core, or many waits meet short DAGs below: so for 9 of 788 DAGs that were drawn.
+//! the core, or many waits meet short DAGs below, and then counts.
 //!
 //! Assumes: each other DAG is wholly above or wholly below; `R <= T` where subtasks wait, of the
 //! DAG and of those above; no job of those above waits for room, so each has a bound. No locks: a

@@ -2,10 +2,12 @@
 
 use std::slice;
 
-use sched_dag::analysis::{NotProvenReason, Overheads, SchedulabilityTest};
+use sched_dag::analysis::{
+    DagBound, NotProvenReason, Overheads, SchedulabilityTest, bounds_by_test,
+};
 use sched_dag::{DagId, DagSpec, Policy, Preemption, Priority, Wait};
 
-use super::simulate::spec;
+use super::simulate::{commit, spec};
 use super::{DIAMOND, FP, answered, bounds, settings};
 
 const EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Enabled);
@@ -102,11 +104,19 @@ fn a_window_begins_behind_what_keeps_the_core() {
     let chain = keeping(spec(60, 60, &[6, 4], &[(0, 1)], 1));
     let middle = waiting(chain.clone(), 1, 3, 3);
     let low = keeping(spec(90, 90, &[4], &[], 2));
-    let on = |specs: &[DagSpec]| bounds(&answered(specs, &settings(FP, 1)))[1];
+    let on = |specs: &[DagSpec]| {
+        let settings = settings(FP, 1);
+        let by_test = bounds_by_test(&commit(specs, settings.policy, 1), &settings);
+        let is_it = |bound: &&DagBound| bound.test == SchedulabilityTest::Windows;
+        Some(by_test[1].iter().find(is_it)?.bound_ns)
+    };
     // The first subtask may keep `high` waiting before the last segment is eligible: not 19.
     assert_eq!(on(&[high.clone(), middle.clone()]), Some(21));
     // Below it 4 may block both before and after the wait; a wait of no time lets nothing in.
-    assert_eq!(on(&[high.clone(), middle.clone(), low.clone()]), Some(29));
+    let all = [high.clone(), middle.clone(), low.clone()];
+    assert_eq!(on(&all), Some(29));
+    // The equations of paths give less, and count.
+    assert_eq!(bounds(&answered(&all, &settings(FP, 1)))[1], Some(25));
     let at_once = waiting(chain, 1, 0, 3);
     assert_eq!(on(&[high.clone(), at_once, low.clone()]), Some(20));
     // Of a DAG above that waits a job may be carried in.

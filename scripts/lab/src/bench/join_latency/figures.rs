@@ -292,7 +292,8 @@ pub(super) fn table(measured: &MeasuredConditions) -> String {
                        latency:12|p99:12|cover:12|p99:12|start:12|response:12";
     let mut table = Table::new("", columns);
     for (condition, figures) in pooled(measured) {
-        let [latency, cover, start, response] = [0, 1, 2, 3].map(|metric| figures.distribution(metric));
+        let [latency, cover, start, response] =
+            [0, 1, 2, 3].map(|metric| figures.distribution(metric));
         let [_, _, same_index, cross_index, missing, _] = figures.counts;
         table.row(&[
             &condition.subtasks,
