@@ -1,0 +1,649 @@
+(** * The bounds of a set of sporadic DAGs *)
+
+Require Import Arith Lia Bool List.
+From Bounds Require Import Sums Model Chains OneTick Account ResponseTime Blocking Workload TaskSet.
+
+(** ** What has to be shown of each DAG: an inequality between numbers
+
+    [R k] is the bound claimed for DAG k.  A job of it executes on at most [width k] cores.  [part k] divides
+    it into [parts k] disjoint chains and a rest.  [f] is j + 1 disjoint chains of DAG k besides which
+    [left] is left over, and [len] is its length.
+
+    Of a DAG that is not [bounded] nothing is claimed.  It may be there if it outranks none of those that are, and
+    its subtasks that keep their cores block them. *)
+
+Section inequalities.
+Variables (K m : nat) (tau : nat -> task) (pol : policy).
+Variables (bounded : nat -> bool) (R loss width parts : nat -> nat) (part : nat -> nat -> nat).
+
+(** The work of some vertices of DAG h, without its waits, in a window of length r that begins at a release of
+    DAG k, on at most p cores at once. *)
+Definition work_of (k h : nat) (vertices : nat -> bool) (p r : nat) : nat :=
+  window_work (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None)
+              (weight (graph (tau h)) (wcet (tau h)) (fun v => vertices v && on_core tau h v))
+              p (R h) (period (tau h)) r.
+
+(** Cores that count: m - j at most, and no more than the DAG can use. *)
+Definition cores_used (j h : nat) : nat := Nat.min (m - j) (width h).
+
+Definition whole_work (k j h r : nat) : nat := work_of k h (fun _ => true) (cores_used j h) r.
+
+(** The work of DAG h in any x ticks of such a window. *)
+Definition clipped_work (k j h r x : nat) : nat :=
+  clipped (whole_work k j h r) (cores_used j h)
+          (parts h) (fun i => work_of k h (fun v => part h v =? i) 1 r)
+          (work_of k h (fun v => parts h <=? part h v) (cores_used j h) r) x.
+
+(** The sum over all other DAGs that may outrank DAG k. *)
+Definition sum_over_others (k : nat) (g : nat -> nat) : nat :=
+  sum K (fun h => if negb (h =? k) && outranks pol h k then g h else 0).
+
+(** *** Blocking
+
+    Some job of DAG h might not delay jobs of DAG k: its subtasks that keep their cores block. *)
+Definition may_block (k h : nat) : bool := negb (h =? k) && (by_deadline pol || negb (outranks pol h k)).
+
+Definition blocks (k h v : nat) : bool := may_block k h && on_core tau h v && keeps (tau h) v.
+
+(** The sum of the q largest that block, or more; see [largest]. *)
+Definition largest_blocking (k q level : nat) : nat :=
+  q * level + sum K (fun h => sum (size (graph (tau h))) (fun v =>
+    (if blocks k h v then wcet (tau h) v else 0) - level)).
+
+(** They block once, from the release on, by the m - j largest, and then [again] times by the m - max(j, 1) largest. *)
+Definition blocking (k j again level0 level1 : nat) : nat :=
+  largest_blocking k (m - j) level0 + again * largest_blocking k (Nat.min (m - j) (m - 1)) level1.
+
+(** No subtask of another DAG blocks DAG k. *)
+Definition unblocked (k : nat) : Prop :=
+  forall h v, h < K -> v < size (graph (tau h)) -> blocks k h v = false.
+
+(** The WCETs of what blocks DAG k are known. *)
+Definition blockers_known (k : nat) : Prop :=
+  forall h v, h < K -> v < size (graph (tau h)) -> blocks k h v = true -> known (tau h) = true.
+
+(** All subtasks of DAG k keep their cores, and none waits for a device. *)
+Definition all_keep (k : nat) : Prop :=
+  forall v, v < size (graph (tau k)) -> waits (tau k) v = false /\ keeps (tau k) v = true.
+
+(** As often as there are subtasks with a predecessor. *)
+Definition each_counts (k again : nat) : Prop :=
+  count (size (graph (tau k))) (has_predecessor (graph (tau k))) <= again.
+
+(** Or, without free chains, as often as a path has such subtasks. *)
+Definition each_of_a_path_counts (k j again : nat) : Prop :=
+  j = 0 /\ all_keep k /\ no_path_longer (graph (tau k)) (fun _ => 1) (S again).
+
+(** *** The inequalities *)
+
+Definition first_inequality (k j len left blocked : nat) : Prop :=
+  left + blocked + sum_over_others k (fun h => whole_work k j h (R k)) + (m - j) * loss k
+  <= (m - j) * (R k - len).
+
+Definition second_inequality (k j len left blocked : nat) : Prop :=
+  Nat.max 1 left + blocked + sum_over_others k (fun h => clipped_work k j h (R k) (R k - len))
+  + (m - j) * loss k <= (m - j) * (R k - len).
+
+Definition shown (k : nat) : Prop :=
+  known (tau k) = true /\ blockers_known k /\
+  enough_cores m tau k (width k) /\
+  disjoint_parts (graph (tau k)) (parts k) (part k) /\
+  (forall h, h < K -> h <> k -> outranks pol h k = true -> bounded h = true) /\
+  (unblocked k \/ all_keep k) /\
+  exists j f len again level0 level1,
+    j < m /\
+    no_path_longer (graph (tau k)) (wcet (tau k)) len /\
+    disjoint_chains (graph (tau k)) j f /\
+    len <= R k <= period (tau k) /\
+    let left := left_over (graph (tau k)) (wcet (tau k)) j f in
+    let blocked := blocking k j again level0 level1 in
+    first_inequality k j len left blocked /\ (each_counts k again \/ each_of_a_path_counts k j again) \/
+    second_inequality k j len left blocked /\ each_counts k again.
+
+End inequalities.
+
+Section proof.
+Variables (K m : nat) (tau : nat -> task) (pol : policy) (s : set_run).
+Variables (bounded : nat -> bool) (R loss width parts : nat -> nat) (part : nat -> nat -> nat).
+Hypothesis rules : global_run K m tau pol s.
+Hypothesis losses : forall k a, k < K -> bounded k = true ->
+  count (R k) (fun t => lost s (a + t)) <= loss k.
+
+Lemma outranked_only k n h t :
+  outranks pol h k = false -> cores_of_jobs tau s (may_delay tau pol s k n h) t h = 0.
+Proof. intros H. apply sum_zero. intros n' _. unfold may_delay. rewrite H. reflexivity. Qed.
+
+(** ** What blocks a job
+
+    Lower-ranked subtasks are numbered: subtask w of DAG h has the number h Z + w. *)
+
+Definition Z : nat := S (sum K (fun h => size (graph (tau h)))).
+
+Lemma few_vertices h : h < K -> size (graph (tau h)) <= Z.
+Proof. intros Hh. pose proof (sum_term K (fun h => size (graph (tau h))) h Hh). unfold Z. lia. Qed.
+
+Lemma sum_of_pairs n f : sum (n * Z) f = sum n (fun h => sum Z (fun w => f (h * Z + w))).
+Proof.
+  induction n; [reflexivity|]. replace (S n * Z) with (n * Z + Z) by lia. rewrite sum_shift, IHn. reflexivity.
+Qed.
+
+Lemma of_pair h w : w < Z -> (h * Z + w) / Z = h /\ (h * Z + w) mod Z = w.
+Proof.
+  intros Hw. assert (Z <> 0) by (unfold Z; lia). split.
+  - rewrite Nat.div_add_l, Nat.div_small; lia.
+  - rewrite Nat.add_comm, Nat.mod_add, Nat.mod_small; auto.
+Qed.
+
+(** Subtask w of DAG h has a core in tick b that it keeps, for a job that may not delay job n of DAG k. *)
+Definition holds_low (k n b h w : nat) : bool :=
+  (w <? size (graph (tau h))) && blocks tau pol k h w &&
+  existsb (fun n' => negb (may_delay tau pol s k n h n') && holds_core tau s b h n' w) (seq 0 (S b)).
+
+Definition low_holds (k n t l : nat) : bool := holds_low k n (release s k n + t) (l / Z) (l mod Z).
+
+Definition longest_low (k l : nat) : nat :=
+  if (l mod Z <? size (graph (tau (l / Z)))) && blocks tau pol k (l / Z) (l mod Z)
+  then wcet (tau (l / Z)) (l mod Z) else 0.
+
+Lemma blocks_true k h w : blocks tau pol k h w = true ->
+  h <> k /\ waits (tau h) w = false /\ keeps (tau h) w = true.
+Proof.
+  unfold blocks, may_block, on_core. rewrite !andb_true_iff, !negb_true_iff, Nat.eqb_neq. tauto.
+Qed.
+
+Lemma holds_low_true k n b h w : holds_low k n b h w = true ->
+  w < size (graph (tau h)) /\ blocks tau pol k h w = true /\
+  exists n', may_delay tau pol s k n h n' = false /\ holds_core tau s b h n' w = true.
+Proof.
+  unfold holds_low. rewrite !andb_true_iff, Nat.ltb_lt, existsb_exists.
+  intros ((W & B) & (n' & _ & E)). apply andb_true_iff in E. rewrite negb_true_iff in E.
+  split; [auto|]. split; [auto|]. exists n'. tauto.
+Qed.
+
+Lemma held_is_released b h n' w : h < K -> w < size (graph (tau h)) -> holds_core tau s b h n' w = true -> n' <= b.
+Proof.
+  intros Hh W E. pose proof (release_at_least K m tau pol s rules h n' Hh) as Rl.
+  assert (Ex : forall i, i <= b -> executes s i h n' w = true -> n' <= b).
+  { intros i Hi Ei. apply (only_ready_execute _ _ _ _ _ rules) in Ei; auto. destruct Ei as (_ & Rel & _). lia. }
+  unfold holds_core in E. apply orb_true_iff in E. destruct E as [E|E]; [apply (Ex b); auto|].
+  rewrite !andb_true_iff in E. destruct E as ((_ & E) & _). apply Nat.ltb_lt, sum_positive in E.
+  destruct E as (i & Hi & E). apply (Ex i); [lia|]. destruct (executes s i h n' w); auto. simpl in E. lia.
+Qed.
+
+Lemma low_holds_core k n b h w n' : h < K -> w < size (graph (tau h)) -> blocks tau pol k h w = true ->
+  may_delay tau pol s k n h n' = false -> holds_core tau s b h n' w = true -> holds_low k n b h w = true.
+Proof.
+  intros Hh W C M E. unfold holds_low. rewrite !andb_true_iff, Nat.ltb_lt, existsb_exists.
+  repeat (split; auto). exists n'. rewrite M, E. split; [|auto].
+  apply in_seq. pose proof (held_is_released b h n' w Hh W E). lia.
+Qed.
+
+Lemma may_block_of_low k n h n' : h <> k -> may_delay tau pol s k n h n' = false -> may_block pol k h = true.
+Proof.
+  unfold may_delay, may_block. intros N M. apply Nat.eqb_neq in N. rewrite N. simpl.
+  destruct (outranks pol h k), (by_deadline pol); auto.
+Qed.
+
+(** If what executes may delay job n of DAG k or keeps its core, cores with others' jobs execute what may delay it,
+    or are held by what blocks it. *)
+Lemma cores_split k n b h : h < K -> h <> k ->
+  (forall n' w, w < size (graph (tau h)) -> waits (tau h) w = false -> executes s b h n' w = true ->
+     may_pass tau pol s k n h n' \/ keeps (tau h) w = true) ->
+  task_cores tau s b h
+  <= cores_of_jobs tau s (may_delay tau pol s k n h) b h + count Z (holds_low k n b h).
+Proof.
+  intros Hh N Ord. unfold task_cores, cores_of_jobs.
+  rewrite (sum_ext _ (job_cores tau s b h) (fun n' =>
+    (if may_delay tau pol s k n h n' then job_cores tau s b h n' else 0)
+    + (if may_delay tau pol s k n h n' then 0 else job_cores tau s b h n')))
+    by (intros n' _; destruct (may_delay tau pol s k n h n'); lia).
+  rewrite sum_plus. apply Nat.add_le_mono_l. unfold job_cores, count.
+  rewrite (sum_ext (S b) _ (fun n' => sum (size (graph (tau h))) (fun w =>
+    Nat.b2n (negb (may_delay tau pol s k n h n') && (on_core tau h w && executes s b h n' w)))))
+    by (intros n' _; destruct (may_delay tau pol s k n h n'); [rewrite sum_zero|]; auto).
+  rewrite sum_swap. apply Nat.le_trans with (2 := sum_more _ _ _ (few_vertices h Hh)).
+  apply sum_le. intros w Hw.
+  destruct (holds_low k n b h w) eqn:E.
+  - apply (count_at_most_one (S b) (fun n' =>
+      negb (may_delay tau pol s k n h n') && (on_core tau h w && executes s b h n' w))).
+    intros u v _ _ Hu Hv. rewrite !andb_true_iff in Hu, Hv.
+    apply (one_job_executes K m tau pol s rules h w u v b); tauto.
+  - rewrite sum_zero; auto. intros n' _.
+    destruct (negb (may_delay tau pol s k n h n') && (on_core tau h w && executes s b h n' w)) eqn:B; auto.
+    rewrite !andb_true_iff, negb_true_iff in B. destruct B as (B1 & B2 & B3).
+    assert (C : waits (tau h) w = false) by (apply negb_true_iff, B2).
+    destruct (Ord n' w Hw C B3) as [[P|P]|Kp]; [tauto|congruence|].
+    rewrite (low_holds_core k n b h w n' Hh Hw) in E; auto; [discriminate| |].
+    + unfold blocks. rewrite (may_block_of_low k n h n' N B1), B2, Kp. reflexivity.
+    + unfold holds_core. rewrite B3. reflexivity.
+Qed.
+
+Lemma count_low k n b : low (K * Z) (low_holds k n) b
+  = sum K (fun h => count Z (holds_low k n (release s k n + b) h)).
+Proof.
+  unfold low, count. rewrite sum_of_pairs. apply sum_ext. intros h _. apply sum_ext. intros w Hw.
+  unfold low_holds. destruct (of_pair h w Hw) as (-> & ->). reflexivity.
+Qed.
+
+Lemma largest_low k q level :
+  largest q level (K * Z) (longest_low k) = largest_blocking K tau pol k q level.
+Proof.
+  unfold largest, largest_blocking. f_equal. rewrite sum_of_pairs. apply sum_ext. intros h Hh.
+  pose proof (few_vertices h Hh) as F. replace Z with (size (graph (tau h)) + (Z - size (graph (tau h)))) by lia.
+  rewrite sum_shift.
+  assert (P : forall w, w < Z -> longest_low k (h * Z + w)
+    = if (w <? size (graph (tau h))) && blocks tau pol k h w then wcet (tau h) w else 0).
+  { intros w Hw. unfold longest_low. destruct (of_pair h w Hw) as (-> & ->). reflexivity. }
+  replace (size (graph (tau h)) + (Z - size (graph (tau h)))) with Z by lia.
+  rewrite (sum_zero (Z - size (graph (tau h)))).
+  - rewrite Nat.add_0_r. apply sum_ext. intros w Hw. rewrite P by lia.
+    destruct (Nat.ltb_spec w (size (graph (tau h)))); [reflexivity|lia].
+  - intros w Hw. rewrite P by lia.
+    destruct (Nat.ltb_spec (size (graph (tau h)) + w) (size (graph (tau h)))); [lia|reflexivity].
+Qed.
+
+Section one.
+Variables (k n : nat).
+Hypothesis in_K : k < K.
+Hypothesis before : forall n', n' < n -> job_complete tau s (release s k n) k n'.
+Hypothesis blockers : blockers_known K tau pol k.
+Notation run := (job_run K m tau s k n).
+Notation G := (graph (tau k)).
+
+Lemma run_legal : legal G m run.
+Proof. apply (job_run_legal K m tau pol s rules k n in_K before). Qed.
+
+Lemma earlier_at t : earlier_complete tau s (release s k n + t) k n.
+Proof. apply (earlier_complete_later tau s (release s k n)); [lia|exact before]. Qed.
+
+Lemma waiting_instance t v : ready G run t v -> executes s (release s k n + t) k n v = false ->
+  waits (tau k) v = false /\ instance_ready tau s (release s k n + t) k n v.
+Proof.
+  intros (Hv & Nf & P) Ex.
+  assert (Ri : instance_ready tau s (release s k n + t) k n v).
+  { split; [auto|]. split; [lia|]. split; [rewrite <- (job_finished_in_run K m tau pol s rules); auto|]. split.
+    - intros u Eu. pose proof (precedes_up _ _ _ Eu).
+      apply (job_finished_in_run K m tau pol s rules); auto. lia.
+    - intros p Hp. apply job_finished_later with (release s k n); [lia|]. apply before; auto. }
+  split; [|auto]. destruct (waits (tau k) v) eqn:Wv; auto.
+  rewrite (waits_go_on _ _ _ _ _ rules _ k n v in_K Wv Ri (earlier_at t)) in Ex. discriminate.
+Qed.
+
+(** While a vertex waits to begin, what is low has begun. *)
+Lemma low_kept t h w n' : waits_to_begin G run (S t) = true ->
+  h < K -> w < size (graph (tau h)) -> blocks tau pol k h w = true ->
+  may_delay tau pol s k n h n' = false -> holds_core tau s (release s k n + S t) h n' w = true ->
+  holds_core tau s (release s k n + t) h n' w = true.
+Proof.
+  intros W Hh Hw Bl M E. destruct (blocks_true k h w Bl) as (N & C & Kp).
+  apply waits_to_begin_true in W. destruct W as (v & Rd & D & Ex). simpl in Ex.
+  pose proof Rd as (Hv & _ & _).
+  rewrite (job_done_in_run K m tau pol s rules _ k n v in_K Hv) in D.
+  destruct (waiting_instance (S t) v Rd Ex) as (Wv & Ri). pose proof (earlier_at (S t)) as Ea.
+  rewrite Nat.add_succ_r in *. set (b := release s k n + t) in *.
+  assert (Nf : job_done s (S b) h n' w < job_exec s h n' w).
+  { unfold holds_core in E. apply orb_true_iff in E. destruct E as [E|E].
+    - apply (only_ready_execute _ _ _ _ _ rules) in E; auto. destruct E as (_ & _ & F & _).
+      unfold job_finished in F. lia.
+    - rewrite !andb_true_iff, Nat.ltb_lt in E. tauto. }
+  assert (Bg : has_begun s (S b) h n' w = true).
+  { unfold holds_core in E. apply orb_true_iff in E. destruct E as [E|E].
+    - destruct (has_begun s (S b) h n' w) eqn:Hb; auto. exfalso.
+      destruct (begin_in_order _ _ _ _ _ rules (S b) k n v in_K Wv Ri Ea) with (h := h) (n' := n') (w := w)
+        as [P|P]; auto; [|congruence].
+      unfold has_begun. rewrite D. reflexivity.
+    - rewrite !andb_true_iff in E. tauto. }
+  unfold has_begun in Bg. apply Nat.ltb_lt in Bg.
+  change (job_done s (S b) h n' w) with (job_done s b h n' w + Nat.b2n (executes s b h n' w)) in Bg, Nf.
+  unfold holds_core. destruct (executes s b h n' w) eqn:Eb; [reflexivity|]. simpl in Bg, Nf. rewrite Kp.
+  unfold has_begun. destruct (Nat.ltb_spec 0 (job_done s b h n' w)), (Nat.ltb_spec (job_done s b h n' w) (job_exec s h n' w));
+    simpl; auto; lia.
+Qed.
+
+Lemma low_in_reach t l : l < K * Z -> low_holds k n t l = true -> exists h w, l = h * Z + w /\
+  h < K /\ w < Z /\ holds_low k n (release s k n + t) h w = true.
+Proof.
+  intros Hl E. exists (l / Z), (l mod Z). assert (Z <> 0) by (unfold Z; lia).
+  split; [rewrite Nat.mul_comm; apply Nat.div_mod; auto|].
+  split; [apply Nat.div_lt_upper_bound; auto; lia|]. split; [apply Nat.mod_upper_bound; auto|exact E].
+Qed.
+
+Lemma low_held_before t l : l < K * Z ->
+  waits_to_begin G run (S t) = true -> low_holds k n (S t) l = true -> low_holds k n t l = true.
+Proof.
+  intros Hl W E. destruct (low_in_reach _ l Hl E) as (h & w & -> & Hh & Hw & Ex).
+  destruct (holds_low_true k n _ h w Ex) as (Hw' & Bl & n' & M & Ei).
+  unfold low_holds. destruct (of_pair h w Hw) as (-> & ->).
+  apply (low_holds_core k n _ h w n'); auto. apply (low_kept t h w n' W); auto.
+Qed.
+
+Lemma job_done_at_most h n' w t : h < K -> w < size (graph (tau h)) -> known (tau h) = true -> job_done s t h n' w <= wcet (tau h) w.
+Proof.
+  intros Hh Hw Kn. apply Nat.le_trans with (job_exec s h n' w); [|apply (executions _ _ _ _ _ rules); auto].
+  induction t; [unfold job_done, count; simpl; lia|].
+  change (job_done s t h n' w + Nat.b2n (executes s t h n' w) <= job_exec s h n' w).
+  destruct (executes s t h n' w) eqn:E; simpl; [|lia].
+  apply (only_ready_execute _ _ _ _ _ rules) in E; auto. destruct E as (_ & _ & Nf & _).
+  unfold job_finished in Nf. lia.
+Qed.
+
+Lemma low_ends b c l : l < K * Z ->
+  (forall i, i < c -> waits_to_begin G run (b + i) = true /\ low_holds k n (b + i) l = true) ->
+  count c (fun i => negb (lost s (release s k n + (b + i)))) <= longest_low k l.
+Proof.
+  intros Hl H. destruct c as [|c]; [unfold count; simpl; lia|].
+  destruct (H c ltac:(lia)) as (W & E).
+  destruct (low_in_reach _ l Hl E) as (h & w & -> & Hh & Hw & Ex).
+  destruct (holds_low_true k n _ h w Ex) as (Hw' & Bl & n' & M & Ei).
+  destruct (blocks_true k h w Bl) as (N & C & Kp).
+  assert (All : forall d, d <= c -> holds_core tau s (release s k n + (b + (c - d))) h n' w = true).
+  { induction d; intros Hd.
+    - replace (c - 0) with c by lia. exact Ei.
+    - specialize (IHd ltac:(lia)). destruct (H (c - d) ltac:(lia)) as (Wd & _).
+      replace (b + (c - d)) with (S (b + (c - S d))) in IHd, Wd by lia.
+      apply (low_kept _ h w n' Wd Hh Hw' Bl M IHd). }
+  unfold longest_low. destruct (of_pair h w Hw) as (-> & ->).
+  rewrite Bl. destruct (Nat.ltb_spec w (size (graph (tau h)))); [simpl|lia].
+  apply Nat.le_trans with (2 := job_done_at_most h n' w (release s k n + b + S c) Hh Hw' (blockers h w Hh Hw' Bl)).
+  unfold job_done, count. rewrite sum_shift.
+  apply Nat.le_trans with (sum (S c) (fun i => Nat.b2n (executes s (release s k n + b + i) h n' w))); [|lia].
+  apply sum_le. intros i Hi.
+  specialize (All (c - i) ltac:(lia)). replace (c - (c - i)) with i in All by lia.
+  rewrite Nat.add_assoc in *. destruct (lost s (release s k n + b + i)) eqn:Lo; [simpl; lia|].
+  assert (Ee : executes s (release s k n + b + i) h n' w = true); [|rewrite Ee; simpl; lia].
+  unfold holds_core in All. apply orb_true_iff in All. destruct All as [A|A]; auto.
+  rewrite !andb_true_iff, Nat.ltb_lt in A. apply (keeps_core _ _ _ _ _ rules); auto; [tauto|].
+  unfold job_finished. lia.
+Qed.
+
+(** Until its next release, only other DAGs and losses are others to job n of DAG k. *)
+Definition higher (t : nat) : nat :=
+  sum_over_others K pol k
+    (fun h => cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h)
+  + (if lost s (release s k n + t) then m else 0).
+
+Definition lost_tick (t : nat) : bool := lost s (release s k n + t).
+
+Lemma others_are_other_dags t : t < period (tau k) ->
+  others run t <= higher t + (if somebody_waits G run t && negb (lost_tick t)
+                              then low (K * Z) (low_holds k n) t else 0).
+Proof.
+  intros Ht. set (b := release s k n + t).
+  change (others run t) with (if somebody_waits G run t
+    then if lost s b then m else sum K (task_cores tau s b) - job_cores tau s b k n else 0).
+  unfold higher, lost_tick. fold b.
+  destruct (somebody_waits G run t) eqn:W; [|lia]. destruct (lost s b) eqn:Lo; [simpl; lia|]. simpl andb. cbv iota.
+  apply somebody_waits_true in W. destruct W as (x & Rd & Ex). simpl in Ex.
+  destruct (waiting_instance t x Rd Ex) as (Wv & Ri).
+  destruct (dispatch _ _ _ _ _ rules b k n x in_K Wv Lo Ri (earlier_at t) Ex) as (_ & Ord).
+  assert (Own : task_cores tau s b k = job_cores tau s b k n).
+  { unfold task_cores. apply (sum_only _ (job_cores tau s b k)).
+    - pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia.
+    - intros n' _ Ne. apply sum_zero. intros v Hv.
+      destruct (executes s b k n' v) eqn:E; [|rewrite andb_false_r; auto]. exfalso.
+      apply (only_ready_execute _ _ _ _ _ rules) in E; auto. destruct E as (_ & Rel & N & _).
+      destruct (lt_eq_lt_dec n' n) as [[H|H]|H]; [|lia|].
+      + apply N. apply job_finished_later with (release s k n); [unfold b; lia|]. apply before; auto.
+      + pose proof (releases_apart K m tau pol s rules k n (n' - n) in_K) as Ap.
+        replace (n + (n' - n)) with n' in Ap by lia.
+        destruct (n' - n) as [|d] eqn:Ed; [lia|]. rewrite Nat.mul_succ_l in Ap. unfold b in Rel. lia. }
+  assert (Split : sum K (task_cores tau s b) <= job_cores tau s b k n
+    + sum_over_others K pol k (fun h => cores_of_jobs tau s (may_delay tau pol s k n h) b h)
+    + low (K * Z) (low_holds k n) t).
+  { rewrite count_low. fold b. unfold sum_over_others.
+    assert (One : sum K (fun h => if h =? k then job_cores tau s b k n else 0) = job_cores tau s b k n).
+    { rewrite (sum_only K (fun h => if h =? k then job_cores tau s b k n else 0) k in_K).
+      - rewrite Nat.eqb_refl. reflexivity.
+      - intros h _ Ne. destruct (Nat.eqb_spec h k); [lia|auto]. }
+    rewrite <- One, <- !sum_plus. apply sum_le. intros h Hh.
+    destruct (Nat.eqb_spec h k) as [->|Ne]; [rewrite Own; simpl; lia|]. simpl.
+    pose proof (cores_split k n b h Hh Ne (fun n' w => Ord h n' w Hh)).
+    destruct (outranks pol h k) eqn:O; [lia|]. rewrite (outranked_only k n h b O) in *. lia. }
+  lia.
+Qed.
+
+Section keeping.
+Hypothesis own : all_keep tau k.
+
+Lemma run_keeps_cores : keeps_cores G m run (K * Z) (low_holds k n) (longest_low k)
+  (fun t => if t <? period (tau k) then higher t else others run t) lost_tick.
+Proof.
+  constructor.
+  - exact run_legal.
+  - intros t. rewrite count_low. set (b := release s k n + t).
+    apply Nat.le_trans with (2 := cores _ _ _ _ _ rules b).
+    assert (B : busy G run t <= cores_held tau s b k).
+    { apply Nat.le_trans with (2 := executing_is_held tau s b k).
+      apply Nat.le_trans with (job_cores tau s b k n).
+      - apply sum_le. intros v Hv. simpl. unfold on_core. destruct (own v Hv) as (-> & _). apply Nat.le_refl.
+      - apply (sum_term (S b) (job_cores tau s b k)).
+        pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia. }
+    apply Nat.le_trans with (sum K (fun h => (if h =? k then cores_held tau s b k else 0)
+      + count Z (holds_low k n b h))).
+    + rewrite sum_plus. apply Nat.add_le_mono_r.
+      rewrite (sum_only K (fun h => if h =? k then cores_held tau s b k else 0) k in_K).
+      * rewrite Nat.eqb_refl. exact B.
+      * intros h _ Ne. destruct (Nat.eqb_spec h k); [lia|auto].
+    + apply sum_le. intros h Hh. destruct (Nat.eqb_spec h k) as [->|Ne].
+      * assert (E : count Z (holds_low k n b k) = 0); [|lia].
+        apply sum_zero. intros w _. unfold holds_low, blocks, may_block. rewrite Nat.eqb_refl. simpl.
+        rewrite andb_false_r. reflexivity.
+      * unfold cores_held, count. rewrite (sum_swap (S b)). cbv iota. rewrite Nat.add_0_l.
+        pose proof (few_vertices h Hh) as F.
+        replace Z with (size (graph (tau h)) + (Z - size (graph (tau h)))) by lia. rewrite sum_shift.
+        rewrite (sum_zero (Z - size (graph (tau h)))).
+        -- rewrite Nat.add_0_r. apply sum_le. intros w Hw. destruct (holds_low k n b h w) eqn:E; [|simpl; lia].
+           destruct (holds_low_true k n b h w E) as (_ & Bl & n' & _ & Ei).
+           destruct (blocks_true k h w Bl) as (_ & C & _).
+           pose proof (held_is_released b h n' w Hh Hw Ei) as Hn'.
+           pose proof (sum_term (S b) (fun n' => Nat.b2n (on_core tau h w && holds_core tau s b h n' w)) n' ltac:(lia)) as T.
+           cbv beta in T. unfold on_core in *. rewrite C, Ei in T. simpl in T. rewrite C. simpl in T |- *. exact T.
+        -- intros w _. unfold holds_low.
+           destruct (Nat.ltb_spec (size (graph (tau h)) + w) (size (graph (tau h)))); [lia|reflexivity].
+  - intros t. destruct (Nat.ltb_spec t (period (tau k))); [|lia].
+    pose proof (others_are_other_dags t H). destruct (somebody_waits G run t), (lost_tick t); simpl in *; lia.
+  - intros t v Hv Lo D N. simpl. destruct (own v Hv) as (C & Kp).
+    rewrite (job_done_in_run K m tau pol s rules _ k n v in_K Hv) in D.
+    apply (keeps_core _ _ _ _ _ rules); auto.
+    + apply Nat.ltb_lt, D.
+    + intros F. apply N. apply (job_finished_in_run K m tau pol s rules); auto.
+  - intros t l Hl W E. apply low_held_before; auto.
+  - intros b c l Hl H. apply (low_ends b c l Hl H).
+Qed.
+
+End keeping.
+
+Lemma blocked_at_most_in_set j again level0 level1 r :
+  unblocked K tau pol k \/ all_keep tau k -> each_counts tau k again ->
+  sum r (fun t => if somebody_waits G run t && negb (lost_tick t)
+                  then Nat.min (low (K * Z) (low_holds k n) t) (m - j) else 0)
+  <= blocking K m tau pol k j again level0 level1.
+Proof.
+  intros [U|A] Often.
+  - rewrite sum_zero; [lia|]. intros t _.
+    assert (Z0 : low (K * Z) (low_holds k n) t = 0).
+    { apply sum_zero. intros l Hl. destruct (low_holds k n t l) eqn:E; auto. exfalso.
+      destruct (low_in_reach _ l Hl E) as (h & w & -> & Hh & Hw & Ex).
+      destruct (holds_low_true k n _ h w Ex) as (Hw' & Bl & _). rewrite U in Bl; auto. discriminate. }
+    rewrite Z0. destruct (somebody_waits G run t && negb (lost_tick t)); auto.
+  - pose proof (run_keeps_cores A) as Rk.
+    pose proof (blocked_at_most _ _ _ _ _ _ _ _ Rk j level0 level1 r) as B.
+    unfold Blocking.blocking in B. rewrite !largest_low in B.
+    match type of B with _ <= ?most => apply Nat.le_trans with most end;
+      [|unfold blocking; apply Nat.add_le_mono_l, Nat.mul_le_mono_r, Often].
+    apply Nat.le_trans with (2 := B). apply sum_le. intros t _.
+    destruct (somebody_waits G run t) eqn:W; [|simpl; lia]. destruct (lost_tick t) eqn:Lo; [simpl; lia|].
+    rewrite (waits_or_skip _ _ _ _ _ _ _ _ Rk t W Lo). simpl. lia.
+Qed.
+
+End one.
+
+(** ** The theorem
+
+    *If the inequality of each bounded DAG holds, then in every run that obeys the rules, with any sporadic releases
+    and any executions up to the WCETs, each job of each bounded DAG is complete within its bound.*
+
+    The inequality of a DAG uses the bounds of others, and theirs may use its own.  That is no circle:
+    the proof looks at a job all of whose competitors' bounds that end earlier are kept. *)
+Theorem set_bounds :
+  (forall k, k < K -> bounded k = true -> shown K m tau pol bounded R loss width parts part k) ->
+  forall k n, k < K -> bounded k = true -> job_complete tau s (release s k n + R k) k n.
+Proof.
+  intros Shown.
+  assert (Main : forall now k n, k < K -> bounded k = true -> release s k n + R k = now ->
+            job_complete tau s (release s k n + R k) k n).
+  { induction now as [now IH] using (well_founded_induction lt_wf). intros k n Hk Bk Now.
+    assert (Kept : forall h, h < K -> bounded h = true -> kept_before tau s now h (R h)).
+    { intros h Hh Bh n' Hn. apply (IH (release s h n' + R h) Hn h n' Hh Bh eq_refl). }
+    destruct (Shown k Hk Bk) as
+      (Kn & Bkn & _ & _ & Outrank & Own & j & f & len & again & level0 & level1 & Hj & Len & D & (Hr & HR) & Ineq).
+    simpl in Ineq.
+    pose proof (periods_positive _ _ _ _ _ rules k Hk) as HT.
+    assert (Apart : forall n', n' < n -> release s k n' + period (tau k) <= release s k n).
+    { intros n' Hn. pose proof (releases_apart K m tau pol s rules k n' (n - n') Hk) as Ap.
+      replace (n' + (n - n')) with n in Ap by lia.
+      destruct (n - n') as [|d] eqn:Ed; [lia|]. rewrite Nat.mul_succ_l in Ap. lia. }
+    assert (Before : forall n', n' < n -> job_complete tau s (release s k n) k n').
+    { intros n' Hn. specialize (Apart n' Hn).
+      apply (job_complete_later tau s (release s k n' + R k)); [lia|].
+      apply (IH (release s k n' + R k)); auto. lia. }
+    pose proof (run_legal k n Hk Before) as L.
+    assert (W : within_wcet (graph (tau k)) (job_run K m tau s k n) (wcet (tau k))).
+    { intros v Hv. apply (executions _ _ _ _ _ rules k n v Hk Hv), Kn. }
+    assert (Facts : forall h, h < K -> negb (h =? k) && outranks pol h k = true ->
+      known (tau h) = true /\ kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
+      disjoint_parts (graph (tau h)) (parts h) (part h)).
+    { intros h Hh O. apply andb_true_iff in O. destruct O as (N & O). apply negb_true_iff, Nat.eqb_neq in N.
+      pose proof (Outrank h Hh N O) as Bh.
+      destruct (Shown h Hh Bh) as (H0 & _ & H1 & H2 & _ & _ & ? & ? & ? & ? & ? & ? & _ & _ & _ & (_ & H3) & _).
+      repeat (split; auto). }
+    assert (Due : forall h, match (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None)
+      with None => True
+      | Some (Dk, D) => forall n', may_delay tau pol s k n h n' = true ->
+                          release s h n' + D <= release s k n + Dk end).
+    { intros h. unfold may_delay. destruct (by_deadline pol); auto. intros n' M.
+      apply andb_true_iff in M. destruct M as (_ & M). apply Nat.leb_le, M. }
+    assert (Higher : sum (R k) (fun t => Nat.min (higher k n t) (m - j))
+      <= sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k)) + (m - j) * loss k).
+    { apply Nat.le_trans with (sum (R k) (fun t => sum_over_others K pol k (fun h =>
+        Nat.min (cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h) (m - j))
+        + (m - j) * Nat.b2n (lost s (release s k n + t)))).
+      + apply sum_le. intros t Ht. unfold higher.
+        assert (sum_over_others K pol k (fun h => Nat.min
+            (cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h) (m - j))
+          >= Nat.min (sum_over_others K pol k (fun h =>
+            cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h)) (m - j)).
+        { apply Nat.le_trans with (1 := min_sum _ _ _). apply sum_le. intros h _.
+          destruct (negb (h =? k) && outranks pol h k); lia. }
+        destruct (lost s (release s k n + t)); simpl Nat.b2n; lia.
+      + rewrite sum_plus, sum_times. apply Nat.add_le_mono; [|apply Nat.mul_le_mono_l, losses; auto].
+        unfold sum_over_others. rewrite sum_swap. apply sum_le. intros h Hh.
+        destruct (negb (h =? k) && outranks pol h k) eqn:O; [|rewrite sum_zero; auto].
+        destruct (Facts h Hh O) as (Fk & F0 & F1 & F2 & F3).
+        apply (kept_workload K m tau pol s rules now h (R h) Hh Fk F0 F1 _ (release s k n) _
+                 (Due h) (m - j) (width h) (R k)); auto. lia. }
+    assert (C : complete (graph (tau k)) (job_run K m tau s k n) (R k)).
+    { destruct Ineq as [(I1 & [Often|(-> & A & Num)])|(I2 & Often)].
+      - apply (first_form _ m _ (wcet (tau k)) len j f (R k)
+                 (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k))
+                  + (m - j) * loss k + blocking K m tau pol k j again level0 level1)); auto;
+          [|unfold first_inequality in I1; lia].
+        pose proof (blocked_at_most_in_set k n Hk Before Bkn j again level0 level1 (R k) Own Often) as B.
+        apply Nat.le_trans with (sum (R k) (fun t => Nat.min (higher k n t) (m - j))
+          + sum (R k) (fun t => if somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)
+                                then Nat.min (low (K * Z) (low_holds k n) t) (m - j) else 0)); [|lia].
+        rewrite <- sum_plus. apply sum_le. intros t Ht.
+        pose proof (others_are_other_dags k n Hk Before t ltac:(lia)) as O.
+        destruct (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); lia.
+      - rewrite Nat.sub_0_r in *.
+        apply (first_form_blocked_along_a_path _ m _ _ _ _ _ _ (run_keeps_cores k n Hk Before Bkn A) level0 level1
+          (wcet (tau k)) len (S again) (R k)
+          (sum_over_others K pol k (fun h => whole_work m tau pol R width k 0 h (R k)) + m * loss k)); auto.
+        + apply Nat.le_trans with (2 := Higher). apply sum_le. intros t Ht.
+          destruct (Nat.ltb_spec t (period (tau k))); lia.
+        + unfold path_blocking. rewrite !largest_low.
+          assert (V : volume (graph (tau k)) (wcet (tau k))
+            <= left_over (graph (tau k)) (wcet (tau k)) 0 f + len).
+          { apply Nat.le_trans with (left_over (graph (tau k)) (wcet (tau k)) 0 f
+              + weight (graph (tau k)) (wcet (tau k)) (fun v => f v <=? 0)).
+            - unfold left_over, weight, volume. rewrite <- sum_plus. apply sum_le. intros v _.
+              destruct (f v <=? 0); lia.
+            - apply Nat.add_le_mono_l. apply chain_at_most_length; auto. intros u v Huv Hv Eu Ev.
+              apply Nat.leb_le in Eu, Ev. apply D; auto; lia. }
+          unfold first_inequality, blocking in I1. rewrite !Nat.sub_0_r in I1.
+          replace (Nat.min m (m - 1)) with (m - 1) in I1 by lia.
+          replace (S again - 1) with again by lia. lia.
+      - set (others_of h t := if negb (h =? k) && outranks pol h k
+               then cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h else 0).
+        set (phi h x := if negb (h =? k) && outranks pol h k
+               then clipped_work m tau pol R width parts part k j h (R k) x else 0).
+        set (blocked := blocking K m tau pol k j again level0 level1) in *.
+        set (low_of t := if somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)
+                         then low (K * Z) (low_holds k n) t else 0).
+        apply (second_form _ m _ (wcet (tau k)) len j f (R k) (S (S K))
+                 (fun h t => if h <? K then others_of h t
+                             else if h =? K then (if lost s (release s k n + t) then m else 0) else low_of t)
+                 (fun h x => if h <? K then phi h x else if h =? K then (m - j) * loss k else blocked)); auto.
+        + intros t Ht. pose proof (others_are_other_dags k n Hk Before t ltac:(lia)) as O. cbn [sum].
+          destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
+          rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|].
+          apply Nat.le_trans with (1 := O). unfold higher. apply Nat.add_le_mono_r, Nat.add_le_mono_r.
+          apply sum_le. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia].
+        + intros h w Hh. destruct (Nat.ltb_spec h K).
+          * unfold others_of, phi. destruct (negb (h =? k) && outranks pol h k) eqn:O.
+            -- destruct (Facts h H O) as (Fk & F0 & F1 & F2 & F3).
+               apply (kept_clipped K m tau pol s rules now h (R h) H Fk F0 F1 _ (release s k n) _
+                        (Due h) (m - j) (width h) (parts h) (part h) (R k) w); auto. lia.
+            -- rewrite sum_zero; [lia|]. intros t _. destruct (w t); auto.
+          * destruct (Nat.eqb_spec h K).
+            -- apply Nat.le_trans with (2 := Nat.mul_le_mono_l _ _ (m - j) (losses k (release s k n) Hk Bk)).
+               unfold count. rewrite <- sum_times. apply sum_le. intros t _.
+               destruct (w t), (lost s (release s k n + t)); simpl Nat.b2n; lia.
+            -- apply Nat.le_trans
+                 with (2 := blocked_at_most_in_set k n Hk Before Bkn j again level0 level1 (R k) Own Often).
+               apply sum_le. intros t _. unfold low_of.
+               destruct (w t), (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); simpl; lia.
+        + intros h a b Hh Hab. destruct (Nat.ltb_spec h K).
+          * unfold phi. destruct (negb (h =? k) && outranks pol h k); [|lia].
+            apply clipped_in_proportion; auto.
+          * destruct (h =? K); apply Nat.mul_le_mono_r, Hab.
+        + cbn [sum]. destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
+          rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|].
+          match goal with |- _ + (?x + _ + _) <= _ => assert (E : x = sum K (fun h => phi h (R k - len))) end.
+          { apply sum_ext. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia]. }
+          rewrite E. unfold second_inequality, sum_over_others in I2. unfold phi. lia. }
+    intros v Hv. apply (job_finished_in_run K m tau pol s rules); auto. }
+  intros k n Hk Bk. apply (Main (release s k n + R k)); auto.
+Qed.
+
+End proof.
+
+(** ** Policies
+
+    [no_losses]: the platform takes no time of its own, besides what is in WCETs. *)
+Definition no_losses (s : set_run) : Prop := forall t, lost s t = false.
+
+Lemma no_losses_bound s r a : no_losses s -> count r (fun t => lost s (a + t)) <= 0.
+Proof. intros H. apply Nat.eq_le_incl, sum_zero. intros t _. rewrite H. reflexivity. Qed.
+
+(** Static priorities, DAG 0 the most urgent: only DAGs before it count. *)
+Definition static : policy := {| by_deadline := false; outranks := Nat.ltb |}.
+
+(** EDF: of all other DAGs the jobs that are due no later count. *)
+Definition edf : policy := {| by_deadline := true; outranks := fun _ _ => true |}.
+
+(** Any work-conserving policy, with or without preemption: all others count. *)
+Definition any_order : policy := {| by_deadline := false; outranks := fun _ _ => true |}.
+
+(** All DAGs are bounded, and the platform takes no time of its own. *)
+Corollary set_bounds_without_losses K m tau pol s R width parts part :
+  global_run K m tau pol s -> no_losses s ->
+  (forall k, k < K -> shown K m tau pol (fun _ => true) R (fun _ => 0) width parts part k) ->
+  forall k n, k < K -> job_complete tau s (release s k n + R k) k n.
+Proof.
+  intros Rules No H k n Hk.
+  apply (set_bounds K m tau pol s (fun _ => true) R (fun _ => 0) width parts part Rules); auto.
+  intros. apply no_losses_bound, No.
+Qed.
+
+

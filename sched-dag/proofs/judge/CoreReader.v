@@ -1,0 +1,37 @@
+(** * A commit of one core from a list of numbers, and all that the program judges
+
+    2, then a commit as in Reader.v, whose claims are of no matter here; what takes the core: how many, and of each what is
+    carried in, the period, and the time; then of each DAG: the deadlines of its subtasks (0: none of its own) and their
+    numbers, of both first how many there are; 1 if a bound is claimed, the bound, stretch and level; how many points,
+    and of each the distance, how many finishes, and these. *)
+
+Require Import Bool List NArith.
+From Bounds Require Import Commit OneCoreCheck OneCoreCommit.
+From Judge Require Import Reader.
+Import ListNotations.
+
+Definition a_burst : parser burst :=
+  a <- one;; p <- one;; t <- one;; give {| carried := a; apart := p; taken := t |}.
+
+Definition a_core_statement : parser core_statement :=
+  ds <- listed one;; ns <- listed small;; h <- flag;; r <- one;; l <- one;; d <- one;;
+  ps <- listed (a <- one;; fs <- listed one;; give (a, fs));;
+  give {| own_dues := ds; own_numbers := ns; core_bound := if h : bool then Some r else None;
+          core_stretch := l; core_level := d; core_points := ps |}.
+
+(** A burst that never ends, or comes at no distance, is none that the theorem means. *)
+Definition judge_core_numbers (l : list N) : option (list bool) :=
+  match a_commit l with
+  | Some (c, l) =>
+      match (bs <- listed a_burst;; more <- many (length (dags c)) a_core_statement;; give (bs, more)) l with
+      | Some ((bs, more), []) =>
+          if forallb (fun b => (0 <? apart b)%N) bs then Some (judge_core c more bs)
+          else Some (map (fun _ => false) (dags c))
+      | _ => None
+      end
+  | None => None
+  end.
+
+(** [judge_sound], [judge_core_sound], [accepted_bounds_hold], [sporadic_bounds_hold]. *)
+Definition judge_all (l : list N) : option (list bool) :=
+  match l with 2%N :: l => judge_core_numbers l | _ => judge_numbers l end.
