@@ -90,6 +90,14 @@ pub static NODE: Need = Need {
     packages: "nodejs",
 };
 
+/// The prover that checks the proofs of bounds, and the compiler of the checker that it extracts.
+pub static COQ: Need = Need {
+    name: "Coq",
+    what: "a prover, with OCaml",
+    parts: &["coqc", "ocamlopt"],
+    packages: "coq ocaml-nox",
+};
+
 /// A browser, in which tests open the page. It is large, so it is not installed for them.
 pub static CHROMIUM: Need = Need {
     name: "Chromium",

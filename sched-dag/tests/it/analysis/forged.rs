@@ -53,7 +53,7 @@ pub(crate) fn refused(file: &str) -> [usize; 3] {
 
 /// Returns the text with each number one more, one less, 0, and below 0; and with all WCETs, priorities
 /// or marks of keeping the core alike; and with a table more.
-fn altered(text: &str) -> Vec<String> {
+pub(crate) fn altered(text: &str) -> Vec<String> {
     let mut all: Vec<String> = (1..=3)
         .flat_map(|column| ["0", "1"].map(|value| with_column(text, column, value)))
         .collect();
@@ -99,7 +99,7 @@ pub(crate) fn hashed(text: &str) -> String {
 
 /// Returns why bounds do not hold for the DAGs that a witness states: the analysis, which virtual
 /// time judges in [`together`](super::together), does not prove as much.
-fn unsound(text: &str, lines: &[String]) -> Option<String> {
+pub(crate) fn unsound(text: &str, lines: &[String]) -> Option<String> {
     let (task_set, settings) = stated(text)?;
     let analysed = answer(&task_set, &settings);
     for line in lines {

@@ -8,6 +8,7 @@ mod certificates;
 mod climb;
 mod forged;
 mod one_core;
+mod proven;
 mod random;
 mod sharp;
 mod simulate;

@@ -123,6 +123,14 @@ fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
             Ok(native::check(blessed)?)
         },
     );
+    run(
+        "Coq checks the proofs, which are of the same statements",
+        &|| {
+            install::ensure(&install::COQ).map_err(CheckFailure::Skipped)?;
+            let script = system::workspace().join("sched-dag/proofs/check");
+            Ok(system::run(&mut Command::new(script)).map(drop)?)
+        },
+    );
     run("a guest runs under KVM", &|| {
         let image = image::build("fork-join");
         let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image));

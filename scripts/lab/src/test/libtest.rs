@@ -32,8 +32,9 @@ const OF_PAGE: [(&str, &Need); 2] = [
     ("in_chromium::", &install::CHROMIUM),
 ];
 
-/// The module of tests on the host that convert YAML.
+/// The modules of tests on the host that convert YAML, and that ask what Coq has proven right.
 const CONVERT: &str = "by_convert::";
+const PROVEN: &str = "proven::";
 
 /// Makes sure that something is there.
 type Ensure = fn() -> Result<(), String>;
@@ -78,6 +79,9 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
         }
         if plan.wants(CONVERT) {
             leave_out(CONVERT, install::ensure_yaml(), &mut host, tally);
+        }
+        if plan.wants(PROVEN) {
+            leave_out(PROVEN, install::ensure(&install::COQ), &mut host, tally);
         }
         run(plan, "tests on the host", host, tally);
         // Doctests need cargo to compile each, which is not quick.
