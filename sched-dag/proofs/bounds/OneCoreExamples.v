@@ -22,7 +22,7 @@ Definition keyed_vertex_ok (u k v : nat) : bool :=
     (lost_in table u ||
      existsb (fun h => existsb (fun w => on table u h w && negb (waits (tau h) w) &&
        (lap_before h w k v || keeps (tau h) w && begun_in table u h w)) (vs tau h)) (seq 0 K)) &&
-    all_on K tau table u (fun h w => negb (keeps (tau h) w) || begun_in table u h w || lap_before h w k v)
+    all_on K tau table u (fun h w => begun_in table u h w || lap_before h w k v)
   else true.
 
 Definition keyed_lap_ok : bool :=
@@ -48,7 +48,7 @@ Proof.
      existsb (fun h => existsb (fun w => on table (t mod lap table) h w && negb (waits (tau h) w) &&
        (lap_before h w k v || keeps (tau h) w && begun_in table (t mod lap table) h w)) (vs tau h)) (seq 0 K)) = true /\
     all_on K tau table (t mod lap table)
-      (fun h w => negb (keeps (tau h) w) || begun_in table (t mod lap table) h w || lap_before h w k v) = true).
+      (fun h w => begun_in table (t mod lap table) h w || lap_before h w k v) = true).
   { intros t k n v Hk W Rd Nx. destruct (positive K 1 tau any_order offset ex table Ok k Hk) as (L & _).
     destruct (ready_now K 1 tau any_order offset ex table Ok t k n v Hk Rd) as (-> & Hv & Ri).
     destruct (the_tick table t L) as (Lt & _).
@@ -59,7 +59,7 @@ Proof.
     unfold keyed_vertex_ok in Keys. rewrite Ri, Nx, W in Keys. cbn [negb andb] in Keys.
     apply andb_true_iff in Keys. auto. }
   constructor; [exact Plain| |].
-  - intros t k n v Hk W Lo Rd Nx. destruct (At t k n v Hk W Rd Nx) as (L & -> & A & _).
+  - intros t k n v Hk W _ Lo Rd Nx. destruct (At t k n v Hk W Rd Nx) as (L & -> & A & _).
     cbn [lap_run lost] in Lo. rewrite Lo in A. cbn [orb] in A.
     apply existsb_exists in A. destruct A as (h & Hh & A). apply in_seq in Hh.
     apply existsb_exists in A. destruct A as (w & Hw & A). apply in_seq in Hw.
@@ -68,11 +68,11 @@ Proof.
     split; [rewrite executes_in by exact L; exact On|].
     destruct B as [B|B]; [left; apply lap_before_goes, B|right].
     apply andb_true_iff in B. rewrite begun_now by exact L. exact B.
-  - intros t k n v Hk W Rd Nx h n' w Hh Hw Ww Kp Bg Ex. destruct (At t k n v Hk W Rd Nx) as (L & -> & _ & A).
+  - intros t k n v Hk W _ Rd Nx h n' w Hh Hw Ww Bg Ex. destruct (At t k n v Hk W Rd Nx) as (L & -> & _ & A).
     destruct (executes_now offset ex table t h n' w L Ex) as (-> & On).
     rewrite begun_now in Bg by exact L.
     pose proof (all_on_true K tau table (t mod lap table) _ h w A Hh Hw Ww On) as B. cbv beta in B.
-    rewrite Kp, Bg in B. apply lap_before_goes, B.
+    rewrite Bg in B. apply lap_before_goes, B.
 Qed.
 
 End keyed_lap.
@@ -123,7 +123,7 @@ Definition core_dag (works : list N) (before : list (list nat)) (key : N) (keep 
           loss := 0; width := 1; cover := None; parts := 0; part_of := []; free_chains := 0; chain_of := [];
           first_level := 0; later_level := 0 |};
      key_at := fun _ => key; number_at := fun v => v; keeps_at := fun _ => keep; least_urgent := 0;
-     longest_stretch := busy; points := ps |}.
+     longest_stretch := busy; points := ps; sinks := [] |}.
 
 (** The DAGs of the runs: DAG 0 is blocked for 3 at most, by what has begun before it.  Its job in
     [one_is_blocked] takes 5 ticks, and 6 - 1/N if a tick is 1/N. *)
@@ -179,8 +179,8 @@ Example third_within_8_ms : forall N s, 0 < N ->
     (release s 2 n + N * N.to_nat 8000000) 2 n.
 Proof.
   intros N s HN Rules Losses.
-  apply (one_core_check_sound false [] (all_keep (ms 8)) 2 ltac:(vm_compute; reflexivity) N s HN Rules); [|exact Losses].
-  discriminate.
+  apply (one_core_check_sound false [] (all_keep (ms 8)) N s); [|vm_compute; reflexivity].
+  constructor; auto. discriminate.
 Qed.
 
 (** The second job of a stretch may be the worst one (R. Davis et al. 2007): of DAG 2 the first one takes 5, the next
@@ -194,6 +194,23 @@ Example second_job_counts :
   core_claim_ok false [] (second_is_worst 6 [(0, [5]); (6, [12])]%N) 2 = true /\
   core_claim_ok false [] (second_is_worst 5 [(0, [5]); (6, [12])]%N) 2 = false /\
   core_claim_ok false [] (second_is_worst 5 [(0, [5])]%N) 2 = false.
+Proof. vm_compute. auto. Qed.
+
+(** Sporadic releases, and sinks whose deadlines differ by more than the period.  DAG 0 has a sink of 1 due after 5
+  and one
+    of 4 due after 22, every 10; DAG 1 takes 16, due after 21.  DAG 0 is released at 0 and 17, DAG 1 at 0: at 17
+    the second sink of the first job waits, is due at 22, as the first sink of the next job is, and goes first, till 21.
+    So that takes 5.  Where earlier jobs are counted at multiples of the period only, the bound is 3. *)
+Definition far_deadlines (r : N) : list core_claim := [
+  {| of_dag := of_dag (core_dag [1; 4]%N [[]; []] 22 false 10 22 36 []);
+     key_at := fun v => nth v [5; 22]%N 0%N; number_at := fun v => v; keeps_at := fun _ => false; least_urgent := 0;
+     longest_stretch := 36; points := [];
+     sinks := [{| sink := 0; sink_bound := r; sink_stretch := 36;
+       sink_points := [(0, [1]); (10, [2]); (17, [22]); (20, [23]); (27, [28]); (30, [29])]%N |}] |};
+  core_dag [16]%N [[]] 21 false 1000 21 36 []].
+
+Example far_deadlines_count :
+  core_sinks_ok true [] (far_deadlines 5) 0 = [true] /\ core_sinks_ok true [] (far_deadlines 4) 0 = [false].
 Proof. vm_compute. auto. Qed.
 
 Print Assumptions third_within_8_ms.

@@ -1,7 +1,7 @@
 (** * One core: the subtasks of a job start in one order
 
     [in_order]: of those that are ready by edges always the one with the least key is first, whatever other jobs do,
-    in all runs without lost ticks.  So it is known which subtask is executed last. *)
+    in all runs.  So it is known which subtask is executed last. *)
 
 Require Import Arith Lia Bool List.
 From Bounds Require Import Sums Model TaskSet AnyResolution OneCoreStretch OneCore.
@@ -18,7 +18,6 @@ Section order.
 Variables (K : nat) (tau : nat -> task) (edf : bool) (key : keys) (s : set_run).
 Variables (k : nat) (place : nat -> nat).
 Hypothesis rules : keyed_run K tau edf key s.
-Hypothesis never : forall t, lost s t = false.
 Hypothesis in_K : k < K.
 Hypothesis keys_up : forall u w, edge (graph (tau k)) u w = true -> key k u <= key k w.
 Hypothesis no_waits : forall w, w < size (graph (tau k)) -> waits (tau k) w = false.
@@ -54,11 +53,7 @@ Lemma begins_first t n x m u :
   instance_ready tau s t k m u -> executes s t k m u = false -> goes_before edf key s k n x k m u = true.
 Proof.
   intros Hx Ex Bg Rd Nx. pose proof Rd as (Hu & _).
-  destruct (by_key _ _ _ _ _ rules t k m u in_K (no_waits u Hu) (never t) Rd Nx)
-    as (h & n' & w & Hh & Hw & Ww & Ew & O).
-  destruct (one_at_a_time K tau edf key s rules t k n x h n' w) as (<- & <- & <-);
-    [apply executing_on_the_core; auto|apply executing_on_the_core; auto|].
-  destruct O as [O|(_ & O)]; [exact O|congruence].
+  apply (begins_by_key _ _ _ _ _ rules t k m u in_K (no_waits u Hu) (or_introl no_waits) Rd Nx k n x); auto.
 Qed.
 
 Lemma in_order n : forall t x y, x < size (graph (tau k)) -> y < size (graph (tau k)) ->
@@ -98,7 +93,7 @@ Proof.
     + intros h i v w Hh C Ed. apply Spec in C. destruct C as (-> & Hi & Kw). apply Spec.
       pose proof (keys_up v w Ed). split; [auto|]. split; [auto|lia].
     + intros h i' i w _ _ Hi C. apply Spec in C. apply Spec. split; [tauto|]. split; [lia|tauto].
-    + intros h i w _ Hw C. apply Spec in C. destruct C as (-> & _). apply no_waits, Hw.
+    + intros h i w _ _ C v Hv. apply Spec in C. destruct C as (-> & _). apply no_waits, Hv.
     + split; [auto|]. split; [auto|]. split; [apply Spec; auto|]. unfold job_finished. lia.
     + pose proof (releases_grow K tau edf key s rules k m n in_K Hm). lia.
     + apply Spec in C. destruct C as (_ & Hm' & Ku).
@@ -122,21 +117,43 @@ Proof.
     clear -B Lex. unfold goes_before, urgency in B. destruct edf; by_keys; lia.
 Qed.
 
+(** What goes before a subtask that is ready, in its job, has an earlier place. *)
+Lemma first_is_earlier n t v w : instance_ready tau s t k n v -> instance_ready tau s t k n w ->
+  goes_before edf key s k n w k n v = true -> place w <= place v.
+Proof.
+  intros (Hv & _ & Fv & _) (Hw & _ & _ & Anc & _) B. destruct (le_lt_dec (place w) (place v)) as [L|L]; [exact
+    L|exfalso].
+  destruct order as (_ & Least). destruct (Least w v Hw Hv L) as [H|[H|(u & E & U)]].
+  1, 2: clear -B H; unfold goes_before, urgency in B; destruct edf; by_keys; lia.
+  pose proof (edges_lead_up _ _ _ E). pose proof (Anc u (precedes_edge _ _ _ E)) as Fu.
+  destruct U as [->|U]; [contradiction|].
+  destruct (finished_has_executed t n u ltac:(lia) Fu) as (i & Hi & Ei).
+  apply Fv. apply job_finished_later with i; [lia|]. apply (in_order n i u v); auto. lia.
+Qed.
+
 End order.
 
+(** The order of the ns is that of the ticks. *)
+Lemma finer_order N tau edf key k place : 0 < N ->
+  start_order tau key k place -> start_order (fun k => finer N (tau k)) (finer_key N edf key) k place.
+Proof.
+  intros HN (O1 & O2). split; [exact O1|]. intros x y Hx Hy L. unfold finer_key. cbn [urgent number].
+  specialize (O2 x y Hx Hy L). simpl.
+  destruct edf; [|exact O2]. destruct O2 as [H|[(H & H')|H]]; [left; nia|right; left; split; [nia|auto]|auto].
+Qed.
+
 (** In all runs the subtask with the last place is executed last. *)
-Theorem order_tells_last K N tau edf key loss s k last place :
+Theorem order_tells_last K N tau edf key s k last place :
   0 < N -> keyed_run K (fun k => finer N (tau k)) edf (finer_key N edf key) s ->
-  (forall a x, count (N * x) (fun t => lost s (a + t)) <= N * loss x) -> (forall x, loss x = 0) -> k < K ->
+  k < K ->
   (forall u w, edge (graph (tau k)) u w = true -> key k u <= key k w) ->
   (forall w, w < size (graph (tau k)) -> waits (tau k) w = false) ->
   start_order tau key k place ->
   last < size (graph (tau k)) -> (forall v, v < size (graph (tau k)) -> v <> last -> place v < place last) ->
   executed_last tau k s last.
 Proof.
-  intros HN Rules Losses No Hk Up W (O1 & O2) Hl Last. split; [exact Hl|]. intros t n v E Hv Ne.
+  intros HN Rules Hk Up W (O1 & O2) Hl Last. split; [exact Hl|]. intros t n v E Hv Ne.
   apply (in_order K (fun k => finer N (tau k)) edf (finer_key N edf key) s k place Rules) with (x := last); auto.
-  - apply (never_lost N loss (lost s) HN Losses No).
   - intros u w Ed. specialize (Up u w Ed). unfold finer_key. cbn [urgent]. destruct edf; nia.
   - split; [exact O1|]. intros x y Hx Hy L. unfold finer_key. cbn [urgent number]. specialize (O2 x y Hx Hy L). simpl.
     destruct edf; [|exact O2]. destruct O2 as [H|[(H & H')|H]]; [left; nia|right; left; split; [nia|auto]|auto].

@@ -38,19 +38,25 @@ Ltac by_keys := unfold goes_before, job_before in *; cbv zeta in *;
 (** Nothing is said by the policy of TaskSet.v: all may delay all, by keys. *)
 Definition any_order : policy := {| by_deadline := false; outranks := fun _ _ => true |}.
 
+(** Of a DAG that waits for devices the rules ask nothing while an earlier job of it is in flight, as W3 may hold the
+  job
+    back. *)
+Definition asked (tau : nat -> task) (s : set_run) (t k n : nat) : Prop :=
+  (forall v, v < size (graph (tau k)) -> waits (tau k) v = false) \/ earlier_complete tau s t k n.
+
 Record keyed_run (K : nat) (tau : nat -> task) (edf : bool) (key : keys) (s : set_run) : Prop := {
   (** R1 to R4, at most one instance has the core, what has begun keeps the core where it says so. *)
   on_one_core : global_run K 1 tau any_order s;
   (** R5: save in lost ticks, while an instance is ready and does not execute, the core executes what goes before, or
       what keeps the core and has begun. *)
-  by_key : forall t k n v, k < K -> waits (tau k) v = false -> lost s t = false ->
+  by_key : forall t k n v, k < K -> waits (tau k) v = false -> asked tau s t k n -> lost s t = false ->
     instance_ready tau s t k n v -> executes s t k n v = false ->
     exists h n' w, h < K /\ w < size (graph (tau h)) /\ waits (tau h) w = false /\ executes s t h n' w = true /\
       (goes_before edf key s h n' w k n v = true \/ keeps (tau h) w = true /\ has_begun s t h n' w = true);
-  (** R5: what keeps the core begins only if it goes before all that is ready. *)
-  begins_by_key : forall t k n v, k < K -> waits (tau k) v = false ->
+  (** R5: what begins goes before all that is ready, in lost ticks, too. *)
+  begins_by_key : forall t k n v, k < K -> waits (tau k) v = false -> asked tau s t k n ->
     instance_ready tau s t k n v -> executes s t k n v = false ->
-    forall h n' w, h < K -> w < size (graph (tau h)) -> waits (tau h) w = false -> keeps (tau h) w = true ->
+    forall h n' w, h < K -> w < size (graph (tau h)) -> waits (tau h) w = false ->
       has_begun s t h n' w = false -> executes s t h n' w = true -> goes_before edf key s h n' w k n v = true
 }.
 
@@ -207,10 +213,14 @@ Hypothesis closed_by_jobs : forall h n' n w,
 Hypothesis closed_by_keys : forall t k n v h n' w, k < K -> h < K -> counts k n v = true ->
   instance_ready tau s t k n v -> instance_ready tau s t h n' w ->
   goes_before edf key s h n' w k n v = true -> counts h n' w = true.
-Hypothesis never_waits : forall h n w,
-  h < K -> w < size (graph (tau h)) -> counts h n w = true -> waits (tau h) w = false.
+Hypothesis waitless : forall h n w, h < K -> w < size (graph (tau h)) -> counts h n w = true ->
+  forall v, v < size (graph (tau h)) -> waits (tau h) v = false.
 Hypothesis wcets_known : forall h n w,
   h < K -> w < size (graph (tau h)) -> counts h n w = true -> known (tau h) = true.
+
+Lemma never_waits h n w :
+  h < K -> w < size (graph (tau h)) -> counts h n w = true -> waits (tau h) w = false.
+Proof. intros Hh Hw C. apply (waitless h n w); auto. Qed.
 
 Definition pending (t h n w : nat) : Prop :=
   h < K /\ w < size (graph (tau h)) /\ counts h n w = true /\ ~ job_finished s t h n w.
@@ -314,7 +324,8 @@ Proof.
   destruct (some_ready t h0 Hh0 n0 w0 P R0) as (n & v & Cv & Rd). pose proof Rd as (Hv & _).
   destruct (executes s t h0 n v) eqn:E.
   { exists h0, n, v. split; [|auto]. apply executing_on_the_core; auto. apply (never_waits h0 n); auto. }
-  destruct (by_key _ _ _ _ _ rules t h0 n v Hh0 (never_waits h0 n v Hh0 Hv Cv) Lo Rd E)
+  destruct (by_key _ _ _ _ _ rules t h0 n v Hh0 (never_waits h0 n v Hh0 Hv Cv)
+    (or_introl (waitless h0 n v Hh0 Hv Cv)) Lo Rd E)
     as (h & n' & w & Hh & Hw & Ww & Ew & O).
   exists h, n', w. split; [apply executing_on_the_core; auto|]. split; [auto|].
   destruct (counts h n' w) eqn:C; [auto|right].
@@ -330,8 +341,9 @@ Proof.
   destruct (executes s i h1 n2 v2) eqn:E2.
   - destruct (one_at_a_time i h1 n2 v2 h n' w) as (-> & -> & ->); [| |congruence];
       apply executing_on_the_core; auto. apply (never_waits h1 n2); auto.
-  - pose proof (begins_by_key _ _ _ _ _ rules i h1 n2 v2 Hh1 (never_waits h1 n2 v2 Hh1 Hv2 C2) Rd2 E2
-      h n' w Hh Hw Ww Kp Bi Ei) as O.
+  - pose proof (begins_by_key _ _ _ _ _ rules i h1 n2 v2 Hh1 (never_waits h1 n2 v2 Hh1 Hv2 C2)
+      (or_introl (waitless h1 n2 v2 Hh1 Hv2 C2)) Rd2 E2
+      h n' w Hh Hw Ww Bi Ei) as O.
     rewrite (closed_by_keys i h1 n2 v2 h n' w) in C; auto; [discriminate|]. apply executing_is_ready; auto.
 Qed.
 

@@ -14,11 +14,11 @@ Print has_begun. Print holds_core. Print cores_held. Print may_pass. Print globa
 Print workload. Print workload_by_deadline. Print clipped. Print blocking. Print shown.
 Print subtask. Print dag_statement. Print commit. Print vertex. Print vertices_of. Print expand.
 Print may_outrank. Print stated. Print claim. Print claim_at. Print stated_task. Print committed. Print finer.
-Print keys. Print urgency. Print job_before. Print goes_before. Print any_order. Print keyed_run.
+Print keys. Print urgency. Print job_before. Print goes_before. Print any_order. Print asked. Print keyed_run.
 Print above. Print may_count. Print may_block. Print first_release. Print blocking_time. Print jobs_due. Print up.
-Print work_of_other. Print own_jobs. Print interference. Print completes. Print starts. Print stretch_ends.
+Print work_of_other. Print own_earlier. Print own_jobs. Print target_work. Print interference. Print completes. Print starts. Print stretch_ends.
 Print blocks_at. Print executed_last. Print response_shown. Print response_shown_by_start. Print finer_key.
-Print start_order. Print burst. Print lossN. Print losses. Print core_statement. Print least_dues. Print subtask_of.
+Print start_order. Print burst. Print lossN. Print losses. Print sink_claim. Print core_run. Print core_statement. Print least_dues. Print subtask_of.
 Print keys_by_vertex. Print numbers_by_vertex. Print stated_keys.
 
 (** The theorems. *)
@@ -39,6 +39,7 @@ Check one_core.
 Check one_core_by_start.
 Check order_tells_last.
 Check one_core_check_sound.
+Check sink_check_sound.
 Check judge_core_sound.
 Check preempted_run_obeys.
 Check three_obey_the_rules.
@@ -50,6 +51,6 @@ Definition all_of_them :=
   (@graham, @multi_path_alone, @first_form_in_fractions, @multi_path_alone_in_fractions,
   @response_time_equation, @second_form, @second_form_sharp, @first_form_blocked,
   @first_form_blocked_along_a_path, @set_bounds, @set_bounds_in_fractions, @check_sound_in_fractions,
-  @judge_sound, @one_core, @one_core_by_start, @order_tells_last, @one_core_check_sound,
+  @judge_sound, @one_core, @one_core_by_start, @order_tells_last, @one_core_check_sound, @sink_check_sound,
   @judge_core_sound, @preempted_run_obeys, @three_obey_the_rules, @losses_of_any_core, @sharp_form_fails_in_fractions).
 Print Assumptions all_of_them.

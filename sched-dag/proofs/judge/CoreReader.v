@@ -3,7 +3,8 @@
     2, then a commit as in Reader.v, whose claims are of no matter here; what takes the core: how many, and of each what is
     carried in, the period, and the time; then of each DAG: the deadlines of its subtasks (0: none of its own) and their
     numbers, of both first how many there are; 1 if a bound is claimed, the bound, stretch and level; how many points,
-    and of each the distance, how many finishes, and these. *)
+    and of each the distance, how many finishes, and these; how many sinks have bounds of their own, and of each the
+    vertex, bound, stretch, and points. *)
 
 Require Import Bool List NArith.
 From Bounds Require Import Commit OneCoreCheck OneCoreCommit.
@@ -13,11 +14,17 @@ Import ListNotations.
 Definition a_burst : parser burst :=
   a <- one;; p <- one;; t <- one;; give {| carried := a; apart := p; taken := t |}.
 
+Definition points_listed : parser (list (N * list N)) := listed (a <- one;; fs <- listed one;; give (a, fs)).
+
+Definition a_sink : parser sink_claim :=
+  v <- small;; r <- one;; l <- one;; ps <- points_listed;;
+  give {| sink := v; sink_bound := r; sink_stretch := l; sink_points := ps |}.
+
 Definition a_core_statement : parser core_statement :=
   ds <- listed one;; ns <- listed small;; h <- flag;; r <- one;; l <- one;; d <- one;;
-  ps <- listed (a <- one;; fs <- listed one;; give (a, fs));;
+  ps <- points_listed;; ss <- listed a_sink;;
   give {| own_dues := ds; own_numbers := ns; core_bound := if h : bool then Some r else None;
-          core_stretch := l; core_level := d; core_points := ps |}.
+          core_stretch := l; core_level := d; core_points := ps; core_sinks := ss |}.
 
 (** A burst that never ends, or comes at no distance, is none that the theorem means. *)
 Definition judge_core_numbers (l : list N) : option (list bool) :=

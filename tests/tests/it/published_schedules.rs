@@ -25,7 +25,6 @@ fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
         seed: 1,
         occupation: Occupation::Hold,
         length: Length::Jobs(1),
-        limit_s: 600,
         grid_ns: 0,
     };
     commit(graph, &settings).expect("it is a DAG");

@@ -266,6 +266,34 @@ chain 0
 seal 0
 ";
 
+/// The last bound is below the WCET, so its job would wait for less than no time.
+const BELOW_THE_PATH: &str = "\
+machine 2 static 0
+dag 0 10 10 1 1 0 a
+subtask 1 0 0
+dag 1 20 20 1 1 0 b
+subtask 1 1 0
+dag 2 1000 1000 1 1 0 x
+subtask 900 2 0
+hash 0
+graph 0 1 1
+levels 1
+graph 1 1 1
+levels 1
+graph 2 900 900
+levels 900
+bound 0 1 paths 1 2 0 0 0
+chain 0
+bound 1 2 paths 1 2 0 0 1
+chain 0
+other 0 1 2 1
+bound 2 1 waiting 1 2 1 0 -3595
+chain 0
+other 0 1 2 1 -1798
+other 1 2 2 1 -1798
+seal 0
+";
+
 /// Its earlier jobs are too many to be counted one by one.
 const MANY_JOBS: &str = "\
 machine 1 static 0
@@ -313,6 +341,7 @@ fn what_is_forged_of_groups_or_too_large_is_refused() {
     let other_digits = MANY_JOBS.replace("machine 1", "machine \u{661}");
     let forged = [
         (GROUPS_OVERLAP, "groups overlap"),
+        (BELOW_THE_PATH, "dag 2: below its longest path"),
         (MANY_JOBS, "dag 0: its other jobs"),
         (&many_cores, "impossible numbers of the machine"),
         (&other_digits, "is no number of a witness"),
