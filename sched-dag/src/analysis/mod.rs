@@ -281,7 +281,7 @@ texts! {
              cores or let the commit divide them, shorten what outranks it or relax the deadline";
         /// As [`NoBound`](Self::NoBound), but the equations give this bound.
         BoundBeyondDeadline { bound_ns: u64 } =
-            "the least bound of its response time is {:?}, beyond its relative deadline (it may still \
+            "the bound of its response time is {:?}, beyond its relative deadline (it may still \
              meet it); add cores or relax the deadline", Duration::from_nanos(*bound_ns);
         /// As [`NoBound`](Self::NoBound), but with more jobs allowed in flight
         /// there might be one.
