@@ -114,7 +114,7 @@ impl<'a> EquationSet<'a> {
     pub(super) fn in_order(&self) -> Option<Vec<u64>> {
         let order: Vec<usize> = (0..self.tasks.len()).collect();
         let none = alloc::vec![None; order.len()];
-        let solution = self.solve(&none, &order, |other, dag| other < dag);
+        let solution = self.solve(&none, &order, &|other, dag| other < dag);
         solution.responses.into_iter().collect()
     }
 
@@ -152,7 +152,7 @@ impl<'a> EquationSet<'a> {
         &self,
         known: &[Option<u64>],
         order: &[usize],
-        may_outrank: impl Fn(usize, usize) -> bool,
+        may_outrank: &dyn Fn(usize, usize) -> bool,
     ) -> DagSolution {
         let mut solution = DagSolution {
             responses: (known.iter().enumerate())
@@ -181,7 +181,7 @@ impl<'a> EquationSet<'a> {
                     && let Some(start_ns) = before
                 {
                     let responses = &solution.responses;
-                    match self.respond(dag, start_ns, responses, &may_outrank, &mut steps) {
+                    match self.respond(dag, start_ns, responses, may_outrank, &mut steps) {
                         Ok(after_ns) => solution.responses[dag] = Some(after_ns),
                         Err(failure) => solution.fail(dag, failure),
                     }
@@ -193,7 +193,7 @@ impl<'a> EquationSet<'a> {
         // The budget is spent on the way up. From the deadlines down each round is a bound, so the
         // last whole one can be had.
         if let Some((_, SolverFailure::Limit)) = solution.first_failing
-            && let Some(coarse) = self.down_from_deadlines(known, &may_outrank)
+            && let Some(coarse) = self.down_from_deadlines(known, may_outrank)
         {
             solution.responses = coarse.into_iter().map(Some).collect();
             solution.first_failing = None;
@@ -209,12 +209,12 @@ impl<'a> EquationSet<'a> {
         dag: usize,
         start_ns: u64,
         responses: &[Option<u64>],
-        may_outrank: impl Fn(usize, usize) -> bool,
+        may_outrank: &dyn Fn(usize, usize) -> bool,
         steps: &mut EvaluationBudget,
     ) -> Result<u64, BoundFailure> {
         let (equations, figures) = (self.equations(dag), &self.figures[dag]);
         let overlapping = equations.limit_ns + 1;
-        let delays = |bound_ns| self.delays_of_job(dag, bound_ns, responses, &may_outrank);
+        let delays = |bound_ns| self.delays_of_job(dag, bound_ns, responses, may_outrank);
         let apart = delays(equations.limit_ns)?;
         let solved = steps.spend(dag, |steps| equations.solve(&apart, start_ns, steps));
         match solved {
@@ -256,7 +256,7 @@ impl<'a> EquationSet<'a> {
     pub(super) fn down_from_deadlines(
         &self,
         known: &[Option<u64>],
-        may_outrank: impl Fn(usize, usize) -> bool,
+        may_outrank: &dyn Fn(usize, usize) -> bool,
     ) -> Option<Vec<u64>> {
         let mut steps = EvaluationBudget::of(self.tasks.len());
         let mut bounds: Vec<u64> = (known.iter().zip(&self.figures))
@@ -269,7 +269,7 @@ impl<'a> EquationSet<'a> {
                 if known[dag].is_some() {
                     return known[dag];
                 }
-                self.respond(dag, 0, &responses, &may_outrank, &mut steps)
+                self.respond(dag, 0, &responses, may_outrank, &mut steps)
                     .ok()
             });
             match lower.collect::<Option<Vec<u64>>>() {
@@ -290,7 +290,7 @@ impl<'a> EquationSet<'a> {
         dag: usize,
         bound_ns: u64,
         responses: &[Option<u64>],
-        may_outrank: impl Fn(usize, usize) -> bool,
+        may_outrank: &dyn Fn(usize, usize) -> bool,
     ) -> Result<DelaySources, BoundFailure> {
         let deadline_ns = self.tasks[dag].relative_deadline_ns();
         self.delays(dag, (bound_ns, deadline_ns), responses, may_outrank)
@@ -307,7 +307,7 @@ impl<'a> EquationSet<'a> {
         dag: usize,
         (bound_ns, deadline_ns): (u64, u64),
         responses: &[Option<u64>],
-        may_outrank: impl Fn(usize, usize) -> bool,
+        may_outrank: &dyn Fn(usize, usize) -> bool,
     ) -> Result<DelaySources, BoundFailure> {
         let is_apart = |dag: usize, bound_ns| bound_ns <= self.tasks[dag].period_ns();
         let limit_ns =
@@ -427,7 +427,7 @@ pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> O
     let mut set = constrained(tasks, cores).then(|| EquationSet::new(tasks, cores))?;
     set.clip = clip;
     set.deadlines_limit = true;
-    set.down_from_deadlines(&alloc::vec![None; tasks.len()], |_, _| true)
+    set.down_from_deadlines(&alloc::vec![None; tasks.len()], &|_, _| true)
 }
 
 #[cfg(test)]

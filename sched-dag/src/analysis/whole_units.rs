@@ -61,7 +61,7 @@ pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<
 pub fn waiting_edf(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
     let mut set = in_units(tasks, cores, form)?;
     set.deadlines_limit = true;
-    set.down_from_deadlines(&alloc::vec![None; tasks.len()], |_, _| true)
+    set.down_from_deadlines(&alloc::vec![None; tasks.len()], &|_, _| true)
 }
 
 fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<EquationSet<'a>> {

@@ -21,7 +21,7 @@ use crate::system;
 use views::json::Value;
 
 /// The most bytes that a stripped image may have.
-pub const MOST_STRIPPED_BYTES: u64 = 968 << 10;
+pub const MOST_STRIPPED_BYTES: u64 = 984 << 10;
 
 /// The folder of the apps.
 const APPS: &str = "apps";

@@ -83,7 +83,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let known = found.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let known: Vec<Option<u64>> = known.collect();
     let may_outrank = |other, dag| case.may_outrank(other, dag);
-    let solution = case.set.solve(&known, &case.order, may_outrank);
+    let solution = case.set.solve(&known, &case.order, &may_outrank);
     let is_asked = |dag: usize| TEST.is_for(case, dag);
     for dag in (0..known.len()).filter(|&dag| known[dag].is_none() && is_asked(dag)) {
         match solution.responses[dag] {
@@ -122,7 +122,7 @@ fn again(
         limit_ns: case.tasks[dag].period_ns().min(most_ns),
         ..case.set.equations(dag)
     };
-    let delays = case.set.delays_of_job(dag, equations.limit_ns, responses, may_outrank);
+    let delays = case.set.delays_of_job(dag, equations.limit_ns, responses, &may_outrank);
     equations.solve(&delays.ok()?, 0, &mut { OWN_STEPS }).ok()
 }
 
@@ -196,7 +196,7 @@ pub(super) fn write(
     text: &mut WitnessText,
 ) {
     let may_outrank = |other, dag| case.may_outrank(other, dag);
-    let Ok(delays) = case.set.delays_of_job(dag, bound_ns, responses, may_outrank) else {
+    let Ok(delays) = case.set.delays_of_job(dag, bound_ns, responses, &may_outrank) else {
         return;
     };
     let listed = listed(case, dag, responses, &delays);

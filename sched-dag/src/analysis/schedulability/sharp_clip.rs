@@ -50,13 +50,13 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let may_outrank = |other, dag| case.may_outrank(other, dag);
     let mut set = case.set.clone();
     set.clip = InterferenceBound::Sharp;
-    let responses = set.solve(&known, &case.order, may_outrank).responses;
+    let responses = set.solve(&known, &case.order, &may_outrank).responses;
     for dag in (0..known.len()).filter(|&dag| known[dag].is_none()) {
         let within = responses[dag].filter(|&ns| ns <= case.tasks[dag].period_ns());
         let Some(bound_ns) = within else {
             continue;
         };
-        let Ok(delays) = set.delays_of_job(dag, bound_ns, &responses, may_outrank) else {
+        let Ok(delays) = set.delays_of_job(dag, bound_ns, &responses, &may_outrank) else {
             continue;
         };
         let published = case.set.equations(dag);

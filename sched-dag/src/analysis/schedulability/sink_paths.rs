@@ -95,7 +95,7 @@ fn equations<'a>(
             let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
             let whole_ns = responses[dag]?;
             let times_ns = (whole_ns, deadline_ns);
-            let delays = set.delays(dag, times_ns, responses, may_outrank).ok()?;
+            let delays = set.delays(dag, times_ns, responses, &may_outrank).ok()?;
             let (length_ns, volume_ns) = (reach.length_ns, reach.volume_ns);
             let figures = &set.figures[dag];
             let figures = figures.of_sink(length_ns, volume_ns, deadline_ns, whole_ns);

@@ -1,8 +1,8 @@
 //! The checker that Coq has proven right, alone: altered witnesses, past what `check-witness`
 //! would refuse of their proofs, against the analysis.
 //!
-//! What it proves of an altered one must hold for the DAGs that this one states. So each number
-//! has to reach the theorem.
+//! A bound that is proven of an altered one must hold for the DAGs that this one states. So each
+//! number has to reach the theorem.
 
 use std::fs;
 use std::path::Path;

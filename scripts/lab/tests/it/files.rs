@@ -16,7 +16,7 @@ bench hand-off --listing none/x | name another
 bench hand-off --listing file --scale | `--scale`
 oracle synchronizer file file | are one file; give it once
 oracle bounds /dev/zero | it is a device or a pipe
-bench bounds sub.json | bench bounds: sub.json: cannot be read: it is a folder; name another file
+bench bounds sub.json | sub.json: cases are wanted; write its sets as in tests/oracle/lent.txt
 bench bounds late.txt | bench bounds: late.txt: case a: a DAG has D > T, which no method here covers; leave the case out
 bench bounds torn.txt | bench bounds: torn.txt:4: the file ends where a `end` record should be";
     let set = "case a 2 1\ndag 8 9 1 0\nwcet 3\n";
