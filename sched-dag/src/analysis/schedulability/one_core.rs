@@ -14,7 +14,8 @@
 //! with own(a) the DAG's earlier work and C the job's up to the subtask, and `R = max over a of X - a`,
 //! where `a` is a multiple of the own period or, under EDF, an instant at which another job joins S. A
 //! subtask that keeps its core has to *start*: its equation is without its own WCET, and also counts
-//! work that is released at its start, if nothing blocks. A blocking subtask has started before the stretch, so it ends before its WCET has passed.
+//! work that is released at its start, if nothing blocks. A blocking subtask has started before the
+//! stretch, so it ends before its WCET has passed.
 //!
 //! M. Joseph, P. Pandya, The Computer Journal 29(5), 1986; J. P. Lehoczky, RTSS 1990; L. George,
 //! N. Rivierre, M. Spuri, INRIA RR-2966, 1996; R. Davis et al., Real-Time Systems 35, 2007;

@@ -208,6 +208,10 @@ impl<'a> JobWindows<'a> {
                 let [wait_ns, wcet_ns, _] = chain[first];
                 work += u128::from(wcet_ns);
                 let window = self.window([work, stops], last_ns, steps);
+                // No grouping of a long chain is known to its end, so the commit does not look on.
+                if *steps == 0 {
+                    return None;
+                }
                 if let (Some((before_ns, groups)), Some(ends)) = (&best[first], window) {
                     let begin_ns = wait_ns.saturating_add(*before_ns);
                     let end_ns = begin_ns.saturating_add(self.length(ends));
