@@ -18,6 +18,7 @@ Definition finer (t : task) : task := {|
   wcet := fun v => N * wcet t v;
   waits := waits t;
   keeps := keeps t;
+  regular := regular t;
   known := known t;
   period := N * period t;
   deadline := N * deadline t;
@@ -133,8 +134,8 @@ Lemma shown_finer k :
   shown K m tau pol bounded R loss width parts part k ->
   shown K m tau' pol bounded R' loss' width parts part k.
 Proof.
-  intros (Kn & Bk & W & P & O & B & j & f & len & again & level0 & level1 & Hj & Len & D & (H1 & H2) & Ineq).
-  split; [exact Kn|]. split; [exact Bk|]. split; [exact W|]. split; [exact P|]. split; [exact O|]. split; [exact B|].
+  intros (Kn & Rg & Bk & W & P & O & B & j & f & len & again & level0 & level1 & Hj & Len & D & (H1 & H2) & Ineq).
+  split; [exact Kn|]. split; [exact Rg|]. split; [exact Bk|]. split; [exact W|]. split; [exact P|]. split; [exact O|]. split; [exact B|].
   exists j, f, (N * len), again, (N * level0), (N * level1).
   split; [auto|]. split; [apply no_path_longer_finer, Len|]. split; [exact D|].
   split; [split; apply Nat.mul_le_mono_l; auto|].

@@ -62,7 +62,7 @@ Definition stated_task (c : claim) : task :=
      wcet := fun v => N.to_nat (wcetN c v);
      waits := fun v => existsb (Nat.eqb v) (wait_list c);
      keeps := fun _ => keeping c;
-     known := known_wcets c;
+     regular := claimed c; known := known_wcets c;
      period := N.to_nat (minimum_period c);
      deadline := N.to_nat (relative_deadline c);
      first_deadline := N.to_nat (least_deadline c) |}.
@@ -518,7 +518,7 @@ Proof.
   rewrite !andb_true_iff.
   intros (_ & (((((((((((((Kn & Bk) & E) & A) & L) & W) & P) & F) & Hj) & HL) & HR) & O) & B) & I)).
   apply Nat.ltb_lt in Hj. apply N.leb_le in HL, HR.
-  split; [exact Kn|]. split.
+  split; [exact Kn|]. split; [exact Cl|]. split.
   { intros h v Hh _ Bl. rewrite blocksN_ok in Bl. apply andb_true_iff in Bl. destruct Bl as (Bl & _).
     unfold blockers_ok in Bk. rewrite forallb_forall in Bk. specialize (Bk h ltac:(apply in_seq; lia)).
     rewrite Bl in Bk. exact Bk. }

@@ -130,15 +130,16 @@ Definition claim_at (claimed_too : bool) (k : nat) : claim :=
      free_chains := beside d; chain_of := map (fun v => in_chain (owner v)) vs;
      first_level := level k (m - beside d); later_level := level k (Nat.min (m - beside d) (m - 1)) |}.
 
-(** The DAGs as tasks: as the claims' (Checker.v), but each subtask keeps its core just if it is stated to. *)
-Definition with_keeps (t : task) (kept : nat -> bool) : task :=
-  {| graph := graph t; wcet := wcet t; waits := waits t; keeps := kept; known := known t;
+(** The DAGs as tasks: as the claims' (Checker.v), but each subtask keeps its core just if it is stated to, and of
+    DAGs without claims no rank and no end is asked. *)
+Definition with_keeps (t : task) (kept : nat -> bool) (is_regular : bool) : task :=
+  {| graph := graph t; wcet := wcet t; waits := waits t; keeps := kept; regular := is_regular; known := known t;
      period := period t; deadline := deadline t; first_deadline := first_deadline t |}.
 
 Definition kept_at (k v : nat) : bool :=
   match nth_error (expand (overhead c) (subtasks (dag_at k))) v with Some x => keeps_its_core (owner x) | None => false end.
 
-Definition committed (k : nat) : task := with_keeps (stated_task (claim_at true k)) (kept_at k).
+Definition committed (k : nat) : task := with_keeps (stated_task (claim_at true k)) (kept_at k) (has_claim (dag_at k)).
 
 (** ** The judge
 
@@ -159,15 +160,17 @@ Fixpoint settle (n : nat) (which : list bool) : list bool :=
 
 Definition judge : list bool :=
   let which := settle number (map has_claim (dags c)) in
-  if (length which =? number) && forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with which)
+  if (length which =? number) && forallb (fun k => negb (nth k which false) || has_claim (dag_at k)) (seq 0 number) &&
+     forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with which)
   then which else map (fun _ => false) (dags c).
 
 (** ** It is right *)
 
 (** A run keeps rules that allow more. *)
-Lemma weaker_rules K m tau pol pol' s kept :
+Lemma weaker_rules K m tau pol pol' s kept is_regular :
   global_run K m tau pol s ->
-  let tau' := fun k => with_keeps (tau k) (kept k) in
+  let tau' := fun k => with_keeps (tau k) (kept k) (is_regular k) in
+  (forall k, k < K -> is_regular k = true -> regular (tau k) = true) ->
   (forall k v, k < K -> v < size (graph (tau k)) -> waits (tau k) v = false ->
      kept k v = true -> keeps (tau k) v = true) ->
   (forall k n h n', k < K -> h < K -> may_pass tau pol s k n h n' -> may_pass tau' pol' s k n h n') ->
@@ -175,24 +178,24 @@ Lemma weaker_rules K m tau pol pol' s kept :
      kept h w = true \/ forall k n n', k < K -> may_pass tau' pol' s k n h n') ->
   global_run K m tau' pol' s.
 Proof.
-  intros R tau' H1 H2 H3. constructor.
+  intros R tau' H0 H1 H2 H3. constructor.
   - apply R.
   - apply R.
-  - apply R.
+  - intros k n v Hk Hv. destruct (executions _ _ _ _ _ R k n v Hk Hv) as (A & B). split; auto.
   - apply R.
   - intros t. apply Nat.le_trans with (2 := cores _ _ _ _ _ R t). apply sum_le. intros k Hk.
     apply sum_le. intros n _. apply sum_le. intros v Hv. unfold on_core, holds_core. simpl.
     specialize (H1 k v Hk Hv). destruct (waits (tau k) v); simpl; [lia|].
     destruct (executes s t k n v); simpl; [lia|]. destruct (kept k v); simpl; [|lia].
     rewrite (H1 eq_refl eq_refl). simpl. lia.
-  - intros t k n v Hk W L Rd E Nx. destruct (dispatch _ _ _ _ _ R t k n v Hk W L Rd E Nx) as (A & B). split; [exact A|].
+  - intros t k n v Hk Rg W L Rd E Nx. destruct (dispatch _ _ _ _ _ R t k n v Hk (H0 k Hk Rg) W L Rd E Nx) as (A & B). split; [exact A|].
     intros h n' w Hh Hw Ww X. destruct (B h n' w Hh Hw Ww X) as [P|P].
     + left. apply H2; auto.
     + destruct (H3 h w Hh Hw Ww P) as [Q|Q]; [right; exact Q|left; apply Q; auto].
-  - intros t k n v Hk W Rd E B Nx h n' w Hh Hw Ww Kw Bw X. apply H2; auto.
-    apply (begin_in_order _ _ _ _ _ R t k n v Hk W Rd E B Nx h n' w); auto.
+  - intros t k n v Hk Rg W Rd E B Nx h n' w Hh Hw Ww Kw Bw X. apply H2; auto.
+    apply (begin_in_order _ _ _ _ _ R t k n v Hk (H0 k Hk Rg) W Rd E B Nx h n' w); auto.
   - intros t k n v Hk Hv W Kp. apply (keeps_core _ _ _ _ _ R t k n v Hk Hv W). apply H1; auto.
-  - apply R.
+  - intros t k n v Hk Rg. apply (waits_go_on _ _ _ _ _ R t k n v Hk (H0 k Hk Rg)).
 Qed.
 
 (** Rules of tasks that are the same. *)
@@ -213,14 +216,14 @@ Proof.
   - intros t k n v Hk. unfold instance_ready. rewrite <- (Eq k Hk). apply (only_ready_execute _ _ _ _ _ R t k n v Hk).
   - intros t. apply Nat.le_trans with (2 := cores _ _ _ _ _ R t). apply sum_le. intros k Hk.
     unfold cores_held, on_core, holds_core. rewrite (Eq k Hk). lia.
-  - intros t k n v Hk W L Rt E X. rewrite <- (Eq k Hk) in W.
-    destruct (dispatch _ _ _ _ _ R t k n v Hk W L (Rd _ _ _ _ Hk Rt) (Ea _ _ _ Hk E) X) as (A & B). split.
+  - intros t k n v Hk Rg W L Rt E X. rewrite <- (Eq k Hk) in W, Rg.
+    destruct (dispatch _ _ _ _ _ R t k n v Hk Rg W L (Rd _ _ _ _ Hk Rt) (Ea _ _ _ Hk E) X) as (A & B). split.
     + rewrite <- A. apply sum_ext. intros h Hh. unfold task_cores, job_cores, on_core. rewrite (Eq h Hh). reflexivity.
     + intros h n' w Hh. rewrite <- (Eq h Hh). intros Hw Ww Xw. destruct (B h n' w Hh Hw Ww Xw); auto.
-  - intros t k n v Hk W Rt E B X h n' w Hh. rewrite <- (Eq k Hk) in W. rewrite <- (Eq h Hh). intros Hw Ww Kw Bw Xw.
-    apply Mp; auto. apply (begin_in_order _ _ _ _ _ R t k n v Hk W (Rd _ _ _ _ Hk Rt) (Ea _ _ _ Hk E) B X h n' w); auto.
+  - intros t k n v Hk Rg W Rt E B X h n' w Hh. rewrite <- (Eq k Hk) in W, Rg. rewrite <- (Eq h Hh). intros Hw Ww Kw Bw Xw.
+    apply Mp; auto. apply (begin_in_order _ _ _ _ _ R t k n v Hk Rg W (Rd _ _ _ _ Hk Rt) (Ea _ _ _ Hk E) B X h n' w); auto.
   - intros t k n v Hk. rewrite <- (Eq k Hk). apply (keeps_core _ _ _ _ _ R t k n v Hk).
-  - intros t k n v Hk W Rt E. rewrite <- (Eq k Hk) in W. apply (waits_go_on _ _ _ _ _ R t k n v Hk W); auto.
+  - intros t k n v Hk Rg W Rt E. rewrite <- (Eq k Hk) in W, Rg. apply (waits_go_on _ _ _ _ _ R t k n v Hk Rg W); auto.
 Qed.
 
 Lemma claims_length which : length which = number -> length (claims_with which) = number.
@@ -272,17 +275,16 @@ Theorem judge_sound N s : 0 < N ->
     job_complete (fun k => finer N (committed k)) s (release s k n + N * N.to_nat (claimed_bound (dag_at k))) k n.
 Proof.
   intros HN R L k n Hk J. unfold judge in *. set (which := settle number (map has_claim (dags c))) in *. cbv zeta in *.
-  destruct ((length which =? number) && forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with which))
+  destruct ((length which =? number) && forallb (fun k => negb (nth k which false) || has_claim (dag_at k)) (seq 0 number) &&
+    forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with which))
     eqn:E.
   2: { exfalso. revert J. clear. generalize (dags c) k. induction l as [|d l IH]; intros [|i]; simpl; try discriminate.
        apply IH. }
-  rewrite !andb_true_iff, Nat.eqb_eq in E. destruct E as ((Len & _) & Ck).
+  rewrite !andb_true_iff, Nat.eqb_eq in E. destruct E as (((Len & Has) & _) & Ck). rewrite forallb_forall in Has.
   pose proof (claims_length which Len) as K0.
   assert (Cl : forall k, k < number -> nth k which false = true -> claimed (claim_of (claims_with which) k) = true)
     by (intros k' Hk' J'; rewrite claim_of_commit, J'; auto).
-  assert (Dag : forall k, k < number -> forall b, committed k
-    = with_keeps (stated_task (claim_at b k)) (kept_at k)) by reflexivity.
-  assert (Same : forall k, k < number -> with_keeps (finer N (committed k)) (fun _ => all_kept)
+  assert (Same : forall k, k < number -> with_keeps (finer N (committed k)) (fun _ => all_kept) (nth k which false)
     = finer N (stated_tasks (claims_with which) k)).
   { intros k' Hk'. unfold stated_tasks. rewrite claim_of_commit by auto. reflexivity. }
   (* the run keeps the rules of the claims' tasks and policy *)
@@ -296,9 +298,10 @@ Proof.
       - apply existsb_exists. exists h. rewrite Nat.eqb_refl, filter_In, in_seq. split; [split; [lia|exact F]|reflexivity].
       - destruct (existsb _ _) eqn:X; auto. apply existsb_exists in X. destruct X as (h' & I & X).
         apply Nat.eqb_eq in X. subst h'. apply filter_In in I. destruct I as (_ & I). congruence. }
-    apply (same_tasks number (machine_cores c) (fun k => with_keeps (finer N (committed k)) (fun _ => all_kept)));
+    apply (same_tasks number (machine_cores c) (fun k => with_keeps (finer N (committed k)) (fun _ => all_kept) (nth k which false)));
       [exact Same|].
-    apply (weaker_rules _ _ _ _ _ _ (fun _ _ => all_kept) R).
+    apply (weaker_rules _ _ _ _ _ _ (fun _ _ => all_kept) _ R).
+    - intros k' Hk' Rg. specialize (Has k' ltac:(apply in_seq; lia)). rewrite Rg in Has. exact Has.
     - intros k' v Hk' Hv W A. change (kept_at k' v = true).
       change (v < length (map time (expand (overhead c) (subtasks (dag_at k'))))) in Hv. rewrite map_length in Hv.
       destruct (kept_is_stated k' v Hk' Hv) as (x & Ex & Ix). unfold kept_at. rewrite Ex.

@@ -133,7 +133,7 @@ Defined.
 
 Definition simple_task (edges : list (nat * nat)) (wcets wait_list : list nat) (keep : bool) (T D : nat) : task :=
   {| graph := dag_of edges (length wcets); wcet := fun v => nth v wcets 0;
-     waits := fun v => existsb (Nat.eqb v) wait_list; keeps := fun _ => keep; known := true;
+     waits := fun v => existsb (Nat.eqb v) wait_list; keeps := fun _ => keep; regular := true; known := true;
      period := T; deadline := D; first_deadline := D |}.
 
 Definition three_dags (k : nat) : task := nth k [
@@ -165,6 +165,20 @@ Example an_answer_at_once : global_run 3 2 three_dags edf
   (lap_run (fun k => nth k [2; 0; 0] 0) (fun k v => if (k =? 0) && (v =? 1) then 0 else wcet (three_dags k) v) [
     ([(1, 0); (2, 0)], false); ([(1, 1); (1, 2)], false); ([(0, 0); (1, 1)], false);
     ([(0, 2); (1, 2)], false); ([(2, 0)], false); ([(2, 0)], false); ([(2, 0)], false);
+    ([], false); ([], false); ([], false); ([], false); ([], false)]).
+Proof. apply lap_obeys_the_rules. vm_compute. reflexivity. Qed.
+
+(** The same where DAG 2 has no claim, so that its jobs may be stopped and cut: its only subtask idles in tick 5, and
+    is aborted after 3 ticks. *)
+Definition third_is_cut (k : nat) : task :=
+  if k =? 2 then {| graph := graph (three_dags 2); wcet := wcet (three_dags 2); waits := fun _ => false;
+    keeps := fun _ => false; regular := false; known := true; period := 12; deadline := 12; first_deadline := 12 |}
+  else three_dags k.
+
+Example cut_jobs_obey_the_rules : global_run 3 2 third_is_cut edf
+  (lap_run (fun k => nth k [2; 0; 0] 0) (fun k v => if k =? 2 then 3 else wcet (three_dags k) v) [
+    ([(1, 0); (2, 0)], false); ([(1, 1); (1, 2)], false); ([(0, 0); (1, 1)], false);
+    ([(0, 1); (1, 2); (2, 0)], false); ([(0, 1)], true); ([(0, 2)], false); ([(2, 0)], false);
     ([], false); ([], false); ([], false); ([], false); ([], false)]).
 Proof. apply lap_obeys_the_rules. vm_compute. reflexivity. Qed.
 

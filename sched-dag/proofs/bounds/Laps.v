@@ -49,7 +49,7 @@ Definition all_on (u : nat) (p : nat -> nat -> bool) : bool :=
 
 Definition vertex_ok (u k v : nat) : bool :=
   (negb (on u k v) || ready_in u k v) &&
-  (negb (ready_in u k v) || on u k v ||
+  (negb (regular (tau k)) || negb (ready_in u k v) || on u k v ||
    negb (waits (tau k) v) &&
    (lost_in u || (cores_by (on u) =? m) && all_on u (fun h w => pass_in k h || keeps (tau h) w)) &&
    (begun_in u k v ||
@@ -58,7 +58,7 @@ Definition vertex_ok (u k v : nat) : bool :=
 
 Definition dag_ok (k : nat) : bool :=
   (0 <? period (tau k)) && (period (tau k) <=? lap) && (offset k <? lap) &&
-  forallb (fun v => (waits (tau k) v || (0 <? ex k v)) && (negb (known (tau k)) || (ex k v <=? wcet (tau k) v))
+  forallb (fun v => (waits (tau k) v || negb (regular (tau k)) || (0 <? ex k v)) && (negb (known (tau k)) || (ex k v <=? wcet (tau k) v))
                     && over lap k v) (vs k).
 
 Definition lap_ok : bool :=
@@ -104,7 +104,7 @@ Proof.
 Qed.
 
 Lemma vertices_of k v : k < K -> v < size (graph (tau k)) ->
-  (waits (tau k) v || (0 <? ex k v)) = true /\ (negb (known (tau k)) || (ex k v <=? wcet (tau k) v)) = true /\
+  (waits (tau k) v || negb (regular (tau k)) || (0 <? ex k v)) = true /\ (negb (known (tau k)) || (ex k v <=? wcet (tau k) v)) = true /\
   forall u, lap <= u -> over u k v = true.
 Proof.
   intros Hk Hv. pose proof (dags k Hk) as D. unfold dag_ok in D. apply andb_true_iff in D. destruct D as (_ & D).
@@ -218,7 +218,7 @@ Proof.
   - intros k Hk. apply (positive k Hk).
   - intros k n Hk. destruct (positive k Hk) as (_ & _ & P). cbn [lap_run release]. rewrite Nat.mul_succ_r. lia.
   - intros k n v Hk Hv. destruct (vertices_of k v Hk Hv) as (E & W & _). cbn [lap_run job_exec]. split.
-    + intros Wt. rewrite Wt in E. apply Nat.ltb_lt, E.
+    + intros Wt Rg. rewrite Wt, Rg in E. apply Nat.ltb_lt, E.
     + intros Kn. rewrite Kn in W. apply Nat.leb_le, W.
   - intros t k n v Hk Hv E. destruct (positive k Hk) as (L & _). destruct (the_tick t L) as (Lt & Eq & Le & _).
     apply executes_now in E; auto. destruct E as (-> & O).
@@ -231,21 +231,21 @@ Proof.
     + intros n' Hn. apply earlier; auto.
   - intros t. destruct K as [|K'] eqn:EK; [simpl; lia|]. destruct (positive 0 ltac:(lia)) as (L & _).
     rewrite <- EK, held_now; auto. apply ticks. apply (the_tick t L).
-  - intros t k n v Hk W Lo R _ E. destruct (positive k Hk) as (L & _). destruct (the_tick t L) as (Lt & _).
+  - intros t k n v Hk Rg W Lo R _ E. destruct (positive k Hk) as (L & _). destruct (the_tick t L) as (Lt & _).
     destruct (ready_now t k n v Hk R) as (-> & Hv & Ri). rewrite executes_in in E; auto.
     destruct (ticks (t mod lap) Lt) as (_ & V). specialize (V k v Hk Hv). unfold vertex_ok in V.
-    change (lost_in (t mod lap) = false) in Lo. rewrite E, Ri, W, Lo in V. simpl in V.
+    change (lost_in (t mod lap) = false) in Lo. rewrite Rg, E, Ri, W, Lo in V. simpl in V.
     apply andb_true_iff in V. destruct V as (V & _). apply andb_true_iff in V. destruct V as (V & _).
     apply andb_true_iff in V. rewrite Nat.eqb_eq in V. destruct V as (C & A).
     rewrite cores_now; auto. split; auto. intros h n' w Hh Hw Ww Ex. apply executes_now in Ex; auto.
     destruct Ex as (-> & O). pose proof (all_on_true _ _ h w A Hh Hw Ww O) as P. cbv beta in P.
     apply orb_true_iff in P. destruct P as [P|P]; [left; apply pass_now, P|auto].
-  - intros t k n v Hk W R _ Nb E h n' w Hh Hw Ww Kw Nbw Ex. destruct (positive k Hk) as (L & _).
+  - intros t k n v Hk Rg W R _ Nb E h n' w Hh Hw Ww Kw Nbw Ex. destruct (positive k Hk) as (L & _).
     destruct (the_tick t L) as (Lt & _). destruct (ready_now t k n v Hk R) as (-> & Hv & Ri).
     rewrite executes_in in E; auto. rewrite begun_now in Nb; auto.
     apply executes_now in Ex; auto. destruct Ex as (-> & O). rewrite begun_now in Nbw; auto.
     destruct (ticks (t mod lap) Lt) as (_ & V). specialize (V k v Hk Hv). unfold vertex_ok in V.
-    rewrite E, Ri, W, Nb in V. simpl in V. apply andb_true_iff in V. destruct V as (V & _). apply andb_true_iff in V. destruct V as (_ & A).
+    rewrite Rg, E, Ri, W, Nb in V. simpl in V. apply andb_true_iff in V. destruct V as (V & _). apply andb_true_iff in V. destruct V as (_ & A).
     pose proof (all_on_true _ _ h w A Hh Hw Ww O) as P. cbv beta in P. rewrite Kw, Nbw in P. apply pass_now, P.
   - intros t k n v Hk Hv W Kp Lo B Nf. destruct (positive k Hk) as (L & _).
     destruct (the_tick t L) as (Lt & Eq & Le & _).
@@ -259,10 +259,10 @@ Proof.
       replace (t - lap * n) with 0 in B by (pose proof (Nat.div_mod t lap ltac:(lia));
         pose proof (Nat.mod_upper_bound t lap ltac:(lia)); nia).
       discriminate.
-  - intros t k n v Hk W R _. destruct (positive k Hk) as (L & _). destruct (the_tick t L) as (Lt & _).
+  - intros t k n v Hk Rg W R _. destruct (positive k Hk) as (L & _). destruct (the_tick t L) as (Lt & _).
     destruct (ready_now t k n v Hk R) as (-> & Hv & Ri). rewrite executes_in; auto.
     destruct (ticks (t mod lap) Lt) as (_ & V). specialize (V k v Hk Hv). unfold vertex_ok in V.
-    rewrite Ri, W in V. simpl in V. rewrite !orb_false_r in V. rewrite !andb_true_iff in V. tauto.
+    rewrite Rg, Ri, W in V. simpl in V. rewrite !orb_false_r in V. rewrite !andb_true_iff in V. tauto.
 Qed.
 
 End lap.

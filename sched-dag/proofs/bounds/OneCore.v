@@ -762,7 +762,7 @@ Proof.
         pose proof (release_at_least K 1 tau' any_order s plain k n in_K). lia.
       + apply Nat.mul_lt_mono_pos_l; [lia|]. rewrite (sum_zero _ (fun _ => 0)) by auto.
         pose proof (executions _ _ _ _ _ plain k n unfinished in_K Hu) as (Ex1 & Ex2).
-        specialize (Ex1 (counts_never_wait k n unfinished in_K Hu C unfinished Hu)).
+        specialize (Ex1 (counts_never_wait k n unfinished in_K Hu C unfinished Hu) (all_regular _ _ _ _ _ rules k in_K)).
         specialize (Ex2 (counted_is_known k n unfinished in_K Hu C)). simpl in Ex2. unfold target_work, weight.
         pose proof (sum_term (size (graph (tau k))) (fun v => if part v then wcet (tau k) v else 0) unfinished Hu) as T.
         cbv beta in T. rewrite counts_target in C. rewrite C in T. nia.
@@ -904,7 +904,7 @@ Proof.
     by (unfold may_count; rewrite Nat.eqb_refl; destruct edf; reflexivity).
   pose proof (no_waits k last in_K Hl Mc last Hl) as Wl.
   pose proof (executions _ _ _ _ _ (on_one_core _ _ _ _ _ rules) k n last in_K Hl) as (Ex1 & Ex2).
-  specialize (Ex1 Wl). specialize (Ex2 (wcets_known k last in_K Hl Mc)). simpl in Ex2.
+  specialize (Ex1 Wl (all_regular _ _ _ _ _ rules k in_K)). specialize (Ex2 (wcets_known k last in_K Hl Mc)). simpl in Ex2.
   destruct (le_lt_dec (job_exec s k n last) (job_done s e k n last)) as [F|F]; [exact F|exfalso].
   assert (U : last < size (graph (tau k)) /\ part last = true /\ ~ job_finished s e k n last)
     by (unfold job_finished; split; [exact Hl|split; [exact Pl|lia]]).

@@ -35,6 +35,7 @@ Definition core_task (c : core_claim) : task :=
      wcet := fun v => N.to_nat (wcetN (of_dag c) v);
      waits := fun v => existsb (Nat.eqb v) (wait_list (of_dag c));
      keeps := keeps_at c;
+     regular := true;
      known := known_wcets (of_dag c);
      period := N.to_nat (minimum_period (of_dag c));
      deadline := N.to_nat (relative_deadline (of_dag c));
@@ -794,7 +795,7 @@ Proof.
       [exact Hk|exact Up|exact W|exact So|exact Hl|exact Last]. }
   destruct EL as (_ & EL). intros v Hv. destruct (Nat.eq_dec v last) as [->|Ne]; [exact Fin|].
   assert (Pos : 0 < job_done s (release s k n + N * N.to_nat (bound (dag_of k))) k n last).
-  { pose proof (proj1 (executions _ _ _ _ _ (on_one_core _ _ _ _ _ Rules) k n last Hk Hl) (W last Hl)).
+  { pose proof (proj1 (executions _ _ _ _ _ (on_one_core _ _ _ _ _ Rules) k n last Hk Hl) (W last Hl) eq_refl).
     unfold job_finished in Fin. lia. }
   apply sum_positive in Pos. destruct Pos as (i & Hi & Ei).
   destruct (executes s i k n last) eqn:E; [|simpl in Ei; lia].

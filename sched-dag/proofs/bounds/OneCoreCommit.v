@@ -106,6 +106,7 @@ Proof.
     by (intros t k n Hk; unfold asked, earlier_complete, job_complete; rewrite (Eq k Hk); auto).
   constructor.
   - apply (same_tasks K 1 tau); [exact Eq|]. apply (on_one_core _ _ _ _ _ R).
+  - intros k Hk. rewrite <- (Eq k Hk). apply (all_regular _ _ _ _ _ R k Hk).
   - intros t k n v Hk W A L Rt X. rewrite <- (Eq k Hk) in W.
     destruct (by_key _ _ _ _ _ R t k n v Hk W (As _ _ _ Hk A) L (Rd _ _ _ _ Hk Rt) X) as (h & n' & w & Hh & Hw & Ww &
       Xw & O).
@@ -121,17 +122,20 @@ Proof.
   rewrite map_nth, seq_nth; auto.
 Qed.
 
+(** Each DAG's jobs execute to their ends, and by rank. *)
+Definition committed_by_rank (k : nat) : task := with_keeps (committed c k) (kept_at c k) true.
+
 (** *What [judge_core] accepts is true: in every run of the committed DAGs on one core in the order of their keys, at
   any
     resolution N of time, each job of the DAG, and each sink with a bound of its own, is complete within the claimed
     bound,* if losses are no more than charged.  Under EDF releases are at whole ns. *)
 Theorem judge_core_sound N s : 0 < N ->
-  keyed_run (Commit.number c) (fun k => finer N (committed c k)) (is_edf c) (finer_key N (is_edf c) stated_keys) s ->
+  keyed_run (Commit.number c) (fun k => finer N (committed_by_rank k)) (is_edf c) (finer_key N (is_edf c) stated_keys) s ->
   (is_edf c = true -> forall k n, k < Commit.number c -> exists q, release s k n = N * q) ->
   (forall a x, count (N * x) (fun t => lost s (a + t)) <= N * losses bursts x) ->
   forall k, k < Commit.number c -> nth k judge_core false = true ->
   (forall r, core_bound (more_of k) = Some r ->
-     forall n, job_complete (fun k => finer N (committed c k)) s (release s k n + N * N.to_nat r) k n) /\
+     forall n, job_complete (fun k => finer N (committed_by_rank k)) s (release s k n + N * N.to_nat r) k n) /\
   (forall of, In of (core_sinks (more_of k)) ->
      forall n, job_finished s (release s k n + N * N.to_nat (sink_bound of)) k n (sink of)).
 Proof.
@@ -145,11 +149,11 @@ Proof.
     rewrite map_nth, seq_nth in J by exact Hk. rewrite Nat.add_0_l in J. unfold f in J.
     destruct (_ && claimed (dag_of core_claims k)); [|discriminate].
     destruct (core_claim_ok (is_edf c) bursts core_claims k); [auto|discriminate]. }
-  assert (Same : forall k, k < Commit.number c -> finer N (committed c k) = finer N (core_tasks core_claims k)).
+  assert (Same : forall k, k < Commit.number c -> finer N (committed_by_rank k) = finer N (core_tasks core_claims k)).
   { intros k' Hk'. unfold core_tasks. rewrite core_claim_of_commit by exact Hk'. reflexivity. }
   assert (Run' : keyed_run (length core_claims) (fun k => finer N (core_tasks core_claims k)) (is_edf c)
     (finer_key N (is_edf c) (core_keys core_claims)) s).
-  { rewrite Len. apply (keyed_same _ (fun k => finer N (committed c k)) _ _ (finer_key N (is_edf c) stated_keys)); auto.
+  { rewrite Len. apply (keyed_same _ (fun k => finer N (committed_by_rank k)) _ _ (finer_key N (is_edf c) stated_keys)); auto.
     intros k' v Hk'. unfold finer_key, core_keys. cbn [urgent OneCoreStretch.number].
     rewrite core_claim_of_commit by exact Hk'. split; reflexivity. }
   rewrite <- Len in Whole.

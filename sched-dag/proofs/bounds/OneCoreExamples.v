@@ -37,9 +37,9 @@ Proof.
     lia.
 Qed.
 
-Lemma keyed_lap_obeys : keyed_lap_ok = true -> keyed_run K tau edf key (lap_run offset ex table).
+Lemma keyed_lap_obeys : (forall k, k < K -> regular (tau k) = true) -> keyed_lap_ok = true -> keyed_run K tau edf key (lap_run offset ex table).
 Proof.
-  unfold keyed_lap_ok. rewrite andb_true_iff. intros (Ok & Keys).
+  intros Reg. unfold keyed_lap_ok. rewrite andb_true_iff. intros (Ok & Keys).
   pose proof (lap_obeys_the_rules K 1 tau any_order offset ex table Ok) as Plain.
   assert (At : forall t k n v, k < K -> waits (tau k) v = false ->
     instance_ready tau (lap_run offset ex table) t k n v -> executes (lap_run offset ex table) t k n v = false ->
@@ -58,7 +58,7 @@ Proof.
     rewrite executes_in in Nx by exact L.
     unfold keyed_vertex_ok in Keys. rewrite Ri, Nx, W in Keys. cbn [negb andb] in Keys.
     apply andb_true_iff in Keys. auto. }
-  constructor; [exact Plain| |].
+  constructor; [exact Plain|exact Reg| |].
   - intros t k n v Hk W _ Lo Rd Nx. destruct (At t k n v Hk W Rd Nx) as (L & -> & A & _).
     cbn [lap_run lost] in Lo. rewrite Lo in A. cbn [orb] in A.
     apply existsb_exists in A. destruct A as (h & Hh & A). apply in_seq in Hh.
@@ -92,7 +92,7 @@ Definition one_is_blocked : set_run :=
     ([(0, 2)], false); ([(1, 0)], false); ([(1, 0)], false); ([], false); ([], false); ([], false); ([], false)].
 
 Example blocked_run_obeys : keyed_run 3 three_on_one true by_deadlines one_is_blocked.
-Proof. apply keyed_lap_obeys. vm_compute. reflexivity. Qed.
+Proof. apply keyed_lap_obeys; [intros [|[|[|k]]] Hk; [reflexivity..|lia]|vm_compute; reflexivity]. Qed.
 
 (** DAG 1 begins, is preempted by DAG 0, which loses a tick, and goes on after it; DAG 2 is last. *)
 Definition one_is_preempted : set_run :=
@@ -101,7 +101,7 @@ Definition one_is_preempted : set_run :=
     ([(2, 0)], false); ([(2, 0)], false); ([(2, 0)], false); ([], false); ([], false); ([], false)].
 
 Example preempted_run_obeys : keyed_run 3 three_on_one true by_deadlines one_is_preempted.
-Proof. apply keyed_lap_obeys. vm_compute. reflexivity. Qed.
+Proof. apply keyed_lap_obeys; [intros [|[|[|k]]] Hk; [reflexivity..|lia]|vm_compute; reflexivity]. Qed.
 
 (** With the two subtasks of the fork exchanged, or DAG 2 let in before DAG 0, a run does not obey. *)
 Example wrong_orders_are_told :

@@ -41,7 +41,7 @@ Qed.
 Lemma finished_has_executed t n v : v < size (graph (tau k)) -> job_finished s t k n v ->
   exists i, i < t /\ executes s i k n v = true.
 Proof.
-  intros Hv F. pose proof (proj1 (executions _ _ _ _ _ plain k n v in_K Hv) (no_waits v Hv)).
+  intros Hv F. pose proof (proj1 (executions _ _ _ _ _ plain k n v in_K Hv) (no_waits v Hv) (all_regular _ _ _ _ _ rules k in_K)).
   assert (Pos : 0 < job_done s t k n v) by (unfold job_finished in F; lia).
   apply sum_positive in Pos. destruct Pos as (i & Hi & E).
   destruct (executes s i k n v) eqn:Ei; simpl in E; [eauto|lia].

@@ -47,6 +47,7 @@ Definition asked (tau : nat -> task) (s : set_run) (t k n : nat) : Prop :=
 Record keyed_run (K : nat) (tau : nat -> task) (edf : bool) (key : keys) (s : set_run) : Prop := {
   (** R1 to R4, at most one instance has the core, what has begun keeps the core where it says so. *)
   on_one_core : global_run K 1 tau any_order s;
+  all_regular : forall k, k < K -> regular (tau k) = true;
   (** R5: save in lost ticks, while an instance is ready and does not execute, the core executes what goes before, or
       what keeps the core and has begun. *)
   by_key : forall t k n v, k < K -> waits (tau k) v = false -> asked tau s t k n -> lost s t = false ->
@@ -117,7 +118,8 @@ Lemma finished_after_ancestors t k n u v :
   k < K -> v < size (graph (tau k)) -> waits (tau k) v = false -> precedes (graph (tau k)) u v ->
   job_finished s t k n v -> job_finished s t k n u.
 Proof.
-  intros Hk Hv W P F. pose proof (proj1 (executions _ _ _ _ _ plain k n v Hk Hv) W).
+  intros Hk Hv W P F.
+  pose proof (proj1 (executions _ _ _ _ _ plain k n v Hk Hv) W (all_regular _ _ _ _ _ rules k Hk)).
   assert (Pos : 0 < job_done s t k n v) by (unfold job_finished in F; lia).
   apply sum_positive in Pos. destruct Pos as (i & Hi & E).
   destruct (executes s i k n v) eqn:Ei; [|simpl in E; lia].

@@ -85,7 +85,7 @@ Definition second_inequality (k j len left blocked : nat) : Prop :=
   + (m - j) * loss k <= (m - j) * (R k - len).
 
 Definition shown (k : nat) : Prop :=
-  known (tau k) = true /\ blockers_known k /\
+  known (tau k) = true /\ regular (tau k) = true /\ blockers_known k /\
   enough_cores m tau k (width k) /\
   disjoint_parts (graph (tau k)) (parts k) (part k) /\
   (forall h, h < K -> h <> k -> outranks pol h k = true -> bounded h = true) /\
@@ -245,13 +245,14 @@ Qed.
 Section one.
 Variables (k n : nat).
 Hypothesis in_K : k < K.
+Hypothesis is_regular : regular (tau k) = true.
 Hypothesis before : forall n', n' < n -> job_complete tau s (release s k n) k n'.
 Hypothesis blockers : blockers_known K tau pol k.
 Notation run := (job_run K m tau s k n).
 Notation G := (graph (tau k)).
 
 Lemma run_legal : legal G m run.
-Proof. apply (job_run_legal K m tau pol s rules k n in_K before). Qed.
+Proof. apply (job_run_legal K m tau pol s rules k n in_K is_regular before). Qed.
 
 Lemma earlier_at t : earlier_complete tau s (release s k n + t) k n.
 Proof. apply (earlier_complete_later tau s (release s k n)); [lia|exact before]. Qed.
@@ -266,7 +267,7 @@ Proof.
       apply (job_finished_in_run K m tau pol s rules); auto. lia.
     - intros p Hp. apply job_finished_later with (release s k n); [lia|]. apply before; auto. }
   split; [|auto]. destruct (waits (tau k) v) eqn:Wv; auto.
-  rewrite (waits_go_on _ _ _ _ _ rules _ k n v in_K Wv Ri (earlier_at t)) in Ex. discriminate.
+  rewrite (waits_go_on _ _ _ _ _ rules _ k n v in_K is_regular Wv Ri (earlier_at t)) in Ex. discriminate.
 Qed.
 
 (** While a vertex waits to begin, what is low has begun. *)
@@ -289,7 +290,7 @@ Proof.
   assert (Bg : has_begun s (S b) h n' w = true).
   { unfold holds_core in E. apply orb_true_iff in E. destruct E as [E|E].
     - destruct (has_begun s (S b) h n' w) eqn:Hb; auto. exfalso.
-      destruct (begin_in_order _ _ _ _ _ rules (S b) k n v in_K Wv Ri Ea) with (h := h) (n' := n') (w := w)
+      destruct (begin_in_order _ _ _ _ _ rules (S b) k n v in_K is_regular Wv Ri Ea) with (h := h) (n' := n') (w := w)
         as [P|P]; auto; [|congruence].
       unfold has_begun. rewrite D. reflexivity.
     - rewrite !andb_true_iff in E. tauto. }
@@ -375,7 +376,7 @@ Proof.
   destruct (somebody_waits G run t) eqn:W; [|lia]. destruct (lost s b) eqn:Lo; [simpl; lia|]. simpl andb. cbv iota.
   apply somebody_waits_true in W. destruct W as (x & Rd & Ex). simpl in Ex.
   destruct (waiting_instance t x Rd Ex) as (Wv & Ri).
-  destruct (dispatch _ _ _ _ _ rules b k n x in_K Wv Lo Ri (earlier_at t) Ex) as (_ & Ord).
+  destruct (dispatch _ _ _ _ _ rules b k n x in_K is_regular Wv Lo Ri (earlier_at t) Ex) as (_ & Ord).
   assert (Own : task_cores tau s b k = job_cores tau s b k n).
   { unfold task_cores. apply (sum_only _ (job_cores tau s b k)).
     - pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia.
@@ -496,7 +497,7 @@ Proof.
     assert (Kept : forall h, h < K -> bounded h = true -> kept_before tau s now h (R h)).
     { intros h Hh Bh n' Hn. apply (IH (release s h n' + R h) Hn h n' Hh Bh eq_refl). }
     destruct (Shown k Hk Bk) as
-      (Kn & Bkn & _ & _ & Outrank & Own & j & f & len & again & level0 & level1 & Hj & Len & D & (Hr & HR) & Ineq).
+      (Kn & Reg & Bkn & _ & _ & Outrank & Own & j & f & len & again & level0 & level1 & Hj & Len & D & (Hr & HR) & Ineq).
     simpl in Ineq.
     pose proof (periods_positive _ _ _ _ _ rules k Hk) as HT.
     assert (Apart : forall n', n' < n -> release s k n' + period (tau k) <= release s k n).
@@ -507,15 +508,15 @@ Proof.
     { intros n' Hn. specialize (Apart n' Hn).
       apply (job_complete_later tau s (release s k n' + R k)); [lia|].
       apply (IH (release s k n' + R k)); auto. lia. }
-    pose proof (run_legal k n Hk Before) as L.
+    pose proof (run_legal k n Hk Reg Before) as L.
     assert (W : within_wcet (graph (tau k)) (job_run K m tau s k n) (wcet (tau k))).
     { intros v Hv. apply (executions _ _ _ _ _ rules k n v Hk Hv), Kn. }
     assert (Facts : forall h, h < K -> negb (h =? k) && outranks pol h k = true ->
-      known (tau h) = true /\ kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
+      known (tau h) = true /\ regular (tau h) = true /\ kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
       disjoint_parts (graph (tau h)) (parts h) (part h)).
     { intros h Hh O. apply andb_true_iff in O. destruct O as (N & O). apply negb_true_iff, Nat.eqb_neq in N.
       pose proof (Outrank h Hh N O) as Bh.
-      destruct (Shown h Hh Bh) as (H0 & _ & H1 & H2 & _ & _ & ? & ? & ? & ? & ? & ? & _ & _ & _ & (_ & H3) & _).
+      destruct (Shown h Hh Bh) as (H0 & H4 & _ & H1 & H2 & _ & _ & ? & ? & ? & ? & ? & ? & _ & _ & _ & (_ & H3) & _).
       repeat (split; auto). }
     assert (Due : forall h, match (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None)
       with None => True
@@ -539,8 +540,8 @@ Proof.
       + rewrite sum_plus, sum_times. apply Nat.add_le_mono; [|apply Nat.mul_le_mono_l, losses; auto].
         unfold sum_over_others. rewrite sum_swap. apply sum_le. intros h Hh.
         destruct (negb (h =? k) && outranks pol h k) eqn:O; [|rewrite sum_zero; auto].
-        destruct (Facts h Hh O) as (Fk & F0 & F1 & F2 & F3).
-        apply (kept_workload K m tau pol s rules now h (R h) Hh Fk F0 F1 _ (release s k n) _
+        destruct (Facts h Hh O) as (Fk & Fr & F0 & F1 & F2 & F3).
+        apply (kept_workload K m tau pol s rules now h (R h) Hh Fk Fr F0 F1 _ (release s k n) _
                  (Due h) (m - j) (width h) (R k)); auto. lia. }
     assert (C : complete (graph (tau k)) (job_run K m tau s k n) (R k)).
     { destruct Ineq as [(I1 & [Often|(-> & A & Num)])|(I2 & Often)].
@@ -548,15 +549,15 @@ Proof.
                  (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k))
                   + (m - j) * loss k + blocking K m tau pol k j again level0 level1)); auto;
           [|unfold first_inequality in I1; lia].
-        pose proof (blocked_at_most_in_set k n Hk Before Bkn j again level0 level1 (R k) Own Often) as B.
+        pose proof (blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Often) as B.
         apply Nat.le_trans with (sum (R k) (fun t => Nat.min (higher k n t) (m - j))
           + sum (R k) (fun t => if somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)
                                 then Nat.min (low (K * Z) (low_holds k n) t) (m - j) else 0)); [|lia].
         rewrite <- sum_plus. apply sum_le. intros t Ht.
-        pose proof (others_are_other_dags k n Hk Before t ltac:(lia)) as O.
+        pose proof (others_are_other_dags k n Hk Reg Before t ltac:(lia)) as O.
         destruct (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); lia.
       - rewrite Nat.sub_0_r in *.
-        apply (first_form_blocked_along_a_path _ m _ _ _ _ _ _ (run_keeps_cores k n Hk Before Bkn A) level0 level1
+        apply (first_form_blocked_along_a_path _ m _ _ _ _ _ _ (run_keeps_cores k n Hk Reg Before Bkn A) level0 level1
           (wcet (tau k)) len (S again) (R k)
           (sum_over_others K pol k (fun h => whole_work m tau pol R width k 0 h (R k)) + m * loss k)); auto.
         + apply Nat.le_trans with (2 := Higher). apply sum_le. intros t Ht.
@@ -584,15 +585,15 @@ Proof.
                  (fun h t => if h <? K then others_of h t
                              else if h =? K then (if lost s (release s k n + t) then m else 0) else low_of t)
                  (fun h x => if h <? K then phi h x else if h =? K then (m - j) * loss k else blocked)); auto.
-        + intros t Ht. pose proof (others_are_other_dags k n Hk Before t ltac:(lia)) as O. cbn [sum].
+        + intros t Ht. pose proof (others_are_other_dags k n Hk Reg Before t ltac:(lia)) as O. cbn [sum].
           destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
           rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|].
           apply Nat.le_trans with (1 := O). unfold higher. apply Nat.add_le_mono_r, Nat.add_le_mono_r.
           apply sum_le. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia].
         + intros h w Hh. destruct (Nat.ltb_spec h K).
           * unfold others_of, phi. destruct (negb (h =? k) && outranks pol h k) eqn:O.
-            -- destruct (Facts h H O) as (Fk & F0 & F1 & F2 & F3).
-               apply (kept_clipped K m tau pol s rules now h (R h) H Fk F0 F1 _ (release s k n) _
+            -- destruct (Facts h H O) as (Fk & Fr & F0 & F1 & F2 & F3).
+               apply (kept_clipped K m tau pol s rules now h (R h) H Fk Fr F0 F1 _ (release s k n) _
                         (Due h) (m - j) (width h) (parts h) (part h) (R k) w); auto. lia.
             -- rewrite sum_zero; [lia|]. intros t _. destruct (w t); auto.
           * destruct (Nat.eqb_spec h K).
@@ -600,7 +601,7 @@ Proof.
                unfold count. rewrite <- sum_times. apply sum_le. intros t _.
                destruct (w t), (lost s (release s k n + t)); simpl Nat.b2n; lia.
             -- apply Nat.le_trans
-                 with (2 := blocked_at_most_in_set k n Hk Before Bkn j again level0 level1 (R k) Own Often).
+                 with (2 := blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Often).
                apply sum_le. intros t _. unfold low_of.
                destruct (w t), (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); simpl; lia.
         + intros h a b Hh Hab. destruct (Nat.ltb_spec h K).

@@ -13,7 +13,7 @@ Print instance_ready. Print earlier_complete. Print on_core. Print job_cores. Pr
 Print has_begun. Print holds_core. Print cores_held. Print may_pass. Print global_run.
 Print workload. Print workload_by_deadline. Print clipped. Print blocking. Print shown.
 Print subtask. Print dag_statement. Print commit. Print vertex. Print vertices_of. Print expand.
-Print may_outrank. Print stated. Print claim. Print claim_at. Print stated_task. Print committed. Print finer.
+Print may_outrank. Print stated. Print claim. Print claim_at. Print stated_task. Print committed. Print committed_by_rank. Print finer.
 Print keys. Print urgency. Print job_before. Print goes_before. Print any_order. Print asked. Print keyed_run.
 Print above. Print may_count. Print may_block. Print first_release. Print blocking_time. Print jobs_due. Print up.
 Print work_of_other. Print own_earlier. Print own_jobs. Print target_work. Print interference. Print completes. Print starts. Print stretch_ends.

@@ -18,6 +18,7 @@ Record task := {
   wcet : nat -> nat;
   waits : nat -> bool;  (* whether a vertex is a wait for a device, of [wcet] at most, on no core *)
   keeps : nat -> bool;  (* whether a vertex, once it executes, keeps its core until it ends *)
+  regular : bool;       (* whether its jobs execute to their ends, and by rank; else they may be aborted or stopped *)
   known : bool;         (* whether WCETs are known; else nothing is said of how long its subtasks execute *)
   period : nat;         (* the least time from a release to the next *)
   deadline : nat;       (* relative, of the whole job *)
@@ -105,7 +106,7 @@ Record global_run (K m : nat) (tau : nat -> task) (pol : policy) (s : set_run) :
   sporadic : forall k n, k < K -> release s k n + period (tau k) <= release s k (S n);
   (** Only the answer to a wait may be there at once. *)
   executions : forall k n v, k < K -> v < size (graph (tau k)) ->
-    (waits (tau k) v = false -> 0 < job_exec s k n v) /\
+    (waits (tau k) v = false -> regular (tau k) = true -> 0 < job_exec s k n v) /\
     (known (tau k) = true -> job_exec s k n v <= wcet (tau k) v);
   (** R1, R2, R3 *)
   only_ready_execute : forall t k n v, k < K -> v < size (graph (tau k)) ->
@@ -114,13 +115,13 @@ Record global_run (K m : nat) (tau : nat -> task) (pol : policy) (s : set_run) :
   (** R5: save in lost ticks, while an instance is ready and does not execute, all m cores execute, and what
       executes may pass it or keeps its core.  This and the next rules are asked only where earlier jobs are
       complete: by W3 the first segment of a subtask stays behind its *last* one in the job before. *)
-  dispatch : forall t k n v, k < K -> waits (tau k) v = false -> lost s t = false ->
+  dispatch : forall t k n v, k < K -> regular (tau k) = true -> waits (tau k) v = false -> lost s t = false ->
     instance_ready tau s t k n v -> earlier_complete tau s t k n -> executes s t k n v = false ->
     sum K (task_cores tau s t) = m /\
     forall h n' w, h < K -> w < size (graph (tau h)) -> waits (tau h) w = false ->
       executes s t h n' w = true -> may_pass tau pol s k n h n' \/ keeps (tau h) w = true;
   (** R5: while an instance waits to begin, of what keeps its core only that begins which may pass it. *)
-  begin_in_order : forall t k n v, k < K -> waits (tau k) v = false ->
+  begin_in_order : forall t k n v, k < K -> regular (tau k) = true -> waits (tau k) v = false ->
     instance_ready tau s t k n v -> earlier_complete tau s t k n -> has_begun s t k n v = false -> executes s t k n v = false ->
     forall h n' w, h < K -> w < size (graph (tau h)) -> waits (tau h) w = false -> keeps (tau h) w = true ->
       has_begun s t h n' w = false -> executes s t h n' w = true -> may_pass tau pol s k n h n';
@@ -129,7 +130,7 @@ Record global_run (K m : nat) (tau : nat -> task) (pol : policy) (s : set_run) :
     keeps (tau k) v = true -> lost s t = false ->
     has_begun s t k n v = true -> ~ job_finished s t k n v -> executes s t k n v = true;
   (** A wait needs nobody: it goes on in each tick until it is over. *)
-  waits_go_on : forall t k n v, k < K -> waits (tau k) v = true ->
+  waits_go_on : forall t k n v, k < K -> regular (tau k) = true -> waits (tau k) v = true ->
     instance_ready tau s t k n v -> earlier_complete tau s t k n -> executes s t k n v = true
 }.
 
@@ -254,10 +255,10 @@ Proof. apply sum_le. intros n _. destruct (jobs n); lia. Qed.
 
 (** If earlier jobs are complete at its release, the rules for one job among others hold. *)
 Lemma job_run_legal k n :
-  k < K -> earlier_complete tau s (release s k n) k n ->
+  k < K -> regular (tau k) = true -> earlier_complete tau s (release s k n) k n ->
   legal (graph (tau k)) m (job_run k n).
 Proof.
-  intros Hk Before. constructor.
+  intros Hk Reg Before. constructor.
   - intros t v Hv E. simpl in E.
     apply (only_ready_execute _ _ _ _ _ rules) in E; auto. destruct E as (_ & _ & N & P & _).
     split; [auto|]. split.
@@ -271,14 +272,14 @@ Proof.
     assert (Bt : earlier_complete tau s (release s k n + t) k n)
       by (apply earlier_complete_later with (release s k n); [lia|auto]).
     destruct (waits (tau k) v) eqn:Wv.
-    { rewrite (waits_go_on _ _ _ _ _ rules _ k n v Hk Wv Rd Bt) in E. discriminate. }
+    { rewrite (waits_go_on _ _ _ _ _ rules _ k n v Hk Reg Wv Rd Bt) in E. discriminate. }
     pose proof (job_cores_in_run t k n) as B.
     pose proof (job_among_all (release s k n + t) k n Hk).
     unfold others, job_run. fold (job_run k n).
     assert (Wt : somebody_waits (graph (tau k)) (job_alone k n) t = true).
     { apply somebody_waits_true. exists v. split; [|exact E]. split; [auto|]. split; [exact N|exact P]. }
     rewrite Wt. destruct (lost s (release s k n + t)) eqn:Lo; [lia|].
-    destruct (dispatch _ _ _ _ _ rules _ k n v Hk Wv Lo Rd Bt E) as (D & _). lia.
+    destruct (dispatch _ _ _ _ _ rules _ k n v Hk Reg Wv Lo Rd Bt E) as (D & _). lia.
 Qed.
 
 (** ** DAGs that have kept their bounds so far *)
@@ -294,6 +295,7 @@ Section kept.
 Variables (now k R : nat).
 Hypothesis in_K : k < K.
 Hypothesis wcets_known : known (tau k) = true.
+Hypothesis is_regular : regular (tau k) = true.
 Hypothesis kept : kept_before now k R.
 Hypothesis in_time : R <= period (tau k).
 
