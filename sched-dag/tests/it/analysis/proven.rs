@@ -4,6 +4,7 @@
 //! A bound that is proven of an altered one must hold for the DAGs that this one states. So each
 //! number has to reach the theorem.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -13,6 +14,8 @@ use sched_dag::analysis::witness;
 
 use super::forged::{altered, hashed, unsound};
 use super::random::{mask, sample_with};
+use super::witnesses::drawn;
+use crate::support::number;
 
 /// Prints of each file the DAGs with a bound that the proven checker accepts, and the bounds. Of
 /// what `check-witness` requires only the statement, and how late releases are, is looked at.
@@ -45,22 +48,67 @@ for witness in found:
     print(*(f'dag {n} x: at most {witness.dags[n].bound} ns' for n in sorted(proven)), sep=';')
 ";
 
-/// Returns what is proven of each text.
-fn proven(folder: &Path, texts: &[String]) -> Vec<Vec<String>> {
+/// Prints of each bound of each file why no theorem proves the bound, an empty line if one does.
+const REASONS: &str = "
+import sys
+space = {'__name__': 'checker', '__file__': sys.argv[1]}
+exec(open(sys.argv[1]).read(), space)
+found = []
+for name in sys.argv[2:]:
+    parts = space['of_clusters'](open(name).read())
+    found += [space['Witness'](part) for part in parts]
+for witness, proven in zip(found, space['judged'](found)):
+    for number in range(len(witness.dags)):
+        if space['is_bounded'](witness, number):
+            print(space['without_theorem'](witness, number, proven) or '')
+";
+
+/// Asks of texts, by a program in Python that uses `check-witness`.
+fn asked(program: &str, folder: &Path, texts: &[String]) -> String {
     let checker = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/check-witness");
     let mut python = Command::new("python3");
-    python.args(["-c", WITHOUT_CHECKS]).arg(checker);
+    python.args(["-c", program]).arg(checker);
     for (number, text) in texts.iter().enumerate() {
         let path = folder.join(number.to_string());
         fs::write(&path, text).expect("the folder takes it");
         python.arg(path);
     }
     let output = python.output().expect("python3 runs");
-    let said = String::from_utf8(output.stdout).expect("UTF-8");
     let complaint = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(said.lines().count(), texts.len(), "{complaint}");
+    assert!(output.status.success(), "{complaint}");
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+/// Returns what is proven of each text.
+fn proven(folder: &Path, texts: &[String]) -> Vec<Vec<String>> {
+    let said = asked(WITHOUT_CHECKS, folder, texts);
+    assert_eq!(said.lines().count(), texts.len(), "{said}");
     let of_text = |line: &str| line.split_terminator(';').map(String::from).collect();
     said.lines().map(of_text).collect()
+}
+
+/// Wherever a bound's form has a theorem, and all that the bound rests on, the proven checker says
+/// so, too.
+#[test]
+fn no_witness_is_judged_differently() {
+    let folder = std::env::temp_dir().join(format!("judged-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a folder");
+    let mut reasons = BTreeMap::<String, u32>::new();
+    let numbers: Vec<u64> = (0..number("PROVEN_SETS", 800)).collect();
+    for some in numbers.chunks(400) {
+        let sets = some.iter().filter_map(|&number| drawn(number));
+        let texts: Vec<String> = sets
+            .map(|(set, settings)| witness(&set, &settings))
+            .collect();
+        for why in asked(REASONS, &folder, &texts).lines() {
+            *reasons.entry(why.to_owned()).or_default() += 1;
+        }
+    }
+    println!("{reasons:#?}");
+    let differing = reasons.keys().find(|why| why.contains("does not accept"));
+    assert_eq!(differing, None);
+    assert!(reasons[""] > 300, "too few are proven");
+    fs::remove_dir_all(&folder).expect("it was made");
 }
 
 #[test]

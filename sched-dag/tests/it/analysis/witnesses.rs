@@ -31,7 +31,7 @@ pub(crate) fn accepted(files: &[String]) -> String {
 
 /// Draws a set; of each four in turn one with waits, every other time on one core, one with lent
 /// cores, and one with tables.
-fn drawn(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
+pub(super) fn drawn(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
     let turn = number / 4 % 4;
     let wanted = mask(&[
         ("waits", turn == 1),

@@ -14,6 +14,7 @@ mod made;
 mod on_host;
 mod on_linux;
 mod page;
+mod proven;
 mod recordings;
 #[path = "../support/mod.rs"]
 mod support;
