@@ -91,6 +91,31 @@ Proof.
   intros H. unfold clipped. do 3 f_equal. apply sum_ext. intros i _. rewrite H. reflexivity.
 Qed.
 
+Lemma rise_finer W p n Wc Wr x :
+  rise (N * W) p n (fun i => N * Wc i) (N * Wr) (N * x) = rise W p n Wc Wr x.
+Proof.
+  assert (Lt : forall a b, (N * a <? N * b) = (a <? b))
+    by (intros a b; destruct (Nat.ltb_spec a b), (Nat.ltb_spec (N * a) (N * b)); auto; nia).
+  assert (Le : forall a b, (N * a <=? N * b) = (a <=? b))
+    by (intros a b; destruct (Nat.leb_spec a b), (Nat.leb_spec (N * a) (N * b)); auto; nia).
+  assert (E : sum n (fun i => Nat.min (N * Wc i) (N * x)) = N * sum n (fun i => Nat.min (Wc i) x)).
+  { rewrite <- sum_times. apply sum_ext. intros i _. apply Nat.mul_min_distr_l. }
+  unfold rise. cbv zeta.
+  rewrite E, swap_factor, !Nat.mul_min_distr_l, <- !Nat.mul_add_distr_l, !Nat.mul_min_distr_l, !Lt, Le.
+  rewrite (sum_ext n (fun i => if N * x <? N * Wc i then 1 else 0) (fun i => if x <? Wc i then 1 else 0))
+    by (intros i _; rewrite Lt; reflexivity).
+  reflexivity.
+Qed.
+
+Lemma rise_ext W p n Wc Wc' Wr x : (forall i, Wc i = Wc' i) -> rise W p n Wc Wr x = rise W p n Wc' Wr x.
+Proof.
+  intros H. unfold rise. cbv zeta.
+  rewrite (sum_ext n (fun i => Nat.min (Wc i) x) (fun i => Nat.min (Wc' i) x)) by (intros; rewrite H; auto).
+  rewrite (sum_ext n (fun i => if x <? Wc i then 1 else 0) (fun i => if x <? Wc' i then 1 else 0))
+    by (intros; rewrite H; auto).
+  reflexivity.
+Qed.
+
 Section set.
 Variables (K m : nat) (tau : nat -> task) (pol : policy).
 Variables (bounded : nat -> bool) (R loss width parts : nat -> nat) (part : nat -> nat -> nat).
@@ -148,18 +173,24 @@ Proof.
       by (intros; apply work_of_finer).
     unfold R', loss'. rewrite <- Nat.mul_sub_distr_l, !swap_factor, <- !Nat.mul_add_distr_l.
     apply Nat.mul_le_mono_l, I.
-  - unfold second_inequality in *.
+  - unfold second_inequality in *. cbv zeta in *.
     rewrite (sum_over_others_finer k
       (fun h => clipped_work m tau pol R width parts part k j h (R k) (R k - len))).
-    + unfold R', loss'. rewrite <- Nat.mul_sub_distr_l, !swap_factor.
-      apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I.
+    2: { intros h. unfold clipped_work, whole_work.
+         rewrite <- clipped_finer. unfold R'. rewrite <- Nat.mul_sub_distr_l.
+         fold R'. rewrite !work_of_finer. apply clipped_ext. intros i. apply work_of_finer. }
+    unfold R', loss'. rewrite <- Nat.mul_sub_distr_l, !swap_factor.
+    destruct I as [I|(I & Up)]; [left|right; split].
+    + apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I.
       assert (Nat.max 1 (N * left_over (graph (tau k)) (wcet (tau k)) j f)
               <= N * Nat.max 1 (left_over (graph (tau k)) (wcet (tau k)) j f)).
       { rewrite <- Nat.mul_max_distr_l. lia. }
       lia.
-    + intros h. unfold clipped_work, whole_work.
-      rewrite <- clipped_finer. unfold R'. rewrite <- Nat.mul_sub_distr_l.
-      fold R'. rewrite !work_of_finer. apply clipped_ext. intros i. apply work_of_finer.
+    + apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I. exact I.
+    + apply Nat.le_lt_trans with (2 := Up). apply sum_le. intros h _.
+      destruct (negb (h =? k) && outranks pol h k); [|lia]. unfold rising_work, whole_work.
+      fold R'. rewrite !work_of_finer. apply Nat.eq_le_incl. rewrite <- (rise_finer (work_of _ _ _ _ _ _ _ _)).
+      apply rise_ext. intros i. apply work_of_finer.
 Qed.
 
 Theorem set_bounds_in_fractions s :

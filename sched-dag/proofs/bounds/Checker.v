@@ -367,6 +367,17 @@ Definition clipped_workN (k j h : nat) (r x : N) : N :=
        (sumN (parts c) (fun i => N.min (work_ofN k h (fun v => label (part_of c) v =? i) 1 r) x)
         + N.min (work_ofN k h (fun v => parts c <=? label (part_of c) v) (cores_usedN j h) r) all)).
 
+Definition rising_workN (k j h : nat) (r x : N) : N :=
+  let c := claim_of claims h in
+  let p := N.of_nat (cores_usedN j h) in
+  let all := (p * x)%N in
+  let chain i := work_ofN k h (fun v => label (part_of c) v =? i) 1 r in
+  let rest := work_ofN k h (fun v => parts c <=? label (part_of c) v) (cores_usedN j h) r in
+  let sums := (sumN (parts c) (fun i => N.min (chain i) x) + N.min rest all)%N in
+  let chains := (sumN (parts c) (fun i => if (x <? chain i)%N then 1%N else 0%N) + (if (all <? rest)%N then p else 0))%N in
+  if (whole_workN k j h r <=? N.min all sums)%N then 0%N
+  else if (all <? sums)%N then p else if (sums <? all)%N then chains else N.min p chains.
+
 Definition sum_over_othersN (k : nat) (g : nat -> N) : N :=
   sumN (length claims) (fun h =>
     if negb (h =? k) && outranks (stated_policy due_no_later claims) h k then g h else 0%N).
@@ -400,8 +411,11 @@ Definition inequality_ok (k : nat) (len : N) : bool :=
   let again := pred (fold_right Nat.max 0 (depths c)) in
   (left + blocked + whole <=? room)%N ||
   ((j =? 0) && own_keep c && depths_ok c (depths c) (S again) && (left + blockingN k j again + whole <=? room)%N) ||
-  (N.max 1 left + blocked + sum_over_othersN k (fun h => clipped_workN k j h r (r - len))
-   + N.of_nat (m - j) * loss c <=? room)%N.
+  (let clipped := sum_over_othersN k (fun h => clipped_workN k j h r (r - len)) in
+   let lost := N.of_nat (m - j) * loss c in
+   (N.max 1 left + blocked + clipped + lost <=? room) ||
+   (left + blocked + clipped + lost <=? room) &&
+   (sum_over_othersN k (fun h => rising_workN k j h r (r - len)) <? N.of_nat (m - j)))%N.
 
 Definition outrankers_ok (k : nat) : bool :=
   forallb (fun h => (h =? k) || negb (outranks (stated_policy due_no_later claims) h k)
@@ -458,6 +472,31 @@ Proof.
   rewrite !N2Nat.inj_min, N2Nat.inj_add, !N2Nat.inj_min, N2Nat.inj_mul, Nat2N.id, !work_ofN_ok.
   f_equal. f_equal. f_equal. apply sumN_ok. intros i _.
   rewrite N2Nat.inj_min, work_ofN_ok. reflexivity.
+Qed.
+
+Lemma ltb_to_nat a b : (N.to_nat a <? N.to_nat b) = (a <? b)%N.
+Proof. destruct (N.ltb_spec a b), (Nat.ltb_spec (N.to_nat a) (N.to_nat b)); auto; lia. Qed.
+
+Lemma rising_workN_ok k j h r x :
+  N.to_nat (rising_workN k j h r x)
+  = rising_work m tau pol R wd ps pt k j h (N.to_nat r) (N.to_nat x).
+Proof.
+  unfold rising_work, rise. cbv zeta. rewrite <- !work_ofN_ok. fold (cores_used m wd j h).
+  change (whole_work m tau pol R wd k j h (N.to_nat r)) with
+    (work_of tau pol R k h (fun _ => true) (cores_used m wd j h) (N.to_nat r)). rewrite <- work_ofN_ok.
+  rewrite <- (sumN_ok (ps h) (fun i => N.min (work_ofN k h (fun v => pt h v =? i)%nat 1 r) x))
+    by (intros i _; rewrite N2Nat.inj_min, work_ofN_ok; reflexivity).
+  rewrite <- (sumN_ok (ps h) (fun i => if (x <? work_ofN k h (fun v => pt h v =? i)%nat 1 r)%N then 1%N else 0%N))
+    by (intros i _; rewrite <- work_ofN_ok, ltb_to_nat; destruct (x <? _)%N; reflexivity).
+  unfold rising_workN, whole_workN. cbv zeta. fold (ps h) (pt h). change (cores_usedN j h) with (cores_used m wd j h).
+  set (p := cores_used m wd j h).
+  replace (p * N.to_nat x) with (N.to_nat (N.of_nat p * x)) by lia.
+  rewrite <- N2Nat.inj_min, <- N2Nat.inj_add, <- N2Nat.inj_min, !ltb_to_nat.
+  set (W := work_ofN k h (fun _ => true) p r). set (sums := (sumN _ _ + N.min _ _)%N).
+  replace (N.to_nat W <=? N.to_nat (N.min (N.of_nat p * x) sums)) with (W <=? N.min (N.of_nat p * x) sums)%N
+    by (destruct (N.leb_spec W (N.min (N.of_nat p * x) sums)),
+          (Nat.leb_spec (N.to_nat W) (N.to_nat (N.min (N.of_nat p * x) sums))); auto; lia).
+  repeat match goal with |- context [if ?b then _ else _] => destruct b end; lia.
 Qed.
 
 Lemma sum_over_othersN_ok k f g :
@@ -539,16 +578,20 @@ Proof.
        + (sum_over_othersN k (fun h => whole_workN k j h (bound c)) + N.of_nat (m - j) * loss c)
      <= N.of_nat (m - j) * (bound c - len))%N /\
     (each_counts tau k again \/ each_of_a_path_counts tau k j again) \/
-    (N.max 1 (left_overN c j (label (chain_of c))) + blockingN k j again
-       + sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len))
-       + N.of_nat (m - j) * loss c <= N.of_nat (m - j) * (bound c - len))%N /\
+    (let others := sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len)) in
+     N.max 1 (left_overN c j (label (chain_of c))) + blockingN k j again + others
+       + N.of_nat (m - j) * loss c <= N.of_nat (m - j) * (bound c - len) \/
+     left_overN c j (label (chain_of c)) + blockingN k j again + others
+       + N.of_nat (m - j) * loss c <= N.of_nat (m - j) * (bound c - len) /\
+     sum_over_othersN k (fun h => rising_workN k j h (bound c) (bound c - len)) < N.of_nat (m - j))%N /\
     each_counts tau k again).
   { apply orb_true_iff in I. destruct I as [I|I]; [apply orb_true_iff in I; destruct I as [I|I]|].
     - exists (followers c). left. apply N.leb_le in I. split; [exact I|]. left. apply followers_ok.
     - exists deep. left. rewrite !andb_true_iff in I. destruct I as (((J & Kp) & De) & I).
       apply N.leb_le in I. split; [exact I|]. right. split; [apply Nat.eqb_eq, J|].
       split; [apply own_keep_ok; auto|]. apply (depths_bound c (depths c)), De.
-    - exists (followers c). right. apply N.leb_le in I. split; [exact I|]. apply followers_ok. }
+    - exists (followers c). right. rewrite orb_true_iff, andb_true_iff, N.ltb_lt, !N.leb_le in I.
+      split; [exact I|]. apply followers_ok. }
   destruct Shape as (again & Ineq).
   exists j, (label (chain_of c)), (N.to_nat len), again,
     (N.to_nat (first_level c)), (N.to_nat (later_level c)).
@@ -569,12 +612,17 @@ Proof.
     change (R k) with (N.to_nat (bound c)). change (ls k) with (N.to_nat (loss c)).
     rewrite <- (Nat2N.id (m - j)).
     rewrite <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- !N2Nat.inj_add. lia.
-  - unfold second_inequality. change (R k) with (N.to_nat (bound c)).
+  - unfold second_inequality. cbv zeta in I' |- *. change (R k) with (N.to_nat (bound c)).
     rewrite <- (sum_over_othersN_ok k (fun h => clipped_workN k j h (bound c) (bound c - len)))
       by (intros; rewrite clipped_workN_ok, N2Nat.inj_sub; reflexivity).
-    change (ls k) with (N.to_nat (loss c)). rewrite <- (Nat2N.id (m - j)).
-    change 1 with (N.to_nat 1).
-    rewrite <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- N2Nat.inj_max, <- !N2Nat.inj_add. lia.
+    change (ls k) with (N.to_nat (loss c)). rewrite <- N2Nat.inj_sub.
+    rewrite <- (sum_over_othersN_ok k (fun h => rising_workN k j h (bound c) (bound c - len)))
+      by (intros; apply rising_workN_ok).
+    set (others := sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len))) in *.
+    set (rising := sum_over_othersN k (fun h => rising_workN k j h (bound c) (bound c - len))) in *.
+    rewrite <- (Nat2N.id (m - j)). change 1 with (N.to_nat 1).
+    rewrite <- !N2Nat.inj_mul, <- N2Nat.inj_max, <- !N2Nat.inj_add.
+    destruct I' as [I'|(I' & Up)]; [left|right]; lia.
 Qed.
 
 Lemma check_each : check = true -> forall k, k < length claims -> claim_ok k = true.

@@ -186,6 +186,26 @@ Qed.
 (** The published form, which does not look one tick further.  [second_form_sharp] gives more where nothing is
     left over: if left + sum of phi k x is at most (m - j) x, it is enough that from x to x + 1 the sum of the
     phi grows by less than m - j.  That is CLIP.md's (C* ), with the growth in a tick for the slope. *)
+Lemma one_tick_further K (phi : nat -> nat -> nat) left p x :
+  (forall k a b, k < K -> a <= b -> a * phi k b <= b * phi k a) ->
+  Nat.max 1 left + sum K (fun k => phi k x) <= p * x ->
+  left + sum K (fun k => phi k (x + 1)) < p * (x + 1).
+Proof.
+  intros Hprop H.
+  assert (S2 : x * sum K (fun k => phi k (x + 1)) <= (x + 1) * sum K (fun k => phi k x)).
+  { rewrite <- !sum_times. apply sum_le. intros k Hk. apply Hprop; auto. lia. }
+  set (Px := sum K (fun k => phi k x)) in *. set (PX := sum K (fun k => phi k (x + 1))) in *.
+  destruct (Nat.eq_dec x 0) as [Z|Z]; [rewrite Z in H; lia|].
+  apply (Nat.mul_lt_mono_pos_l x); [lia|].
+  assert (S3 : (x + 1) * (Nat.max 1 left + Px) <= (x + 1) * (p * x)) by (apply Nat.mul_le_mono_l, H).
+  rewrite Nat.mul_add_distr_l in S3 |- *.
+  assert (S4 : x * left + 1 <= (x + 1) * Nat.max 1 left).
+  { assert (x * left <= x * Nat.max 1 left) by (apply Nat.mul_le_mono_l; lia).
+    rewrite Nat.mul_add_distr_r. lia. }
+  assert (S5 : x * (p * (x + 1)) = (x + 1) * (p * x)) by lia.
+  lia.
+Qed.
+
 Theorem second_form G m s c len j f r K (other : nat -> nat -> nat) (phi : nat -> nat -> nat) :
   legal G m s -> within_wcet G s c -> no_path_longer G c len -> disjoint_chains G j f ->
   (forall t, t < r -> others s t <= sum K (fun k => other k t)) ->
@@ -197,20 +217,7 @@ Theorem second_form G m s c len j f r K (other : nat -> nat -> nat) (phi : nat -
   complete G s r.
 Proof.
   intros L W Len D Ho Hphi Hprop Hr H.
-  apply (second_form_sharp G m s c len j f r K other phi); auto.
-  set (x := r - len) in *. set (B := left_over G c j f) in *.
-  assert (S2 : x * sum K (fun k => phi k (x + 1)) <= (x + 1) * sum K (fun k => phi k x)).
-  { rewrite <- !sum_times. apply sum_le. intros k Hk. apply Hprop; auto. lia. }
-  set (Px := sum K (fun k => phi k x)) in *. set (PX := sum K (fun k => phi k (x + 1))) in *.
-  destruct (Nat.eq_dec x 0) as [Z|Z]; [rewrite Z in H; lia|].
-  apply (Nat.mul_lt_mono_pos_l x); [lia|].
-  assert (S3 : (x + 1) * (Nat.max 1 B + Px) <= (x + 1) * ((m - j) * x)) by (apply Nat.mul_le_mono_l, H).
-  rewrite Nat.mul_add_distr_l in S3 |- *.
-  assert (S4 : x * B + 1 <= (x + 1) * Nat.max 1 B).
-  { assert (x * B <= x * Nat.max 1 B) by (apply Nat.mul_le_mono_l; lia).
-    rewrite Nat.mul_add_distr_r. lia. }
-  assert (S5 : x * ((m - j) * (x + 1)) = (x + 1) * ((m - j) * x)) by lia.
-  lia.
+  apply (second_form_sharp G m s c len j f r K other phi); auto. apply one_tick_further; auto.
 Qed.
 
 (** *** What phi may be: the three terms of the product's f_i(X) *)
@@ -240,6 +247,27 @@ Proof.
   - rewrite <- !sum_times. apply sum_le. intros i _.
     apply (in_proportion_min (fun _ => Wc i) (fun n => n)); nia.
   - apply (in_proportion_min (fun _ => Wrest) (fun n => p * n)); nia.
+Qed.
+
+(** How much [clipped] grows at most right after n, per unit of time however short, as far as comparisons tell. *)
+Definition rise (W p N : nat) (Wc : nat -> nat) (Wrest n : nat) : nat :=
+  let sums := sum N (fun i => Nat.min (Wc i) n) + Nat.min Wrest (p * n) in
+  let chains := sum N (fun i => if n <? Wc i then 1 else 0) + (if p * n <? Wrest then p else 0) in
+  if W <=? Nat.min (p * n) sums then 0
+  else if p * n <? sums then p else if sums <? p * n then chains else Nat.min p chains.
+
+Lemma clipped_further W p N Wc Wrest n :
+  clipped W p N Wc Wrest (n + 1) <= clipped W p N Wc Wrest n + rise W p N Wc Wrest n.
+Proof.
+  unfold clipped, rise. cbv zeta.
+  assert (S : sum N (fun i => Nat.min (Wc i) (n + 1))
+    <= sum N (fun i => Nat.min (Wc i) n) + sum N (fun i => if n <? Wc i then 1 else 0)).
+  { rewrite <- sum_plus. apply sum_le. intros i _. destruct (Nat.ltb_spec n (Wc i)); lia. }
+  rewrite Nat.mul_add_distr_l, Nat.mul_1_r.
+  generalize dependent (sum N (fun i => Nat.min (Wc i) (n + 1))).
+  generalize (sum N (fun i => Nat.min (Wc i) n)), (sum N (fun i => if n <? Wc i then 1 else 0)), (p * n).
+  intros a b c d S. destruct (Nat.ltb_spec c Wrest), (Nat.leb_spec W (Nat.min c (a + Nat.min Wrest c))),
+    (Nat.ltb_spec c (a + Nat.min Wrest c)), (Nat.ltb_spec (a + Nat.min Wrest c) c); lia.
 Qed.
 
 Lemma clipped_is_bound r W p N Wc Wrest (cores rest : nat -> nat) (on : nat -> nat -> nat) w :

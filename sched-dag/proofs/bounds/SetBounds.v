@@ -34,6 +34,12 @@ Definition clipped_work (k j h r x : nat) : nat :=
           (parts h) (fun i => work_of k h (fun v => part h v =? i) 1 r)
           (work_of k h (fun v => parts h <=? part h v) (cores_used j h) r) x.
 
+(** How fast that grows. *)
+Definition rising_work (k j h r x : nat) : nat :=
+  rise (whole_work k j h r) (cores_used j h)
+       (parts h) (fun i => work_of k h (fun v => part h v =? i) 1 r)
+       (work_of k h (fun v => parts h <=? part h v) (cores_used j h) r) x.
+
 (** The sum over all other DAGs that may outrank DAG k. *)
 Definition sum_over_others (k : nat) (g : nat -> nat) : nat :=
   sum K (fun h => if negb (h =? k) && outranks pol h k then g h else 0).
@@ -81,8 +87,10 @@ Definition first_inequality (k j len left blocked : nat) : Prop :=
   <= (m - j) * (R k - len).
 
 Definition second_inequality (k j len left blocked : nat) : Prop :=
-  Nat.max 1 left + blocked + sum_over_others k (fun h => clipped_work k j h (R k) (R k - len))
-  + (m - j) * loss k <= (m - j) * (R k - len).
+  let others := sum_over_others k (fun h => clipped_work k j h (R k) (R k - len)) in
+  Nat.max 1 left + blocked + others + (m - j) * loss k <= (m - j) * (R k - len) \/
+  left + blocked + others + (m - j) * loss k <= (m - j) * (R k - len) /\
+  sum_over_others k (fun h => rising_work k j h (R k) (R k - len)) < m - j.
 
 Definition shown (k : nat) : Prop :=
   known (tau k) = true /\ regular (tau k) = true /\ blockers_known k /\
@@ -581,16 +589,26 @@ Proof.
         set (blocked := blocking K m tau pol k j again level0 level1) in *.
         set (low_of t := if somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)
                          then low (K * Z) (low_holds k n) t else 0).
-        apply (second_form _ m _ (wcet (tau k)) len j f (R k) (S (S K))
+        set (F h x := if h <? K then phi h x else if h =? K then (m - j) * loss k else blocked).
+        assert (Sum : forall x, sum (S (S K)) (fun h => F h x) = sum K (fun h => phi h x) + (m - j) * loss k + blocked).
+        { intros x. unfold F. cbn [sum]. destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
+          rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|]. do 2 f_equal.
+          apply sum_ext. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia]. }
+        assert (Prop' : forall h a b, h < S (S K) -> a <= b -> a * F h b <= b * F h a).
+        { intros h a b Hh Hab. unfold F. destruct (Nat.ltb_spec h K).
+          * unfold phi. destruct (negb (h =? k) && outranks pol h k); [|lia].
+            apply clipped_in_proportion; auto.
+          * destruct (h =? K); apply Nat.mul_le_mono_r, Hab. }
+        apply (second_form_sharp _ m _ (wcet (tau k)) len j f (R k) (S (S K))
                  (fun h t => if h <? K then others_of h t
                              else if h =? K then (if lost s (release s k n + t) then m else 0) else low_of t)
-                 (fun h x => if h <? K then phi h x else if h =? K then (m - j) * loss k else blocked)); auto.
+                 F); auto.
         + intros t Ht. pose proof (others_are_other_dags k n Hk Reg Before t ltac:(lia)) as O. cbn [sum].
           destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
           rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|].
           apply Nat.le_trans with (1 := O). unfold higher. apply Nat.add_le_mono_r, Nat.add_le_mono_r.
           apply sum_le. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia].
-        + intros h w Hh. destruct (Nat.ltb_spec h K).
+        + intros h w Hh. unfold F. destruct (Nat.ltb_spec h K).
           * unfold others_of, phi. destruct (negb (h =? k) && outranks pol h k) eqn:O.
             -- destruct (Facts h H O) as (Fk & Fr & F0 & F1 & F2 & F3).
                apply (kept_clipped K m tau pol s rules now h (R h) H Fk Fr F0 F1 _ (release s k n) _
@@ -604,15 +622,15 @@ Proof.
                  with (2 := blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Often).
                apply sum_le. intros t _. unfold low_of.
                destruct (w t), (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); simpl; lia.
-        + intros h a b Hh Hab. destruct (Nat.ltb_spec h K).
-          * unfold phi. destruct (negb (h =? k) && outranks pol h k); [|lia].
-            apply clipped_in_proportion; auto.
-          * destruct (h =? K); apply Nat.mul_le_mono_r, Hab.
-        + cbn [sum]. destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
-          rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|].
-          match goal with |- _ + (?x + _ + _) <= _ => assert (E : x = sum K (fun h => phi h (R k - len))) end.
-          { apply sum_ext. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia]. }
-          rewrite E. unfold second_inequality, sum_over_others in I2. unfold phi. lia. }
+        + unfold second_inequality, sum_over_others in I2. cbv zeta in I2. destruct I2 as [I2|(I2 & Up)].
+          * apply one_tick_further; [exact Prop'|]. rewrite Sum. unfold phi. lia.
+          * rewrite Sum, Nat.mul_add_distr_l, Nat.mul_1_r.
+            assert (Further : sum K (fun h => phi h (R k - len + 1)) <= sum K (fun h => phi h (R k - len))
+              + sum K (fun h => if negb (h =? k) && outranks pol h k
+                                then rising_work m tau pol R width parts part k j h (R k) (R k - len) else 0)).
+            { rewrite <- sum_plus. apply sum_le. intros h _. unfold phi.
+              destruct (negb (h =? k) && outranks pol h k); [apply clipped_further|lia]. }
+            unfold phi in *. lia. }
     intros v Hv. apply (job_finished_in_run K m tau pol s rules); auto. }
   intros k n Hk Bk. apply (Main (release s k n + R k)); auto.
 Qed.

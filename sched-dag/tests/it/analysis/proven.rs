@@ -128,7 +128,7 @@ fn what_it_proves_of_altered_witnesses_holds() {
             continue;
         };
         let text = witness(&task_set, &settings);
-        let forms = [" paths ", " waiting ", " core ", " table\n"];
+        let forms = [" paths ", " waiting ", " sharp ", " core ", " table\n"];
         let is_asked = forms.iter().any(|form| text.contains(form));
         let most = if text.contains(" core ") { 60 } else { 40 };
         if !is_asked || text.lines().count() > most || text.matches("machine ").count() > 1 {
