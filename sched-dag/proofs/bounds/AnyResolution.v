@@ -16,6 +16,8 @@ Hypothesis positive : 0 < N.
 Definition finer (t : task) : task := {|
   graph := graph t;
   wcet := fun v => N * wcet t v;
+  head := head t;
+  together := fun v => N * together t v;
   waits := waits t;
   keeps := keeps t;
   regular := regular t;
@@ -159,38 +161,41 @@ Lemma shown_finer k :
   shown K m tau pol bounded R loss width parts part k ->
   shown K m tau' pol bounded R' loss' width parts part k.
 Proof.
-  intros (Kn & Rg & Bk & W & P & O & B & j & f & len & again & level0 & level1 & Hj & Len & D & (H1 & H2) & Ineq).
-  split; [exact Kn|]. split; [exact Rg|]. split; [exact Bk|]. split; [exact W|]. split; [exact P|]. split; [exact O|]. split; [exact B|].
-  exists j, f, (N * len), again, (N * level0), (N * level1).
-  split; [auto|]. split; [apply no_path_longer_finer, Len|]. split; [exact D|].
+  intros (Kn & Rg & Bk & W & P & Hd & Sm & O & B & j & f & len & again & level0 & level1 & most & Hj & Len & D & F & (H1 & H2) & Ineq).
+  do 9 (split; [assumption|]).
+  exists j, f, (N * len), again, (N * level0), (N * level1), (N * most).
+  split; [auto|]. split; [apply no_path_longer_finer, Len|]. split; [exact D|]. split; [exact F|].
   split; [split; apply Nat.mul_le_mono_l; auto|].
-  cbv zeta in *. change (wcet (tau' k)) with (fun v => N * wcet (tau k) v).
-  change (graph (tau' k)) with (graph (tau k)). rewrite left_over_finer, blocking_finer.
-  set (b := blocking K m tau pol k j again level0 level1) in *.
-  destruct Ineq as [(I & Of)|(I & Of)]; [left|right]; (split; [|exact Of]).
-  - unfold first_inequality in *.
-    rewrite (sum_over_others_finer k (fun h => whole_work m tau pol R width k j h (R k)))
-      by (intros; apply work_of_finer).
-    unfold R', loss'. rewrite <- Nat.mul_sub_distr_l, !swap_factor, <- !Nat.mul_add_distr_l.
-    apply Nat.mul_le_mono_l, I.
-  - unfold second_inequality in *. cbv zeta in *.
-    rewrite (sum_over_others_finer k
-      (fun h => clipped_work m tau pol R width parts part k j h (R k) (R k - len))).
-    2: { intros h. unfold clipped_work, whole_work.
-         rewrite <- clipped_finer. unfold R'. rewrite <- Nat.mul_sub_distr_l.
-         fold R'. rewrite !work_of_finer. apply clipped_ext. intros i. apply work_of_finer. }
-    unfold R', loss'. rewrite <- Nat.mul_sub_distr_l, !swap_factor.
-    destruct I as [I|(I & Up)]; [left|right; split].
-    + apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I.
-      assert (Nat.max 1 (N * left_over (graph (tau k)) (wcet (tau k)) j f)
-              <= N * Nat.max 1 (left_over (graph (tau k)) (wcet (tau k)) j f)).
-      { rewrite <- Nat.mul_max_distr_l. lia. }
-      lia.
-    + apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I. exact I.
-    + apply Nat.le_lt_trans with (2 := Up). apply sum_le. intros h _.
-      destruct (negb (h =? k) && outranks pol h k); [|lia]. unfold rising_work, whole_work.
-      fold R'. rewrite !work_of_finer. apply Nat.eq_le_incl. rewrite <- (rise_finer (work_of _ _ _ _ _ _ _ _)).
-      apply rise_ext. intros i. apply work_of_finer.
+  cbv zeta in *. unfold first_inequality, second_inequality, path_inequality in *.
+  rewrite !(sum_over_others_finer k (fun h => whole_work m tau pol R width k j h (R k)))
+    by (intros; apply work_of_finer).
+  change (together (tau' k)) with (fun v => N * together (tau k) v).
+  change (graph (tau' k)) with (graph (tau k)). rewrite left_over_finer, blocking_finer, weight_finer, !largest_blocking_finer.
+  unfold R', loss'. rewrite <- !Nat.mul_sub_distr_l, !swap_factor.
+  destruct Ineq as [(Waits & Of & I)|(Most & I)]; [left|right].
+  - split; [exact Waits|]. split; [exact Of|]. destruct I as [I|I]; [left|right].
+    + rewrite <- !Nat.mul_add_distr_l. apply Nat.mul_le_mono_l, I.
+    + rewrite (sum_over_others_finer k
+        (fun h => clipped_work m tau pol R width parts part k j h (R k) (R k - len))).
+      2: { intros h. unfold clipped_work, whole_work. rewrite <- clipped_finer. fold R'.
+           rewrite !work_of_finer. apply clipped_ext. intros i. apply work_of_finer. }
+      destruct I as [I|(I & Up)]; [left|right; split].
+      * apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I.
+        assert (Nat.max 1 (N * left_over (graph (tau k)) (together (tau k)) j f)
+                <= N * Nat.max 1 (left_over (graph (tau k)) (together (tau k)) j f)).
+        { rewrite <- Nat.mul_max_distr_l. lia. }
+        lia.
+      * apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I. exact I.
+      * apply Nat.le_lt_trans with (2 := Up). apply sum_le. intros h _.
+        destruct (negb (h =? k) && outranks pol h k); [|lia]. unfold rising_work, whole_work.
+        fold R'. rewrite !work_of_finer. apply Nat.eq_le_incl. rewrite <- (rise_finer (work_of _ _ _ _ _ _ _ _)).
+        apply rise_ext. intros i. apply work_of_finer.
+  - split; [|rewrite <- !Nat.mul_add_distr_l; apply Nat.mul_le_mono_l, I].
+    intros l Pl. apply Nat.le_trans with (2 := no_path_longer_finer _ _ _ Most l Pl).
+    apply Nat.eq_le_incl. unfold path_length. f_equal. apply map_ext. intros v. unfold on_path.
+    rewrite !largest_blocking_finer. simpl. rewrite swap_factor, Nat.mul_add_distr_l, Nat.mul_sub_distr_l.
+    unfold outside, on_core. simpl.
+    destruct (waits (tau k) v), (j <=? f v), (after_wait (graph (tau k)) (fun v => negb (waits (tau k) v)) v); simpl; lia.
 Qed.
 
 Theorem set_bounds_in_fractions s :

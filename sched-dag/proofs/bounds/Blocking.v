@@ -1,7 +1,7 @@
 (** * Subtasks that keep their cores: blocking by lower-ranked work
 
-    MULTI_PATH.md, section 6, for one job among others.  All its subtasks keep their cores until they end.  In each
-    tick others are higher-ranked work, [high t] cores, and lower-ranked subtasks [0 .. L - 1], of which
+    MULTI_PATH.md, section 6, for one job among others.  All its vertices [on] a core keep it until they end, and
+    the others, its waits, need nobody.  In each tick others are higher-ranked work, [high t] cores, and lower-ranked subtasks [0 .. L - 1], of which
     [low_holds t l] says whether l has a core; a run of it takes [longest l] at most.  In the ticks [skip] what
     has a core may be interrupted; then what executes is [high].
 
@@ -9,7 +9,7 @@
     and those that hold cores when a stretch of such ticks begins, after the release, leave one to a predecessor. *)
 
 Require Import Arith Lia Bool List.
-From Bounds Require Import Sums Model Chains OneTick Account ResponseTime.
+From Bounds Require Import Sums Model Chains OneTick Account ResponseTime AlongAPath.
 
 (** The sum of the q largest of [longest 0 .. longest (L - 1)], or more: it is the least of these over all
     [level], and attained where [level] is the q-th largest. *)
@@ -35,16 +35,22 @@ Qed.
 
 Section blocking.
 Variables (G : dag) (m : nat) (s : run).
-Variables (L : nat) (low_holds : nat -> nat -> bool) (longest : nat -> nat) (high : nat -> nat) (skip : nat -> bool).
+Variables (on : nat -> bool) (L : nat) (low_holds : nat -> nat -> bool) (longest : nat -> nat).
+Variables (high : nat -> nat) (skip : nat -> bool).
 
 Definition low (t : nat) : nat := count L (low_holds t).
 
+(** The cores that execute the job. *)
+Definition own_cores (t : nat) : nat := count (size G) (fun v => on v && runs s t v).
+
 Record keeps_cores : Prop := {
   obeys : legal G m s;
-  m_cores : forall t, busy G s t + low t <= m;
+  m_cores : forall t, own_cores t + low t <= m;
   others_are : forall t, others s t <= high t + (if skip t then 0 else low t);
   (** The job's own vertices keep their cores. *)
-  own_keep : forall t v, v < size G -> skip t = false -> 0 < done s t v -> ~ finished s t v -> runs s t v = true;
+  own_keep : forall t v, v < size G -> on v = true -> skip t = false -> 0 < done s t v -> ~ finished s t v -> runs s t v = true;
+  takes_time : forall v, v < size G -> on v = true -> 0 < exec s v;
+  waits_run : forall t v, on v = false -> ready G s t v -> runs s t v = true;
   (** Nothing of lower rank starts while a vertex waits. *)
   no_start : forall t l, l < L ->
     waits_to_begin G s (S t) = true -> low_holds (S t) l = true -> low_holds t l = true;
@@ -61,7 +67,8 @@ Lemma waits_or_skip t : somebody_waits G s t = true -> skip t = false -> waits t
 Proof.
   intros W Sk. apply somebody_waits_true in W. destruct W as (v & Rd & E). apply waits_to_begin_true.
   exists v. split; [auto|]. split; [|auto]. destruct (Nat.eq_dec (done s t v) 0); auto.
-  destruct Rd as (Hv & N & _). rewrite (own_keep rules t v Hv Sk ltac:(lia) N) in E. discriminate.
+  destruct (on v) eqn:O; [|rewrite (waits_run rules t v O Rd) in E; discriminate].
+  destruct Rd as (Hv & N & _). rewrite (own_keep rules t v Hv O Sk ltac:(lia) N) in E. discriminate.
 Qed.
 
 (** For how many ticks on end, up to t, some vertex has waited, and how many of these count. *)
@@ -109,50 +116,41 @@ Definition becomes_ready (t v : nat) : bool :=
   | S p => ready_bool G s (S p) v && negb (ready_bool G s p v)
   end.
 
-Lemma unfinished_before p v : v < size G -> ~ (forall u, precedes G u v -> finished s p u) ->
-  exists u, u < size G /\ precedes G u v /\ ~ finished s p u.
-Proof.
-  intros Hv N. destruct (some_or_none (size G) (fun u => precedes_bool G u v && negb (finished_bool s p u)))
-    as [(u & Hu & H)|A].
-  - apply andb_true_iff in H. rewrite negb_true_iff, finished_bool_false, precedes_bool_true in H. exists u. tauto.
-  - exfalso. apply N. intros u Eu. pose proof (precedes_up _ _ _ Eu). specialize (A u ltac:(lia)). cbv beta in A.
-    apply precedes_bool_true in Eu. rewrite Eu in A. simpl in A. apply finished_bool_true, negb_false_iff, A.
-Qed.
-
 Lemma begin_of_stretch p : waits p = false -> waits (S p) = true ->
   exists v, v < size G /\ becomes_ready (S p) v = true /\ has_predecessor G v = true /\ 0 < busy G s p.
 Proof.
   intros Wp W. apply waits_to_begin_true in W. destruct W as (v & Rd & D & E).
-  pose proof Rd as (Hv & Nf & Pf).
-  assert (Nf' : ~ finished s p v) by (intros F; apply Nf, finished_later with p; auto).
+  pose proof Rd as (Hv & _ & _).
   assert (NR : ~ ready G s p v).
   { intros Rp. rewrite done_next in D. assert (waits p = true); [|congruence].
     apply waits_to_begin_true. exists v. destruct (runs s p v); simpl in D; [lia|]. split; [auto|]. split; [lia|auto]. }
-  assert (U : exists u, u < size G /\ precedes G u v /\ ~ finished s p u).
-  { apply unfinished_before; auto. intros P. apply NR. split; [auto|]. split; auto. }
-  destruct U as (u & Hu & Eu & Nu).
+  destruct (becomes_ready_after G s p v Rd NR) as (u & Hu & Eu & _ & Ru).
   exists v. split; [auto|]. split; [|split].
   - simpl. apply andb_true_iff. split; [apply ready_bool_true; auto|].
     apply negb_true_iff. destruct (ready_bool G s p v) eqn:B; auto.
     apply ready_bool_true in B. tauto.
   - destruct (last_edge G u v Eu) as (w & Ew). pose proof (edges_lead_up _ _ _ Ew).
     unfold has_predecessor. apply existsb_exists. exists w. rewrite in_seq. split; [lia|auto].
-  - specialize (Pf u Eu). unfold finished in Pf, Nu. rewrite done_next in Pf.
-    destruct (runs s p u) eqn:Ru; simpl in Pf; [|lia].
-    pose proof (sum_term (size G) (fun v => Nat.b2n (runs s p v)) u Hu) as T. cbv beta in T.
+  - pose proof (sum_term (size G) (fun v => Nat.b2n (runs s p v)) u Hu) as T. cbv beta in T.
     rewrite Ru in T. simpl in T. unfold busy, count. lia.
 Qed.
 
-Lemma fewer_low t : waits t = true -> waited t < t -> low t <= m - 1.
+(** Until here the job may wait for devices.  Without, each predecessor leaves a core. *)
+Definition all_on : Prop := forall v, v < size G -> on v = true.
+
+Lemma busy_is_own t : all_on -> busy G s t = own_cores t.
+Proof. intros A. apply sum_ext. intros v Hv. rewrite (A v Hv). reflexivity. Qed.
+
+Lemma fewer_low t : all_on -> waits t = true -> waited t < t -> low t <= m - 1.
 Proof.
-  induction t; intros W H; [simpl in H; lia|].
+  intros A. induction t; intros W H; [simpl in H; lia|].
   assert (Less : low (S t) <= low t).
   { apply sum_le. intros l Hl. destruct (low_holds (S t) l) eqn:E; simpl; [|lia].
     rewrite (no_start rules t l Hl W E). simpl. lia. }
   simpl in H. destruct (waits t) eqn:Wt.
   - specialize (IHt eq_refl ltac:(lia)). lia.
   - destruct (begin_of_stretch t Wt W) as (_ & _ & _ & _ & B).
-    pose proof (m_cores rules t). lia.
+    rewrite (busy_is_own t A) in B. pose proof (m_cores rules t). lia.
 Qed.
 
 (** How many stretches begin after the release. *)
@@ -212,9 +210,8 @@ Qed.
 
 (** ** Blocking along a path
 
-    Graham's path instead of chains that change: from a vertex that is ready at r, back to its predecessor that
-    finished last, and so on.  While one of the path waits, lower-ranked work starts nowhere, so *it blocks once
-    for each vertex of the path*; and all m cores execute what is not on the path.  This is for j = 0 only. *)
+    While a vertex of a path waits (AlongAPath.v), lower-ranked work starts nowhere, so it blocks once for each
+    vertex: by the m - 1 largest of it, as a predecessor has left a core; by the m largest after a wait. *)
 
 Section path.
 Variables (level0 level1 : nat).
@@ -276,24 +273,11 @@ Proof.
   specialize (H (S n) (le_n _)). apply Nat.le_trans with (2 := H). apply Nat.le_add_r.
 Qed.
 
-Lemma ready_since t v : ready G s t v -> exists a, a <= t /\ (forall i, a <= i <= t -> ready G s i v) /\
-  (a = 0 \/ exists p, a = S p /\ ~ ready G s p v).
-Proof.
-  induction t; intros Rd.
-  - exists 0. split; [lia|]. split; [|auto]. intros i Hi. replace i with 0 by lia. auto.
-  - destruct (ready_bool G s t v) eqn:B.
-    + apply ready_bool_true in B. destruct (IHt B) as (a & Ha & R & Z). exists a. split; [lia|].
-      split; [|auto]. intros i Hi. destruct (Nat.eq_dec i (S t)) as [->|]; auto. apply R. lia.
-    + exists (S t). split; [lia|]. split.
-      * intros i Hi. replace i with (S t) by lia. auto.
-      * right. exists t. split; auto. intros Rt. apply ready_bool_true in Rt. congruence.
-Qed.
-
-Lemma waits_first a d v : v < size G -> (forall i, i <= d -> ready G s (a + i) v) -> done s a v = 0 ->
+Lemma waits_first a d v : v < size G -> on v = true -> (forall i, i <= d -> ready G s (a + i) v) -> done s a v = 0 ->
   exists n, n <= d /\ (forall i, i < n -> waits (a + i) = true) /\
     (forall i, n <= i < d -> skip (a + i) = true \/ runs s (a + i) v = true).
 Proof.
-  intros Hv Rd Z.
+  intros Hv O Rd Z.
   assert (H : exists n, n <= d /\ (forall i, i < n -> runs s (a + i) v = false) /\
     (n = d \/ runs s (a + n) v = true)).
   { clear Rd. induction d; [exists 0; split; [lia|split; [intros; lia|auto]]|].
@@ -313,15 +297,12 @@ Proof.
     simpl in M. lia.
 Qed.
 
-Lemma waiting_vertex i v : ready G s i v -> runs s i v = false -> somebody_waits G s i = true.
-Proof. intros. apply somebody_waits_true. eauto. Qed.
-
 (** What one vertex waits, from when it becomes ready. *)
-Lemma one_wait few level' a d v : v < size G -> (forall i, i <= d -> ready G s (a + i) v) ->
+Lemma one_wait few level' a d v : v < size G -> on v = true -> (forall i, i <= d -> ready G s (a + i) v) ->
   done s a v = 0 -> (waits a = true -> low a <= few) ->
   sum d (fun i => if runs s (a + i) v then 0 else counted (a + i)) <= largest few level' L longest.
 Proof.
-  intros Hv Rd Z Q. destruct (waits_first a d v Hv Rd Z) as (n & Hn & W & H2).
+  intros Hv O Rd Z Q. destruct (waits_first a d v Hv O Rd Z) as (n & Hn & W & H2).
   replace d with (n + (d - n)) by lia. rewrite sum_shift.
   rewrite (sum_zero (d - n)).
   2: { intros i Hi. unfold counted. destruct (H2 (n + i) ltac:(lia)) as [->| ->]; [|auto].
@@ -332,196 +313,55 @@ Proof.
   - apply one_stretch; auto. intros Hn0. apply Q. specialize (W 0 Hn0). rewrite Nat.add_0_r in W. auto.
 Qed.
 
-(** A vertex that becomes ready has not executed yet. *)
-Lemma not_begun a v : v < size G -> (forall p, a = S p -> exists u, precedes G u v /\ ~ finished s p u) ->
-  done s a v = 0.
+Definition after_wait (v : nat) : bool := existsb (fun u => edge G u v && negb (on u)) (seq 0 (size G)).
+
+Notation every := (largest m level0 L longest).
+Notation later := (largest (m - 1) level1 L longest).
+
+Definition blocked_at (v : nat) : nat := if on v then if after_wait v then every else later else 0.
+
+Lemma waits_never_wait a d v : on v = false -> (forall i, i <= d -> ready G s (a + i) v) ->
+  sum d (fun i => if runs s (a + i) v then 0 else counted (a + i)) = 0.
+Proof. intros O Rd. apply sum_zero. intros i Hi. rewrite (waits_run rules _ v O); auto. apply Rd. lia. Qed.
+
+Lemma blocked_at_release d v : v < size G -> (forall i, i <= d -> ready G s i v) ->
+  sum d (fun i => if runs s (0 + i) v then 0 else counted (0 + i)) <= every - later + blocked_at v.
 Proof.
-  intros Hv H. destruct a as [|p]; [reflexivity|]. destruct (H p eq_refl) as (u & Eu & Nu).
-  destruct (Nat.eq_dec (done s (S p) v) 0); auto. exfalso. apply Nu.
-  assert (P : 0 < done s (S p) v) by lia. apply sum_positive in P. destruct P as (i & Hi & R).
-  destruct (runs s i v) eqn:Er; simpl in R; [|lia].
-  apply (only_ready_run _ _ _ (obeys rules)) in Er; auto. destruct Er as (_ & _ & P).
-  apply finished_later with i; [lia|auto].
+  intros Hv Rd. unfold blocked_at. destruct (on v) eqn:O; [|rewrite waits_never_wait; auto; lia].
+  apply Nat.le_trans with every; [|destruct (after_wait v); lia].
+  apply one_wait; auto. intros _. pose proof (m_cores rules 0). lia.
 Qed.
 
-Definition path_blocking (n : nat) : nat :=
-  largest m level0 L longest + (n - 1) * largest (m - 1) level1 L longest.
-
-Lemma path_account t : forall v, ready G s t v ->
-  exists K w : nat -> bool,
-    chain G K /\ K v = true /\
-    (forall x, K x = true -> x = v \/ precedes G x v) /\
-    (forall i, i < t -> w i = true ->
-       somebody_waits G s i = true /\ forall x, x < size G -> K x = true -> runs s i x = false) /\
-    (forall i, i < t -> w i = false -> exists x, x < size G /\ K x = true /\ runs s i x = true) /\
-    sum t (fun i => if w i then counted i else 0) <= path_blocking (count (size G) K).
+Lemma blocked_later p d v : v < size G -> (forall i, i <= d -> ready G s (S p + i) v) -> ~ ready G s p v ->
+  sum d (fun i => if runs s (S p + i) v then 0 else counted (S p + i)) <= blocked_at v.
 Proof.
-  induction t as [t IH] using (well_founded_induction lt_wf). intros v Rd.
-  pose proof Rd as (Hv & _ & _).
-  destruct (ready_since t v Rd) as (a & Ha & Since & D).
-  destruct D as [->|(p & -> & Np)].
-  - exists (fun x => x =? v), (fun i => negb (runs s i v)).
-    split; [apply chain_single|]. split; [apply Nat.eqb_refl|].
-    split; [intros x E; left; apply Nat.eqb_eq, E|].
-    split; [|split].
-    + intros i Hi E. apply negb_true_iff in E. split.
-      * apply waiting_vertex with v; auto. apply Since. lia.
-      * intros x _ Ex. apply Nat.eqb_eq in Ex. subst. auto.
-    + intros i Hi E. apply negb_false_iff in E. exists v. rewrite Nat.eqb_refl. auto.
-    + unfold path_blocking.
-      apply Nat.le_trans with (largest m level0 L longest); [|apply Nat.le_add_r].
-      apply Nat.le_trans with (2 := one_wait m level0 0 t v Hv ltac:(intros; apply Since; lia) eq_refl
-        ltac:(intros _; pose proof (m_cores rules 0); lia)).
-      apply sum_le. intros i _. simpl. destruct (runs s i v); simpl; lia.
-  - destruct (Since (S p) ltac:(lia)) as (_ & Nv & Pv).
-    assert (U : exists u, u < size G /\ precedes G u v /\ ~ finished s p u).
-    { apply unfinished_before; auto. intros P. apply Np. split; [auto|]. split; auto.
-      intros F. apply Nv, finished_later with p; auto. }
-    destruct U as (u & Hu & Eu & Nu).
-    pose proof (precedes_up _ _ _ Eu) as Huv.
-    assert (Z : done s (S p) v = 0).
-    { apply not_begun; auto. intros p' E. injection E as <-. eauto. }
-    assert (Ru : runs s p u = true).
-    { specialize (Pv u Eu). unfold finished in Pv, Nu. rewrite done_next in Pv.
-      destruct (runs s p u); simpl in Pv; [auto|lia]. }
-    assert (Rdu : ready G s p u) by (apply (only_ready_run _ _ _ (obeys rules)); auto).
-    destruct (IH p ltac:(lia) u Rdu) as (K & w & CK & Ku & Kp & Kw & Kr & Kb).
-    assert (Kless : forall x, K x = true -> x < v /\ precedes G x v).
-    { intros x Kx. destruct (Kp x Kx) as [->|H]; [split; [lia|auto]|].
-      split; [|apply precedes_trans with u; auto].
-      apply precedes_up in H. lia. }
-    assert (Kv : K v = false).
-    { destruct (K v) eqn:E; auto. destruct (Kless v E). lia. }
-    assert (Cnt : count (size G) (fun x => (x =? v) || K x) = S (count (size G) K)).
-    { unfold count. rewrite (sum_ext _ _ (fun x => Nat.b2n (x =? v) + Nat.b2n (K x))).
-      - rewrite sum_plus, (sum_only _ (fun x => Nat.b2n (x =? v)) v Hv).
-        + rewrite Nat.eqb_refl. reflexivity.
-        + intros x _ Ne. destruct (Nat.eqb_spec x v); [lia|auto].
-      - intros x _. destruct (Nat.eqb_spec x v); [subst; rewrite Kv|]; simpl; lia. }
-    assert (Cpos : 0 < count (size G) K).
-    { pose proof (sum_term (size G) (fun x => Nat.b2n (K x)) u Hu) as T. cbv beta in T. rewrite Ku in T.
-      unfold count. simpl in T. lia. }
-    exists (fun x => (x =? v) || K x),
-      (fun i => if i <? p then w i else if i =? p then false else negb (runs s i v)).
-    split; [|split; [|split; [|split; [|split]]]].
-    + intros x y Hxy Hy Kx Ky.
-      destruct (Nat.eqb_spec y v) as [->|Ny].
-      * destruct (Nat.eqb_spec x v) as [->|Nx]; [lia|]. simpl in Kx. apply Kless, Kx.
-      * simpl in Ky. destruct (Kless y Ky) as (Ly & _).
-        destruct (Nat.eqb_spec x v) as [->|Nx]; [lia|]. simpl in Kx. apply CK; auto.
-    + rewrite Nat.eqb_refl. reflexivity.
-    + intros x Kx. destruct (Nat.eqb_spec x v); [auto|]. right. apply Kless, Kx.
-    + intros i Hi E. destruct (Nat.ltb_spec i p) as [Lp|Lp].
-      * destruct (Kw i Lp E) as (W1 & W2). split; auto. intros x Hx Kx.
-        destruct (Nat.eqb_spec x v) as [->|Ne]; [|apply W2; auto].
-        destruct (runs s i v) eqn:Er; auto. exfalso.
-        apply (only_ready_run _ _ _ (obeys rules)) in Er; auto. destruct Er as (_ & _ & P).
-        apply Nu. apply finished_later with i; [lia|auto].
-      * destruct (Nat.eqb_spec i p) as [->|Ne]; [discriminate|]. apply negb_true_iff in E.
-        assert (Ri : ready G s i v) by (apply Since; lia).
-        split; [apply waiting_vertex with v; auto|]. intros x Hx Kx.
-        destruct (Nat.eqb_spec x v) as [->|Nx]; [auto|]. simpl in Kx.
-        destruct (runs s i x) eqn:Er; auto. exfalso.
-        apply (only_ready_run _ _ _ (obeys rules)) in Er; auto. destruct Er as (_ & F & _).
-        apply F. apply (ready_after_ancestors G s i x v); [apply Kless, Kx|auto].
-    + intros i Hi E. destruct (Nat.ltb_spec i p) as [Lp|Lp].
-      * destruct (Kr i Lp E) as (x & Hx & Kx & Rx). exists x. rewrite Kx, orb_true_r. auto.
-      * destruct (Nat.eqb_spec i p) as [->|Ne].
-        -- exists u. rewrite Ku, orb_true_r. auto.
-        -- apply negb_false_iff in E. exists v. rewrite Nat.eqb_refl. auto.
-    + rewrite Cnt. replace t with (S p + (t - S p)) by lia. rewrite sum_shift.
-      assert (B1 : sum (S p) (fun i => if (if i <? p then w i else if i =? p then false else negb (runs s i v))
-                     then counted i else 0) <= path_blocking (count (size G) K)).
-      { cbn [sum]. destruct (Nat.ltb_spec p p); [lia|]. rewrite Nat.eqb_refl, Nat.add_0_r.
-        apply Nat.le_trans with (2 := Kb). apply sum_le. intros i Hi.
-        destruct (Nat.ltb_spec i p); [auto|lia]. }
-      assert (B2 : sum (t - S p) (fun i => if (if S p + i <? p then w (S p + i) else if S p + i =? p then false
-                       else negb (runs s (S p + i) v)) then counted (S p + i) else 0)
-                   <= largest (m - 1) level1 L longest).
-      { apply Nat.le_trans with (2 := one_wait (m - 1) level1 (S p) (t - S p) v Hv
-          ltac:(intros; apply Since; lia) Z
-          ltac:(intros W; assert (Less : low (S p) <= low p);
-            [apply sum_le; intros l Hl; destruct (low_holds (S p) l) eqn:E; simpl; [|lia];
-             rewrite (no_start rules p l Hl W E); simpl; lia|];
-            pose proof (m_cores rules p); pose proof (sum_term (size G) (fun v => Nat.b2n (runs s p v)) u Hu) as T;
-            cbv beta in T; rewrite Ru in T; simpl Nat.b2n in T; unfold busy, count in *; lia)).
-        apply sum_le. intros i _. destruct (Nat.ltb_spec (S p + i) p); [lia|].
-        destruct (Nat.eqb_spec (S p + i) p); [lia|]. destruct (runs s (S p + i) v); simpl; lia. }
-      unfold path_blocking in *.
-      replace (S (count (size G) K) - 1) with (S (count (size G) K - 1)) by lia.
-      rewrite Nat.mul_succ_l. lia.
-Qed.
-
-(** *Lower-ranked work blocks once for each vertex of a path: by the m largest of it, then by the m - 1 largest.*
-    [n] is how many vertices a path has at most.  The volume is all of the DAG's, as with Graham. *)
-Theorem first_form_blocked_along_a_path c len n r I :
-  0 < m -> within_wcet G s c -> no_path_longer G c len -> no_path_longer G (fun _ => 1) n ->
-  sum r (fun t => Nat.min (high t) m) <= I ->
-  len <= r -> volume G c + I + path_blocking n <= m * (r - len) + len ->
-  complete G s r.
-Proof.
-  intros Hm W Len Num HI Hr H.
-  destruct (complete_or_not G s r) as [C|(v0 & Hv0 & F0)]; auto. exfalso.
-  destruct (least (size G) (fun v => negb (finished_bool s r v))) as (v & Hv & F & Fl).
-  { exists v0. split; auto. apply negb_true_iff, finished_bool_false, F0. }
-  apply negb_true_iff, finished_bool_false in F.
-  assert (Rd : ready G s r v).
-  { split; [auto|]. split; [auto|]. intros u Eu. apply precedes_up in Eu.
-    specialize (Fl u ltac:(lia)). apply negb_false_iff, finished_bool_true in Fl. auto. }
-  destruct (path_account r v Rd) as (K & w & CK & Kv & _ & Kw & Kr & Kb).
-  assert (Done : forall t x, x < size G -> done s t x <= c x).
-  { intros t x Hx. pose proof (done_at_most_exec G m s (obeys rules) t x Hx). specialize (W x Hx). lia. }
-  assert (WK : weight G c K <= len) by (apply chain_at_most_length; auto).
-  assert (NK : count (size G) K <= n).
-  { pose proof (chain_at_most_length G (fun _ => 1) n K Num CK) as Q. unfold weight in Q. unfold count.
-    apply Nat.le_trans with (2 := Q). apply sum_le. intros x _. destruct (K x); simpl; lia. }
-  (* the ticks in which the path executes *)
-  assert (T1 : r + 1 <= count r w + weight G c K).
-  { assert (r <= count r w + sum (size G) (fun x => if K x then done s r x else 0)).
-    { rewrite <- (Nat.mul_1_r r) at 1. rewrite <- sum_const. unfold count.
-      rewrite (sum_ext (size G) _ (fun x => sum r (fun i => if K x then Nat.b2n (runs s i x) else 0))).
-      - rewrite <- sum_swap, <- sum_plus. apply sum_le. intros i Hi. destruct (w i) eqn:E; simpl; [lia|].
-        destruct (Kr i Hi E) as (x & Hx & Kx & Rx).
-        pose proof (sum_term (size G) (fun x => if K x then Nat.b2n (runs s i x) else 0) x Hx) as T.
-        cbv beta in T. rewrite Kx, Rx in T. simpl in T. lia.
-      - intros x _. destruct (K x); [reflexivity|]. rewrite sum_zero; auto. }
-    assert (sum (size G) (fun x => if K x then done s r x else 0) + 1 <= weight G c K).
-    { unfold weight.
-      assert (One : sum (size G) (fun x => Nat.b2n (x =? v)) = 1).
-      { rewrite (sum_only _ _ v Hv); [rewrite Nat.eqb_refl; auto|].
-        intros x _ Ne. destruct (Nat.eqb_spec x v); [lia|auto]. }
-      rewrite <- One, <- sum_plus. apply sum_le. intros x Hx. destruct (Nat.eqb_spec x v) as [->|Ne].
-      - rewrite Kv. specialize (W v Hv). unfold finished in F. simpl. lia.
-      - destruct (K x); simpl; [|lia]. specialize (Done r x Hx). lia. }
-    lia. }
-  (* all cores execute what is not on it *)
-  assert (T2 : m * count r w + weight G c K <= volume G c + I + path_blocking (count (size G) K)).
-  { assert (B : sum r (fun i => if w i then busy G s i else 0) + weight G c K <= volume G c).
-    { unfold weight, volume. rewrite (sum_ext r _ (fun i => sum (size G)
-        (fun x => if w i then Nat.b2n (runs s i x) else 0)))
-        by (intros i _; destruct (w i); [reflexivity|rewrite sum_zero; auto]).
-      rewrite sum_swap, <- sum_plus. apply sum_le. intros x Hx. destruct (K x) eqn:Kx.
-      - rewrite sum_zero; [lia|]. intros i Hi. destruct (w i) eqn:E; auto.
-        destruct (Kw i Hi E) as (_ & N). rewrite N; auto.
-      - specialize (Done r x Hx). apply Nat.le_trans with (done s r x); [|lia].
-        rewrite Nat.add_0_r. apply sum_le. intros i _. destruct (w i); lia. }
-    assert (A : m * count r w <= sum r (fun i => if w i then busy G s i else 0)
-      + sum r (fun t => Nat.min (high t) m) + sum r (fun i => if w i then counted i else 0)).
-    { unfold count. rewrite <- sum_times, <- !sum_plus. apply sum_le. intros i Hi.
-      destruct (w i) eqn:E; simpl; [|lia]. destruct (Kw i Hi E) as (Wi & _).
-      apply somebody_waits_true in Wi. destruct Wi as (x & Rx & Nx).
-      pose proof (work_conserving _ _ _ (obeys rules) i x Rx Nx). pose proof (others_are rules i).
-      unfold counted. destruct (skip i); lia. }
-    lia. }
-  assert (Mono : path_blocking (count (size G) K) <= path_blocking n).
-  { unfold path_blocking. apply Nat.add_le_mono_l, Nat.mul_le_mono_r. lia. }
-  nia.
+  intros Hv Rd Np. unfold blocked_at. destruct (on v) eqn:O; [|rewrite waits_never_wait; auto].
+  assert (Rv : ready G s (S p) v) by (specialize (Rd 0 ltac:(lia)); rewrite Nat.add_0_r in Rd; exact Rd).
+  destruct (becomes_ready_after G s p v Rv Np) as (u & Hu & Eu & Nu & Ru).
+  pose proof (not_begun G m s (obeys rules) p u v Hv Eu Nu) as Z.
+  destruct (after_wait v) eqn:Af.
+  { apply one_wait; auto. intros _. pose proof (m_cores rules (S p)). lia. }
+  assert (No : forall w, edge G w v = true -> on w = true).
+  { intros w E. destruct (on w) eqn:Ow; auto. exfalso. pose proof (edges_lead_up _ _ _ E).
+    assert (after_wait v = true); [|congruence]. apply existsb_exists. exists w. rewrite in_seq, E, Ow. split; [lia|auto]. }
+  (* so the predecessor that ends is a segment, and leaves a core *)
+  assert (Ou : on u = true).
+  { inversion Eu as [? E|w ? Uw E]; subst; [apply No, E|]. exfalso. pose proof (edges_lead_up _ _ _ E).
+    pose proof (not_begun G m s (obeys rules) p u w ltac:(lia) Uw Nu). destruct Rv as (_ & _ & P).
+    specialize (P w (precedes_edge _ _ _ E)). pose proof (takes_time rules w ltac:(lia) (No w E)). unfold finished in P. lia. }
+  apply one_wait; auto. intros W.
+  assert (Less : low (S p) <= low p).
+  { apply sum_le. intros l Hl. destruct (low_holds (S p) l) eqn:E; simpl; [|lia].
+    rewrite (no_start rules p l Hl W E). simpl. lia. }
+  pose proof (m_cores rules p). pose proof (sum_term (size G) (fun v => Nat.b2n (on v && runs s p v)) u Hu) as T.
+  cbv beta in T. rewrite Ou, Ru in T. simpl Nat.b2n in T. unfold own_cores, count in *. lia.
 Qed.
 
 End path.
 
 (** ** Blocking as often as subtasks have a predecessor *)
 
+Hypothesis without_waits : all_on.
 Variables (j level0 level1 : nat).
 Let q0 := m - j.
 Let q1 := Nat.min (m - j) (m - 1).
@@ -538,7 +378,7 @@ Lemma at_most_q t : waits t = true -> Nat.min (low t) (m - j) <= q t.
 Proof.
   intros W. unfold q, q0, q1. destruct (Nat.eqb_spec (waited t) t) as [E|E]; [lia|].
   assert (Le : forall t, waited t <= t) by (clear; induction t; simpl; [|destruct (waits t)]; lia).
-  pose proof (fewer_low t W ltac:(specialize (Le t); lia)). lia.
+  pose proof (fewer_low t without_waits W ltac:(specialize (Le t); lia)). lia.
 Qed.
 
 (** A tick of a stretch. *)

@@ -5,7 +5,8 @@
     Ancestors and lengths are computed by code that need not be trusted, and then verified. *)
 
 Require Import Arith Lia Bool List NArith.
-From Bounds Require Import Sums Model Chains OneTick Account ResponseTime Blocking Workload TaskSet SetBounds.
+From Bounds Require Import Sums Model Chains Shares OneTick Account ResponseTime Blocking Workload TaskSet
+  SetBounds.
 Import ListNotations.
 
 (** A DAG and the bound claimed for it.  Vertices are numbered such that predecessors come first.
@@ -13,6 +14,7 @@ Import ListNotations.
     What is claimed: *)
 Record claim := {
   wcets : list N;               (* by vertex *)
+  shared : option (list nat * list N);  (* by vertex its head, and the WCET of all together; or no two share one *)
   wait_list : list nat;         (* the vertices that are waits; their WCETs are the waits' limits *)
   preds : list (list nat);      (* by vertex: its predecessors *)
   minimum_period : N;
@@ -30,13 +32,13 @@ Record claim := {
   parts : nat;                  (* so many disjoint chains, for the work of this DAG in others' inequalities; *)
   part_of : list nat;           (* by vertex: its chain, or a number from [parts] on *)
   free_chains : nat;            (* j *)
-  chain_of : list nat;          (* by vertex: its chain among j + 1 disjoint ones, or a number above j *)
+  chain_of : list nat;          (* by vertex: its chain among j + 1 disjoint ones (along a path, j), or a number above j *)
   first_level : N;              (* the (m - j)-th largest WCET of those that block, *)
   later_level : N               (* and the (m - max(j, 1))-th; any numbers are right, these are best *)
 }.
 
 Definition no_claim : claim :=
-  {| wcets := []; wait_list := []; preds := []; minimum_period := 1; relative_deadline := 1;
+  {| wcets := []; shared := None; wait_list := []; preds := []; minimum_period := 1; relative_deadline := 1;
      least_deadline := 1; outranked_by := []; keeping := false; known_wcets := false; claimed := false; bound := 0; loss := 0; width := 0; cover := None;
      parts := 0; part_of := []; free_chains := 0; chain_of := []; first_level := 0; later_level := 0 |}.
 
@@ -57,9 +59,15 @@ Definition stated_dag (c : claim) : dag :=
 
 Definition wcetN (c : claim) (v : nat) : N := nth v (wcets c) 0%N.
 
+Definition head_of (c : claim) (v : nat) : nat := match shared c with Some (h, _) => nth v h v | None => v end.
+
+Definition togetherN (c : claim) (v : nat) : N := match shared c with Some (_, t) => nth v t 0%N | None => wcetN c v end.
+
 Definition stated_task (c : claim) : task :=
   {| graph := stated_dag c;
      wcet := fun v => N.to_nat (wcetN c v);
+     head := head_of c;
+     together := fun v => N.to_nat (togetherN c v);
      waits := fun v => existsb (Nat.eqb v) (wait_list c);
      keeps := fun _ => keeping c;
      regular := claimed c; known := known_wcets c;
@@ -130,24 +138,18 @@ Proof.
   rewrite N2Nat.inj_min, workloadN_ok, workload_by_deadlineN_ok. reflexivity.
 Qed.
 
-Definition weightN (c : claim) (k : nat -> bool) : N :=
-  sumN (vertices c) (fun v => if k v then wcetN c v else 0%N).
+Definition weightN (c : claim) (w : nat -> N) (k : nat -> bool) : N :=
+  sumN (vertices c) (fun v => if k v then w v else 0%N).
 
-Lemma weightN_ok c k :
-  N.to_nat (weightN c k) = weight (stated_dag c) (fun v => N.to_nat (wcetN c v)) k.
+Lemma weightN_ok c w k : N.to_nat (weightN c w k) = weight (stated_dag c) (fun v => N.to_nat (w v)) k.
 Proof. apply sumN_ok. intros v _. destruct (k v); reflexivity. Qed.
 
 Definition left_overN (c : claim) (j : nat) (f : nat -> nat) : N :=
-  weightN c (fun v => negb (f v <=? j)).
+  weightN c (togetherN c) (fun v => negb (f v <=? j)).
 
 Lemma left_overN_ok c j f :
-  N.to_nat (left_overN c j f) = left_over (stated_dag c) (fun v => N.to_nat (wcetN c v)) j f.
+  N.to_nat (left_overN c j f) = left_over (stated_dag c) (fun v => N.to_nat (togetherN c v)) j f.
 Proof. apply sumN_ok. intros v _. destruct (f v <=? j); reflexivity. Qed.
-
-Definition volumeN (c : claim) : N := weightN c (fun _ => true).
-
-Lemma volumeN_ok c : N.to_nat (volumeN c) = volume (stated_dag c) (fun v => N.to_nat (wcetN c v)).
-Proof. apply sumN_ok. auto. Qed.
 
 (** ** The graph: ancestors and lengths *)
 
@@ -161,8 +163,9 @@ Definition ancestors (c : claim) : list N :=
 Definition level_from (lv : list N) (l : list nat) : N :=
   fold_right (fun u s => N.max (nth u lv 0%N) s) 0%N l.
 
-Definition levels (c : claim) : list N :=
-  fold_left (fun lv l => lv ++ [(level_from lv l + wcetN c (length lv))%N]) (preds c) [].
+(** The heaviest path to each vertex. *)
+Definition levels (c : claim) (w : nat -> N) : list N :=
+  fold_left (fun lv l => lv ++ [(level_from lv l + w (length lv))%N]) (preds c) [].
 
 Definition all_vertices (c : claim) (p : nat -> bool) : bool := forallb p (seq 0 (vertices c)).
 
@@ -178,9 +181,9 @@ Definition edges_ok (c : claim) : bool :=
 Definition ancestors_ok (c : claim) (anc : list N) : bool :=
   all_vertices c (fun v => (nth v anc 0 =? ancestors_from anc (nth v (preds c) []))%N).
 
-Definition levels_ok (c : claim) (lv : list N) (len : N) : bool :=
+Definition levels_ok (c : claim) (w : nat -> N) (lv : list N) (len : N) : bool :=
   all_vertices c (fun v =>
-    (nth v lv 0 =? level_from lv (nth v (preds c) []) + wcetN c v)%N && (nth v lv 0 <=? len)%N).
+    (nth v lv 0 =? level_from lv (nth v (preds c) []) + w v)%N && (nth v lv 0 <=? len)%N).
 
 Definition is_ancestor (anc : list N) (u v : nat) : bool := N.testbit (nth v anc 0%N) (N.of_nat u).
 
@@ -229,16 +232,16 @@ Proof.
   specialize (IH H). unfold level_from in IH. lia.
 Qed.
 
-Lemma levels_bound c lv len :
-  edges_ok c = true -> levels_ok c lv len = true ->
-  no_path_longer (stated_dag c) (fun v => N.to_nat (wcetN c v)) (N.to_nat len).
+Lemma levels_bound c w lv len :
+  edges_ok c = true -> levels_ok c w lv len = true ->
+  no_path_longer (stated_dag c) (fun v => N.to_nat (w v)) (N.to_nat len).
 Proof.
   intros E L l.
   assert (H : forall l, path (stated_dag c) l ->
     match l with
     | [] => True
     | v :: _ => v < vertices c /\
-        path_length (fun v => N.to_nat (wcetN c v)) l <= N.to_nat (nth v lv 0%N)
+        path_length (fun v => N.to_nat (w v)) l <= N.to_nat (nth v lv 0%N)
     end).
   { clear l. induction l as [|v l IH]; intros P; auto.
     destruct P as (Hv & Ed & P). simpl in Hv. split; [exact Hv|].
@@ -300,6 +303,54 @@ Proof.
   intros u v H Hv Eq. apply (chains_ok_sound c anc l (width c) E A C); auto.
 Qed.
 
+(** ** Segments that share a WCET
+
+    One that is not its head has one predecessor, and this one has one, of the same head and in the same chains. *)
+Definition heads_ok (c : claim) : bool := all_vertices c (fun v =>
+  (head_of c v =? v) ||
+  match nth v (preds c) [] with
+  | [w] => match nth w (preds c) [] with
+    | [u] => (head_of c u =? head_of c v) && Bool.eqb (existsb (Nat.eqb u) (wait_list c)) (existsb (Nat.eqb v) (wait_list c))
+             && (label (part_of c) u =? label (part_of c) v) && (label (chain_of c) u =? label (chain_of c) v)
+    | _ => false
+    end
+  | _ => false
+  end).
+
+Lemma heads_ok_sound c : edges_ok c = true -> heads_ok c = true ->
+  heads_first (stated_dag c) (head_of c) /\ forall v, v < vertices c ->
+  existsb (Nat.eqb (head_of c v)) (wait_list c) = existsb (Nat.eqb v) (wait_list c) /\
+  label (part_of c) (head_of c v) = label (part_of c) v /\ label (chain_of c) (head_of c v) = label (chain_of c) v.
+Proof.
+  intros E Hd.
+  assert (Only : forall w u, nth w (preds c) [] = [u] -> forall z, stated_edge c z w = true -> z = u).
+  { intros w u P z Ez. unfold stated_edge, listed_edge in Ez. rewrite P in Ez. apply andb_true_iff in Ez.
+    destruct Ez as (_ & Ez). simpl in Ez. rewrite orb_false_r in Ez. apply Nat.eqb_eq, Ez. }
+  assert (Local : forall v, v < vertices c -> head_of c v = v \/ exists w u,
+    stated_edge c u w = true /\ stated_edge c w v = true /\ head_of c u = head_of c v /\
+    (forall z, stated_edge c z v = true -> z = w) /\ (forall z, stated_edge c z w = true -> z = u) /\
+    existsb (Nat.eqb u) (wait_list c) = existsb (Nat.eqb v) (wait_list c) /\
+    label (part_of c) u = label (part_of c) v /\ label (chain_of c) u = label (chain_of c) v).
+  { intros v Hv. pose proof (all_vertices_true c _ Hd v Hv) as Q. cbv beta in Q.
+    apply orb_true_iff in Q. destruct Q as [Q|Q]; [left; apply Nat.eqb_eq, Q|right].
+    destruct (nth v (preds c) []) as [|w [|]] eqn:Pv; try discriminate.
+    destruct (nth w (preds c) []) as [|u [|]] eqn:Pw; try discriminate.
+    rewrite !andb_true_iff, !Nat.eqb_eq in Q. destruct Q as (((Q1 & Q2) & Q3) & Q4). apply eqb_prop in Q2.
+    assert (Ew : stated_edge c w v = true) by (apply stated_edge_of_pred; auto; rewrite Pv; left; reflexivity).
+    pose proof (listed_edges_lead_up _ _ w v Ew).
+    exists w, u. split; [apply stated_edge_of_pred; auto; [lia|rewrite Pw; left; reflexivity]|].
+    split; [exact Ew|]. split; [exact Q1|]. split; [apply (Only v w Pv)|]. split; [apply (Only w u Pw)|]. auto. }
+  assert (Heads : heads_first (stated_dag c) (head_of c)).
+  { intros v Hv. destruct (Local v Hv) as [L|(w & u & E1 & E2 & L1 & L2 & L3 & _)]; [auto|right]. exists w, u. auto. }
+  split; [exact Heads|]. intros v Hv.
+  pose proof (of_head (stated_dag c) (head_of c) _ (fun v => (existsb (Nat.eqb v) (wait_list c),
+    (label (part_of c) v, label (chain_of c) v)))) as H.
+  cbv beta in H. specialize (H ltac:(intros z Hz; destruct (Local z Hz) as [L|(w & u & E1 & E2 & L1 & _ & _ & L2 & L3 & L4)];
+    [auto|right]; exists u; pose proof (listed_edges_lead_up _ _ u w E1); pose proof (listed_edges_lead_up _ _ w z E2);
+    split; [lia|]; split; [exact L1|]; rewrite L2, L3, L4; reflexivity) v Hv).
+  injection H. auto.
+Qed.
+
 (** ** Blocking: how often *)
 
 Definition has_some {A} (l : list A) : bool := match l with [] => false | _ => true end.
@@ -315,34 +366,6 @@ Proof.
   destruct (nth v (preds c) []); [discriminate|simpl; lia].
 Qed.
 
-(** How many vertices a path to each has at most. *)
-Definition depths (c : claim) : list nat :=
-  fold_left (fun d l => d ++ [S (fold_right (fun u n => Nat.max (nth u d 0) n) 0 l)]) (preds c) [].
-
-Definition depths_ok (c : claim) (d : list nat) (n : nat) : bool :=
-  all_vertices c (fun v =>
-    forallb (fun u => nth u d 0 <? nth v d 0) (nth v (preds c) []) && (0 <? nth v d 0) && (nth v d 0 <=? n)).
-
-Lemma depths_bound c d n : depths_ok c d n = true -> no_path_longer (stated_dag c) (fun _ => 1) n.
-Proof.
-  intros D.
-  assert (H : forall l, path (stated_dag c) l ->
-    match l with [] => True | v :: _ => v < vertices c /\ path_length (fun _ => 1) l <= nth v d 0 end).
-  { induction l as [|v l IH]; intros P; auto. destruct P as (Hv & Ed & P). simpl in Hv. split; [exact Hv|].
-    pose proof (all_vertices_true c _ D v Hv) as Q. cbv beta in Q. rewrite !andb_true_iff in Q.
-    destruct Q as ((Q & Pos) & _). apply Nat.ltb_lt in Pos. specialize (IH P).
-    unfold path_length in *. cbn [map]. simpl.
-    destruct l as [|u l]; [simpl; lia|]. destruct IH as (Hu & IH). simpl in Ed.
-    rewrite forallb_forall in Q.
-    assert (Iu : In u (nth v (preds c) [])).
-    { unfold stated_edge, listed_edge in Ed. apply andb_true_iff in Ed. destruct Ed as (_ & Ed).
-      apply existsb_exists in Ed. destruct Ed as (x & Hx & Ex). apply Nat.eqb_eq in Ex. subst. auto. }
-    specialize (Q u Iu). apply Nat.ltb_lt in Q. simpl in *. lia. }
-  intros l P. specialize (H l P). destruct l as [|v l]; [unfold path_length; simpl; lia|].
-  destruct H as (Hv & H). pose proof (all_vertices_true c _ D v Hv) as Q. cbv beta in Q.
-  rewrite !andb_true_iff in Q. destruct Q as (_ & Q). apply Nat.leb_le in Q. lia.
-Qed.
-
 (** ** The inequalities *)
 
 Section set.
@@ -352,7 +375,7 @@ Definition work_ofN (k h : nat) (vertices : nat -> bool) (p : nat) (r : N) : N :
   let c := claim_of claims h in
   window_workN (if due_no_later then Some (relative_deadline (claim_of claims k), least_deadline c)
                 else None)
-    (weightN c (fun v => vertices v && negb (existsb (Nat.eqb v) (wait_list c))))
+    (weightN c (togetherN c) (fun v => vertices v && negb (existsb (Nat.eqb v) (wait_list c))))
     (N.of_nat p) (bound c) (minimum_period c) r.
 
 Definition cores_usedN (j h : nat) : nat := Nat.min (m - j) (width (claim_of claims h)).
@@ -398,7 +421,22 @@ Definition blockingN (k j again : nat) : N :=
 
 Definition no_blocking (k : nat) : bool := forallb (fun h => negb (blocksN k h)) (seq 0 (length claims)).
 
-Definition own_keep (c : claim) : bool := keeping c && negb (has_some (wait_list c)).
+Definition outsideN (c : claim) (v : nat) : bool :=
+  negb (existsb (Nat.eqb v) (wait_list c)) && (free_chains c <=? label (chain_of c) v).
+
+Definition on_pathN (c : claim) (every later : N) (v : nat) : N :=
+  (N.of_nat (m - free_chains c) * togetherN c v - (if outsideN c v then togetherN c v else 0)
+   + (if existsb (Nat.eqb v) (wait_list c) then 0
+      else if after_wait (stated_dag c) (fun u => negb (existsb (Nat.eqb u) (wait_list c))) v then every else later))%N.
+
+Definition path_ok (k : nat) (whole : N) : bool :=
+  let c := claim_of claims k in
+  let every := largest_blockingN k m (first_level c) in
+  let later := largest_blockingN k (m - 1) (later_level c) in
+  let lv := levels c (on_pathN c every later) in
+  let most := fold_right N.max 0%N lv in
+  levels_ok c (on_pathN c every later) lv most &&
+  (weightN c (togetherN c) (outsideN c) + (every - later) + whole + most <=? N.of_nat (m - free_chains c) * bound c)%N.
 
 Definition inequality_ok (k : nat) (len : N) : bool :=
   let c := claim_of claims k in
@@ -408,14 +446,14 @@ Definition inequality_ok (k : nat) (len : N) : bool :=
   let room := (N.of_nat (m - j) * (r - len))%N in
   let blocked := blockingN k j (followers c) in
   let whole := (sum_over_othersN k (fun h => whole_workN k j h r) + N.of_nat (m - j) * loss c)%N in
-  let again := pred (fold_right Nat.max 0 (depths c)) in
-  (left + blocked + whole <=? room)%N ||
-  ((j =? 0) && own_keep c && depths_ok c (depths c) (S again) && (left + blockingN k j again + whole <=? room)%N) ||
-  (let clipped := sum_over_othersN k (fun h => clipped_workN k j h r (r - len)) in
-   let lost := N.of_nat (m - j) * loss c in
-   (N.max 1 left + blocked + clipped + lost <=? room) ||
-   (left + blocked + clipped + lost <=? room) &&
-   (sum_over_othersN k (fun h => rising_workN k j h r (r - len)) <? N.of_nat (m - j)))%N.
+  (no_blocking k || negb (has_some (wait_list c))) &&
+  ((left + blocked + whole <=? room)%N ||
+   (let clipped := sum_over_othersN k (fun h => clipped_workN k j h r (r - len)) in
+    let lost := N.of_nat (m - j) * loss c in
+    (N.max 1 left + blocked + clipped + lost <=? room) ||
+    (left + blocked + clipped + lost <=? room) &&
+    (sum_over_othersN k (fun h => rising_workN k j h r (r - len)) <? N.of_nat (m - j)))%N) ||
+  path_ok k whole.
 
 Definition outrankers_ok (k : nat) : bool :=
   forallb (fun h => (h =? k) || negb (outranks (stated_policy due_no_later claims) h k)
@@ -437,14 +475,14 @@ Definition blockers_ok (k : nat) : bool :=
 Definition claim_ok (k : nat) : bool :=
   let c := claim_of claims k in
   let anc := ancestors c in
-  let lv := levels c in
+  let lv := levels c (togetherN c) in
   let len := fold_right N.max 0%N lv in
   wcets_ok c && (0 <? minimum_period c)%N && policy_ok k && edges_ok c &&
   (negb (claimed c) ||
-   known_wcets c && blockers_ok k && edges_ok c && ancestors_ok c anc && levels_ok c lv len && width_ok c anc m &&
+   known_wcets c && blockers_ok k && edges_ok c && ancestors_ok c anc && heads_ok c && levels_ok c (togetherN c) lv len && width_ok c anc m &&
    chains_ok c anc (part_of c) (parts c) && chains_ok c anc (chain_of c) (S (free_chains c)) &&
    (free_chains c <? m) && (len <=? bound c)%N && (bound c <=? minimum_period c)%N &&
-   outrankers_ok k && (no_blocking k || own_keep c) && inequality_ok k len).
+   outrankers_ok k && (no_blocking k || keeping c) && inequality_ok k len).
 
 Definition check : bool := forallb claim_ok (seq 0 (length claims)).
 
@@ -541,10 +579,25 @@ Proof.
   rewrite N2Nat.inj_add, N2Nat.inj_mul, Nat2N.id, !largest_blockingN_ok. reflexivity.
 Qed.
 
-Lemma own_keep_ok k : own_keep (claim_of claims k) = true -> all_keep tau k.
+Lemma no_blocking_ok k : no_blocking k = true -> unblocked (length claims) tau pol k.
 Proof.
-  unfold own_keep. rewrite andb_true_iff, negb_true_iff. intros (Kp & W) v _. simpl.
-  destruct (wait_list (claim_of claims k)); [auto|discriminate].
+  unfold no_blocking. rewrite forallb_forall. intros B h v Hh _.
+  specialize (B h ltac:(apply in_seq; lia)). apply negb_true_iff in B. rewrite blocksN_ok, B. reflexivity.
+Qed.
+
+Lemma on_pathN_ok k every later level0 level1 v :
+  let c := claim_of claims k in
+  N.to_nat every = largest_blocking (length claims) tau pol k m level0 ->
+  N.to_nat later = largest_blocking (length claims) tau pol k (m - 1) level1 ->
+  N.to_nat (on_pathN c every later v)
+  = on_path (length claims) m tau pol k (free_chains c) (label (chain_of c)) level0 level1 v.
+Proof.
+  intros c E1 E2. unfold on_pathN, on_path. rewrite <- E1, <- E2. to_nat. rewrite Nat2N.id. f_equal.
+  - f_equal. unfold outsideN, outside. fold c. change (on_core tau k v) with (negb (existsb (Nat.eqb v) (wait_list c))).
+    destruct (negb (existsb (Nat.eqb v) (wait_list c)) && (free_chains c <=? label (chain_of c) v)); reflexivity.
+  - change (on_core tau k) with (fun v => negb (existsb (Nat.eqb v) (wait_list c))). cbv beta.
+    change (graph (tau k)) with (stated_dag c). destruct (existsb (Nat.eqb v) (wait_list c)); [reflexivity|]. simpl negb.
+    destruct (after_wait (stated_dag c) (fun u => negb (existsb (Nat.eqb u) (wait_list c))) v); reflexivity.
 Qed.
 
 Lemma claim_ok_shown k :
@@ -553,9 +606,9 @@ Lemma claim_ok_shown k :
 Proof.
   unfold claim_ok. cbv zeta. intros Ok Cl. rewrite Cl in Ok. simpl negb in Ok. rewrite orb_false_l in Ok.
   revert Ok.
-  set (c := claim_of claims k). set (len := fold_right N.max 0%N (levels c)).
+  set (c := claim_of claims k). set (len := fold_right N.max 0%N (levels c (togetherN c))).
   rewrite !andb_true_iff.
-  intros (_ & (((((((((((((Kn & Bk) & E) & A) & L) & W) & P) & F) & Hj) & HL) & HR) & O) & B) & I)).
+  intros (_ & ((((((((((((((Kn & Bk) & E) & A) & Hd) & L) & W) & P) & F) & Hj) & HL) & HR) & O) & B) & I)).
   apply Nat.ltb_lt in Hj. apply N.leb_le in HL, HR.
   split; [exact Kn|]. split; [exact Cl|]. split.
   { intros h v Hh _ Bl. rewrite blocksN_ok in Bl. apply andb_true_iff in Bl. destruct Bl as (Bl & _).
@@ -563,66 +616,56 @@ Proof.
     rewrite Bl in Bk. exact Bk. }
   split; [apply (width_ok_sound c (ancestors c)); auto|].
   split; [apply (chains_ok_sound c (ancestors c)); auto|].
+  destruct (heads_ok_sound c E Hd) as (Heads & Same). split; [exact Heads|]. split.
+  { intros v Hv. destruct (Same v Hv) as (On & Pt & _). split; [|exact Pt]. unfold on_core. simpl. fold c. rewrite On. reflexivity. }
   split.
   { intros h Hh N Ou. unfold outrankers_ok in O. rewrite forallb_forall in O.
     specialize (O h ltac:(apply in_seq; lia)). apply Nat.eqb_neq in N. rewrite N in O.
     change (outranks (stated_policy due_no_later claims) h k = true) in Ou. rewrite Ou in O. exact O. }
   split.
-  { apply orb_true_iff in B. destruct B as [B|B]; [left|right; apply own_keep_ok; auto].
-    unfold no_blocking in B. rewrite forallb_forall in B. intros h v Hh _.
-    specialize (B h ltac:(apply in_seq; lia)). apply negb_true_iff in B. rewrite blocksN_ok, B. reflexivity. }
-  unfold inequality_ok in I. cbv zeta in I. fold c in I.
-  set (j := free_chains c) in *. set (deep := pred (fold_right Nat.max 0 (depths c))) in *.
-  assert (Shape : exists again,
-    (left_overN c j (label (chain_of c)) + blockingN k j again
-       + (sum_over_othersN k (fun h => whole_workN k j h (bound c)) + N.of_nat (m - j) * loss c)
-     <= N.of_nat (m - j) * (bound c - len))%N /\
-    (each_counts tau k again \/ each_of_a_path_counts tau k j again) \/
-    (let others := sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len)) in
-     N.max 1 (left_overN c j (label (chain_of c))) + blockingN k j again + others
-       + N.of_nat (m - j) * loss c <= N.of_nat (m - j) * (bound c - len) \/
-     left_overN c j (label (chain_of c)) + blockingN k j again + others
-       + N.of_nat (m - j) * loss c <= N.of_nat (m - j) * (bound c - len) /\
-     sum_over_othersN k (fun h => rising_workN k j h (bound c) (bound c - len)) < N.of_nat (m - j))%N /\
-    each_counts tau k again).
-  { apply orb_true_iff in I. destruct I as [I|I]; [apply orb_true_iff in I; destruct I as [I|I]|].
-    - exists (followers c). left. apply N.leb_le in I. split; [exact I|]. left. apply followers_ok.
-    - exists deep. left. rewrite !andb_true_iff in I. destruct I as (((J & Kp) & De) & I).
-      apply N.leb_le in I. split; [exact I|]. right. split; [apply Nat.eqb_eq, J|].
-      split; [apply own_keep_ok; auto|]. apply (depths_bound c (depths c)), De.
-    - exists (followers c). right. rewrite orb_true_iff, andb_true_iff, N.ltb_lt, !N.leb_le in I.
-      split; [exact I|]. apply followers_ok. }
-  destruct Shape as (again & Ineq).
-  exists j, (label (chain_of c)), (N.to_nat len), again,
-    (N.to_nat (first_level c)), (N.to_nat (later_level c)).
-  split; [auto|]. split; [apply (levels_bound c (levels c) len E L)|].
+  { apply orb_true_iff in B. destruct B as [B|B]; [left; apply no_blocking_ok, B|right; intros v _ _; exact B]. }
+  set (j := free_chains c) in *.
+  set (level0 := N.to_nat (first_level c)). set (level1 := N.to_nat (later_level c)).
+  set (every := largest_blockingN k m (first_level c)). set (later := largest_blockingN k (m - 1) (later_level c)).
+  exists j, (label (chain_of c)), (N.to_nat len), (followers c), level0, level1,
+    (N.to_nat (fold_right N.max 0%N (levels c (on_pathN c every later)))).
+  split; [auto|]. split; [apply (levels_bound c (togetherN c) (levels c (togetherN c)) len E L)|].
   split.
   { intros u v H Hv Eq Le. apply (chains_ok_sound c (ancestors c) (chain_of c) (S (free_chains c))); auto.
     fold j. lia. }
+  split; [intros v Hv; apply (Same v Hv)|].
   split; [unfold R, tau, stated_tasks, stated_task, period; fold c; lia|].
   cbv zeta.
-  change (graph (tau k)) with (stated_dag c).
-  change (wcet (tau k)) with (fun v => N.to_nat (wcetN c v)).
-  rewrite <- left_overN_ok.
-  unfold c at 2 4 6 8. rewrite <- blockingN_ok. fold c.
-  destruct Ineq as [(I' & Of)|(I' & Of)]; [left|right]; (split; [|exact Of]).
-  - unfold first_inequality.
-    rewrite <- (sum_over_othersN_ok k (fun h => whole_workN k j h (bound c)))
-      by (intros; apply work_ofN_ok).
-    change (R k) with (N.to_nat (bound c)). change (ls k) with (N.to_nat (loss c)).
-    rewrite <- (Nat2N.id (m - j)).
-    rewrite <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- !N2Nat.inj_add. lia.
-  - unfold second_inequality. cbv zeta in I' |- *. change (R k) with (N.to_nat (bound c)).
-    rewrite <- (sum_over_othersN_ok k (fun h => clipped_workN k j h (bound c) (bound c - len)))
-      by (intros; rewrite clipped_workN_ok, N2Nat.inj_sub; reflexivity).
-    change (ls k) with (N.to_nat (loss c)). rewrite <- N2Nat.inj_sub.
-    rewrite <- (sum_over_othersN_ok k (fun h => rising_workN k j h (bound c) (bound c - len)))
-      by (intros; apply rising_workN_ok).
-    set (others := sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len))) in *.
-    set (rising := sum_over_othersN k (fun h => rising_workN k j h (bound c) (bound c - len))) in *.
-    rewrite <- (Nat2N.id (m - j)). change 1 with (N.to_nat 1).
-    rewrite <- !N2Nat.inj_mul, <- N2Nat.inj_max, <- !N2Nat.inj_add.
-    destruct I' as [I'|(I' & Up)]; [left|right]; lia.
+  change (together (tau k)) with (fun v => N.to_nat (togetherN c v)). change (R k) with (N.to_nat (bound c)).
+  unfold first_inequality, second_inequality, path_inequality.
+  change (R k) with (N.to_nat (bound c)). change (ls k) with (N.to_nat (loss c)).
+  change (graph (tau k)) with (stated_dag c). change (together (tau k)) with (fun v => N.to_nat (togetherN c v)).
+  rewrite <- left_overN_ok. unfold level0, level1. rewrite <- blockingN_ok, <- !largest_blockingN_ok.
+  rewrite <- (sum_over_othersN_ok k (fun h => whole_workN k j h (bound c))) by (intros; apply work_ofN_ok).
+  rewrite <- (sum_over_othersN_ok k (fun h => clipped_workN k j h (bound c) (bound c - len)))
+    by (intros; rewrite clipped_workN_ok, N2Nat.inj_sub; reflexivity).
+  rewrite <- N2Nat.inj_sub.
+  rewrite <- (sum_over_othersN_ok k (fun h => rising_workN k j h (bound c) (bound c - len)))
+    by (intros; apply rising_workN_ok).
+  set (clipped := sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len))) in *.
+  set (rising := sum_over_othersN k (fun h => rising_workN k j h (bound c) (bound c - len))) in *.
+  change (Nat.max 1) with (Nat.max (N.to_nat 1)). rewrite <- (Nat2N.id (m - j)).
+  fold every later.
+  unfold inequality_ok in I. cbv zeta in I. fold c j in I. apply orb_true_iff in I. destruct I as [I|I]; [left|right].
+  - apply andb_true_iff in I. destruct I as (U & I). split; [|split].
+    + apply orb_true_iff in U. destruct U as [U|U]; [left; apply no_blocking_ok, U|right].
+      intros v _. simpl. fold c. destruct (wait_list c); [reflexivity|discriminate].
+    + apply followers_ok.
+    + rewrite <- N2Nat.inj_max, <- !N2Nat.inj_mul, <- !N2Nat.inj_add.
+      rewrite !orb_true_iff, andb_true_iff, N.ltb_lt, !N.leb_le in I. destruct I as [I|[I|(I & Up)]]; [left|right; left|right; right]; lia.
+  - unfold path_ok in I. cbv zeta in I. fold c j every later in I. apply andb_true_iff in I. destruct I as (Lv & I).
+    split.
+    + intros l Pl. apply Nat.le_trans with (2 := levels_bound c _ _ _ E Lv l Pl). apply Nat.eq_le_incl.
+      unfold path_length. f_equal. apply map_ext. intros v. symmetry. apply on_pathN_ok; [apply largest_blockingN_ok|apply largest_blockingN_ok].
+    + apply N.leb_le in I.
+      change (weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outside tau k j (label (chain_of c))))
+        with (weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outsideN c)).
+      rewrite <- weightN_ok, <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- !N2Nat.inj_add. lia.
 Qed.
 
 Lemma check_each : check = true -> forall k, k < length claims -> claim_ok k = true.

@@ -13,11 +13,12 @@ Import ListNotations.
 Record subtask := {
   priority : N;              (* the smaller, the more urgent *)
   keeps_its_core : bool;     (* until the end of its segment, once it has started *)
-  times : list N;            (* WCETs of its segments (0: unknown) and limits of the waits between, in turn *)
+  times : list N;            (* WCETs of its segments (0: unknown) and limits of the waits between, in turn; if the last
+                                one is 0, but not the first, this is the WCET of all segments together *)
   predecessors : list nat;   (* in the same DAG, of smaller numbers *)
   in_cover : nat;            (* what shows a claim: the number of its chain in a cover of the DAG by chains, *)
   in_part : nat;             (* in a division into chains, *)
-  in_chain : nat             (* and among the j + 1 chains of the bound; else that number of chains *)
+  in_chain : nat             (* and among the j + 1 chains of the bound (along a path, j); else a number above j *)
 }.
 
 Record dag_statement := {
@@ -44,22 +45,34 @@ Record commit := {
 
 (** ** Its meaning: segments and waits as vertices *)
 
-Record vertex := { owner : subtask; time : N; is_wait : bool; before : list nat }.
+Record vertex := { owner : subtask; time : N; is_wait : bool; before : list nat; its_head : nat; all_time : N }.
 
-Fixpoint vertices_of (v : subtask) (charge : N) (wait : bool) (at_ : nat) (pre : list nat) (ts : list N) : list vertex :=
+(** Segments may share a WCET, with the first one, [first]. *)
+Fixpoint vertices_of (v : subtask) (charge : N) (first : option (nat * N)) (wait : bool) (at_ : nat) (pre : list nat)
+    (ts : list N) : list vertex :=
   match ts with
   | [] => []
   | t :: ts =>
-      {| owner := v; time := (if wait || (t =? 0) then t else t + charge)%N; is_wait := wait; before := pre |}
-      :: vertices_of v charge (negb wait) (S at_) [at_] ts
+      let own := (if wait || (t =? 0) then t else t + charge)%N in
+      {| owner := v; is_wait := wait; before := pre;
+         time := match first with Some (_, c) => if wait then t else (c + charge)%N | None => own end;
+         its_head := match first with Some (h, _) => if wait then at_ else h | None => at_ end;
+         all_time := match first with
+           | Some (h, c) => if wait then t
+               else if at_ =? h then (c + charge * N.of_nat (S (Nat.div2 (length ts))))%N else 0%N
+           | None => own
+           end |}
+      :: vertices_of v charge first (negb wait) (S at_) [at_] ts
   end.
 
-(** The vertices, predecessors first; [last]: of each subtask the last one. *)
+(** The vertices, predecessors first; [lasts]: of each subtask the last one. *)
 Definition expand (charge : N) (vs : list subtask) : list vertex :=
   fst (fold_left (fun (x : list vertex * list nat) v =>
-    let (found, last) := x in
-    let new := vertices_of v charge false (length found) (map (fun u => nth u last 0) (predecessors v)) (times v) in
-    (found ++ new, last ++ [length found + length new - 1])) vs ([], [])).
+    let (found, lasts) := x in
+    let whole := hd 0%N (times v) in
+    let first := if ((0 <? whole) && (last (times v) 0 =? 0))%N then Some (length found, whole) else None in
+    let new := vertices_of v charge first false (length found) (map (fun u => nth u lasts 0) (predecessors v)) (times v) in
+    (found ++ new, lasts ++ [length found + length new - 1])) vs ([], [])).
 
 (** Each subtask has a segment, begins and ends with one, and its predecessors have smaller numbers. *)
 Definition subtasks_ok (d : dag_statement) : bool :=
@@ -117,7 +130,7 @@ Definition claim_at (claimed_too : bool) (k : nat) : claim :=
   let d := dag_at k in
   let vs := expand (overhead c) (subtasks d) in
   let m := machine_cores c in
-  {| wcets := map time vs;
+  {| wcets := map time vs; shared := Some (map its_head vs, map all_time vs);
      wait_list := flat_map (fun p => if is_wait (snd p) then [fst p] else []) (combine (seq 0 (length vs)) vs);
      preds := map before vs;
      minimum_period := least_gap d; relative_deadline := due d; least_deadline := least_due d;
@@ -133,7 +146,7 @@ Definition claim_at (claimed_too : bool) (k : nat) : claim :=
 (** The DAGs as tasks: as the claims' (Checker.v), but each subtask keeps its core just if it is stated to, and of
     DAGs without claims no rank and no end is asked. *)
 Definition with_keeps (t : task) (kept : nat -> bool) (is_regular : bool) : task :=
-  {| graph := graph t; wcet := wcet t; waits := waits t; keeps := kept; regular := is_regular; known := known t;
+  {| graph := graph t; wcet := wcet t; head := head t; together := together t; waits := waits t; keeps := kept; regular := is_regular; known := known t;
      period := period t; deadline := deadline t; first_deadline := first_deadline t |}.
 
 Definition kept_at (k v : nat) : bool :=
@@ -183,6 +196,7 @@ Proof.
   - apply R.
   - intros k n v Hk Hv. destruct (executions _ _ _ _ _ R k n v Hk Hv) as (A & B). split; auto.
   - apply R.
+  - apply R.
   - intros t. apply Nat.le_trans with (2 := cores _ _ _ _ _ R t). apply sum_le. intros k Hk.
     apply sum_le. intros n _. apply sum_le. intros v Hv. unfold on_core, holds_core. simpl.
     specialize (H1 k v Hk Hv). destruct (waits (tau k) v); simpl; [lia|].
@@ -213,6 +227,7 @@ Proof.
   - intros k Hk. rewrite <- (Eq k Hk). apply (periods_positive _ _ _ _ _ R k Hk).
   - intros k n Hk. rewrite <- (Eq k Hk). apply (sporadic _ _ _ _ _ R k n Hk).
   - intros k n v Hk. rewrite <- (Eq k Hk). apply (executions _ _ _ _ _ R k n v Hk).
+  - intros k n v Hk. rewrite <- (Eq k Hk). apply (shared_executions _ _ _ _ _ R k n v Hk).
   - intros t k n v Hk. unfold instance_ready. rewrite <- (Eq k Hk). apply (only_ready_execute _ _ _ _ _ R t k n v Hk).
   - intros t. apply Nat.le_trans with (2 := cores _ _ _ _ _ R t). apply sum_le. intros k Hk.
     unfold cores_held, on_core, holds_core. rewrite (Eq k Hk). lia.

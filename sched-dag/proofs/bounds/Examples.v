@@ -132,7 +132,7 @@ Proof.
 Defined.
 
 Definition simple_task (edges : list (nat * nat)) (wcets wait_list : list nat) (keep : bool) (T D : nat) : task :=
-  {| graph := dag_of edges (length wcets); wcet := fun v => nth v wcets 0;
+  {| graph := dag_of edges (length wcets); wcet := fun v => nth v wcets 0; head := fun v => v; together := fun v => nth v wcets 0;
      waits := fun v => existsb (Nat.eqb v) wait_list; keeps := fun _ => keep; regular := true; known := true;
      period := T; deadline := D; first_deadline := D |}.
 
@@ -171,7 +171,8 @@ Proof. apply lap_obeys_the_rules. vm_compute. reflexivity. Qed.
 (** The same where DAG 2 has no claim, so that its jobs may be stopped and cut: its only subtask idles in tick 5, and
     is aborted after 3 ticks. *)
 Definition third_is_cut (k : nat) : task :=
-  if k =? 2 then {| graph := graph (three_dags 2); wcet := wcet (three_dags 2); waits := fun _ => false;
+  if k =? 2 then {| graph := graph (three_dags 2); wcet := wcet (three_dags 2); head := fun v => v;
+    together := wcet (three_dags 2); waits := fun _ => false;
     keeps := fun _ => false; regular := false; known := true; period := 12; deadline := 12; first_deadline := 12 |}
   else three_dags k.
 
@@ -202,14 +203,14 @@ Example kept_core_blocks : ~ job_complete long_task_keeps kept_core (release kep
 Proof. intros C. specialize (C 0 ltac:(simpl; lia)). vm_compute in C. lia. Qed.
 
 Definition urgent_claim (r : N) : claim :=
-  {| wcets := [1]%N; wait_list := []; preds := [[]];
+  {| wcets := [1]%N; shared := None; wait_list := []; preds := [[]];
      minimum_period := 8; relative_deadline := 8; least_deadline := 8;
      outranked_by := []; keeping := true; known_wcets := true; claimed := true; bound := r; loss := 0;
      width := 1; cover := None; parts := 0; part_of := [0]; free_chains := 0; chain_of := [0];
      first_level := 3; later_level := 3 |}.
 
 Definition no_claim_of_3 : claim :=
-  {| wcets := [3]%N; wait_list := []; preds := [[]];
+  {| wcets := [3]%N; shared := None; wait_list := []; preds := [[]];
      minimum_period := 8; relative_deadline := 8; least_deadline := 8;
      outranked_by := [0]; keeping := true; known_wcets := true; claimed := false; bound := 0; loss := 0;
      width := 1; cover := None; parts := 0; part_of := [0]; free_chains := 0; chain_of := [0];
@@ -226,14 +227,14 @@ Proof. vm_compute. auto. Qed.
 Definition ms (n : N) : N := (n * 1000000)%N.
 
 Definition diamond : claim :=
-  {| wcets := map ms [1; 2; 2; 1]%N; wait_list := []; preds := [[]; [0]; [0]; [1; 2]];
+  {| wcets := map ms [1; 2; 2; 1]%N; shared := None; wait_list := []; preds := [[]; [0]; [0]; [1; 2]];
      minimum_period := ms 10; relative_deadline := ms 10; least_deadline := ms 10;
      outranked_by := []; keeping := false; known_wcets := true; claimed := true; bound := ms 4; loss := 0;
      width := 2; cover := Some [0; 0; 1; 0]; parts := 2; part_of := [0; 0; 1; 0];
      free_chains := 1; chain_of := [0; 0; 1; 0]; first_level := 0; later_level := 0 |}.
 
 Definition fork (r : N) : claim :=
-  {| wcets := map ms [1; 3; 3; 3; 1]%N; wait_list := []; preds := [[]; [0]; [0]; [0]; [1; 2; 3]];
+  {| wcets := map ms [1; 3; 3; 3; 1]%N; shared := None; wait_list := []; preds := [[]; [0]; [0]; [0]; [1; 2; 3]];
      minimum_period := ms 20; relative_deadline := ms 20; least_deadline := ms 20;
      outranked_by := [0]; keeping := false; known_wcets := true; claimed := true; bound := r; loss := 0;
      width := 3; cover := Some [0; 0; 1; 2; 0]; parts := 3; part_of := [0; 0; 1; 2; 0];
@@ -264,7 +265,7 @@ Qed.
     itself loses 1 of any 10 ticks, and yet the job is late for the bound with a loss of 1.  What counts are the ticks
     in which *any* core is lost, 2, and with these the bound is refused. *)
 Definition two_subtasks (lost : N) : claim :=
-  {| wcets := [2; 2]%N; wait_list := []; preds := [[]; []];
+  {| wcets := [2; 2]%N; shared := None; wait_list := []; preds := [[]; []];
      minimum_period := 10; relative_deadline := 10; least_deadline := 10;
      outranked_by := []; keeping := false; known_wcets := true; claimed := true; bound := 3; loss := lost;
      width := 2; cover := Some [0; 1]; parts := 2; part_of := [0; 1];
@@ -288,7 +289,7 @@ Qed.
 
 (** ** Statements that no run obeys are refused *)
 Definition small (outranked : list nat) (w D least r : N) : claim :=
-  {| wcets := [w]; wait_list := []; preds := [[]];
+  {| wcets := [w]; shared := None; wait_list := []; preds := [[]];
      minimum_period := 10; relative_deadline := D; least_deadline := least;
      outranked_by := outranked; keeping := false; known_wcets := true; claimed := true; bound := r; loss := 0;
      width := 1; cover := None; parts := 0; part_of := [0]; free_chains := 0; chain_of := [0];

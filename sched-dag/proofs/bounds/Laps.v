@@ -59,7 +59,9 @@ Definition vertex_ok (u k v : nat) : bool :=
 Definition dag_ok (k : nat) : bool :=
   (0 <? period (tau k)) && (period (tau k) <=? lap) && (offset k <? lap) &&
   forallb (fun v => (waits (tau k) v || negb (regular (tau k)) || (0 <? ex k v)) && (negb (known (tau k)) || (ex k v <=? wcet (tau k) v))
-                    && over lap k v) (vs k).
+                    && over lap k v) (vs k) &&
+  (negb (known (tau k)) || forallb (fun v =>
+     sum (size (graph (tau k))) (fun u => if head (tau k) u =? v then ex k u else 0) <=? together (tau k) v) (vs k)).
 
 Definition lap_ok : bool :=
   forallb dag_ok (seq 0 K) &&
@@ -107,8 +109,8 @@ Lemma vertices_of k v : k < K -> v < size (graph (tau k)) ->
   (waits (tau k) v || negb (regular (tau k)) || (0 <? ex k v)) = true /\ (negb (known (tau k)) || (ex k v <=? wcet (tau k) v)) = true /\
   forall u, lap <= u -> over u k v = true.
 Proof.
-  intros Hk Hv. pose proof (dags k Hk) as D. unfold dag_ok in D. apply andb_true_iff in D. destruct D as (_ & D).
-  rewrite forallb_forall in D. specialize (D v ltac:(apply in_seq; lia)). rewrite !andb_true_iff in D.
+  intros Hk Hv. pose proof (dags k Hk) as D. unfold dag_ok in D. apply andb_true_iff in D. destruct D as (D & _).
+  apply andb_true_iff in D. destruct D as (_ & D). rewrite forallb_forall in D. specialize (D v ltac:(apply in_seq; lia)). rewrite !andb_true_iff in D.
   destruct D as ((D1 & D2) & D3). repeat (split; auto). intros u Hu. unfold over in *.
   apply Nat.leb_le in D3. apply Nat.leb_le.
   pose proof (sum_more lap u (fun i => Nat.b2n (on i k v)) Hu). unfold done_in, count in *. lia.
@@ -220,6 +222,8 @@ Proof.
   - intros k n v Hk Hv. destruct (vertices_of k v Hk Hv) as (E & W & _). cbn [lap_run job_exec]. split.
     + intros Wt Rg. rewrite Wt, Rg in E. apply Nat.ltb_lt, E.
     + intros Kn. rewrite Kn in W. apply Nat.leb_le, W.
+  - intros k n v Hk Hv Kn. pose proof (dags k Hk) as D. unfold dag_ok in D. apply andb_true_iff in D. destruct D as (_ & D).
+    rewrite Kn in D. simpl in D. rewrite forallb_forall in D. apply Nat.leb_le, D, in_seq. lia.
   - intros t k n v Hk Hv E. destruct (positive k Hk) as (L & _). destruct (the_tick t L) as (Lt & Eq & Le & _).
     apply executes_now in E; auto. destruct E as (-> & O).
     destruct (ticks (t mod lap) Lt) as (_ & V). specialize (V k v Hk Hv). unfold vertex_ok in V.

@@ -33,6 +33,8 @@ Definition no_core_claim : core_claim :=
 Definition core_task (c : core_claim) : task :=
   {| graph := stated_dag (of_dag c);
      wcet := fun v => N.to_nat (wcetN (of_dag c) v);
+     head := head_of (of_dag c);
+     together := fun v => N.to_nat (togetherN (of_dag c) v);
      waits := fun v => existsb (Nat.eqb v) (wait_list (of_dag c));
      keeps := keeps_at c;
      regular := true;
@@ -241,7 +243,7 @@ Definition interferenceN (a : N) (blocking : option (nat * nat)) (x : N) : N :=
   sumN (length cs) (fun h =>
     if h =? k then own_jobsN a x else work_of_otherN a (first_releaseN a blocking h) x h).
 
-Definition target_workN : N := weightN (dag_of k) part.
+Definition target_workN : N := weightN (dag_of k) (wcetN (dag_of k)) part.
 
 Definition completesN (a : N) (blocking : option (nat * nat)) (X : N) : bool :=
   (blocking_timeN blocking + target_workN + interferenceN a blocking X + lossN bursts X <=? X)%N.

@@ -38,7 +38,7 @@ Definition subtask_of (d : dag_statement) : list nat :=
   flat_map (fun p => repeat (fst p) (length (times (snd p)))) (combine (seq 0 (length (subtasks d))) (subtasks d)).
 
 Definition with_bound (c : claim) (r : option N) : claim :=
-  {| wcets := wcets c; wait_list := wait_list c; preds := preds c; minimum_period := minimum_period c;
+  {| wcets := wcets c; shared := shared c; wait_list := wait_list c; preds := preds c; minimum_period := minimum_period c;
      relative_deadline := relative_deadline c; least_deadline := least_deadline c; outranked_by := outranked_by c;
      keeping := keeping c; known_wcets := known_wcets c;
      claimed := match r with Some _ => true | None => false end;

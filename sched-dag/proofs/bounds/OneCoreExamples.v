@@ -118,7 +118,7 @@ Proof. vm_compute. auto. Qed.
 Definition core_dag (works : list N) (before : list (list nat)) (key : N) (keep : bool) (gap : N)
   (r busy : N) (ps : list (N * list N)) : core_claim :=
   {| of_dag :=
-       {| wcets := works; wait_list := []; preds := before; minimum_period := gap; relative_deadline := key;
+       {| wcets := works; shared := None; wait_list := []; preds := before; minimum_period := gap; relative_deadline := key;
           least_deadline := key; outranked_by := []; keeping := keep; known_wcets := true; claimed := true; bound := r;
           loss := 0; width := 1; cover := None; parts := 0; part_of := []; free_chains := 0; chain_of := [];
           first_level := 0; later_level := 0 |};

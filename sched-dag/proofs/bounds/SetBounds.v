@@ -1,7 +1,8 @@
 (** * The bounds of a set of sporadic DAGs *)
 
 Require Import Arith Lia Bool List.
-From Bounds Require Import Sums Model Chains OneTick Account ResponseTime Blocking Workload TaskSet.
+From Bounds Require Import Sums Model Chains Shares OneTick Account ResponseTime AlongAPath Blocking Workload
+  TaskSet.
 
 (** ** What has to be shown of each DAG: an inequality between numbers
 
@@ -20,7 +21,7 @@ Variables (bounded : nat -> bool) (R loss width parts : nat -> nat) (part : nat 
     DAG k, on at most p cores at once. *)
 Definition work_of (k h : nat) (vertices : nat -> bool) (p r : nat) : nat :=
   window_work (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None)
-              (weight (graph (tau h)) (wcet (tau h)) (fun v => vertices v && on_core tau h v))
+              (weight (graph (tau h)) (together (tau h)) (fun v => vertices v && on_core tau h v))
               p (R h) (period (tau h)) r.
 
 (** Cores that count: m - j at most, and no more than the DAG can use. *)
@@ -68,17 +69,15 @@ Definition unblocked (k : nat) : Prop :=
 Definition blockers_known (k : nat) : Prop :=
   forall h v, h < K -> v < size (graph (tau h)) -> blocks k h v = true -> known (tau h) = true.
 
-(** All subtasks of DAG k keep their cores, and none waits for a device. *)
+(** All segments of DAG k keep their cores; none waits for a device. *)
 Definition all_keep (k : nat) : Prop :=
-  forall v, v < size (graph (tau k)) -> waits (tau k) v = false /\ keeps (tau k) v = true.
+  forall v, v < size (graph (tau k)) -> waits (tau k) v = false -> keeps (tau k) v = true.
+
+Definition without_waits (k : nat) : Prop := forall v, v < size (graph (tau k)) -> waits (tau k) v = false.
 
 (** As often as there are subtasks with a predecessor. *)
 Definition each_counts (k again : nat) : Prop :=
   count (size (graph (tau k))) (has_predecessor (graph (tau k))) <= again.
-
-(** Or, without free chains, as often as a path has such subtasks. *)
-Definition each_of_a_path_counts (k j again : nat) : Prop :=
-  j = 0 /\ all_keep k /\ no_path_longer (graph (tau k)) (fun _ => 1) (S again).
 
 (** *** The inequalities *)
 
@@ -92,21 +91,44 @@ Definition second_inequality (k j len left blocked : nat) : Prop :=
   left + blocked + others + (m - j) * loss k <= (m - j) * (R k - len) /\
   sum_over_others k (fun h => rising_work k j h (R k) (R k - len)) < m - j.
 
+(** *** Along a path
+
+    Off the path and j chains, m - j cores execute the DAG's segments; waits there are no work.  What keeps its core
+    blocks each segment of the path: by the m - 1 largest, but by the m largest at the release and after a wait. *)
+Definition outside (k j : nat) (f : nat -> nat) (v : nat) : bool := on_core tau k v && (j <=? f v).
+
+Definition on_path (k j : nat) (f : nat -> nat) (level0 level1 v : nat) : nat :=
+  (m - j) * together (tau k) v - (if outside k j f v then together (tau k) v else 0)
+  + (if on_core tau k v
+     then if after_wait (graph (tau k)) (on_core tau k) v then largest_blocking k m level0
+          else largest_blocking k (m - 1) level1
+     else 0).
+
+Definition path_inequality (k j : nat) (f : nat -> nat) (level0 level1 most : nat) : Prop :=
+  no_path_longer (graph (tau k)) (on_path k j f level0 level1) most /\
+  weight (graph (tau k)) (together (tau k)) (outside k j f)
+  + (largest_blocking k m level0 - largest_blocking k (m - 1) level1)
+  + sum_over_others k (fun h => whole_work k j h (R k)) + (m - j) * loss k + most <= (m - j) * R k.
+
 Definition shown (k : nat) : Prop :=
   known (tau k) = true /\ regular (tau k) = true /\ blockers_known k /\
   enough_cores m tau k (width k) /\
   disjoint_parts (graph (tau k)) (parts k) (part k) /\
+  heads_first (graph (tau k)) (head (tau k)) /\
+  (forall v, v < size (graph (tau k)) ->
+     on_core tau k (head (tau k) v) = on_core tau k v /\ part k (head (tau k) v) = part k v) /\
   (forall h, h < K -> h <> k -> outranks pol h k = true -> bounded h = true) /\
   (unblocked k \/ all_keep k) /\
-  exists j f len again level0 level1,
+  exists j f len again level0 level1 most,
     j < m /\
-    no_path_longer (graph (tau k)) (wcet (tau k)) len /\
-    disjoint_chains (graph (tau k)) j f /\
+    no_path_longer (graph (tau k)) (together (tau k)) len /\
+    disjoint_chains (graph (tau k)) j f /\ (forall v, v < size (graph (tau k)) -> f (head (tau k) v) = f v) /\
     len <= R k <= period (tau k) /\
-    let left := left_over (graph (tau k)) (wcet (tau k)) j f in
+    let left := left_over (graph (tau k)) (together (tau k)) j f in
     let blocked := blocking k j again level0 level1 in
-    first_inequality k j len left blocked /\ (each_counts k again \/ each_of_a_path_counts k j again) \/
-    second_inequality k j len left blocked /\ each_counts k again.
+    (unblocked k \/ without_waits k) /\ each_counts k again /\
+    (first_inequality k j len left blocked \/ second_inequality k j len left blocked) \/
+    path_inequality k j f level0 level1 most.
 
 End inequalities.
 
@@ -411,22 +433,39 @@ Proof.
   lia.
 Qed.
 
+Lemma nothing_low t : unblocked K tau pol k -> low (K * Z) (low_holds k n) t = 0.
+Proof.
+  intros U. apply sum_zero. intros l Hl. destruct (low_holds k n t l) eqn:E; auto. exfalso.
+  destruct (low_in_reach _ l Hl E) as (h & w & -> & Hh & Hw & Ex).
+  destruct (holds_low_true k n _ h w Ex) as (Hw' & Bl & _). rewrite U in Bl; auto. discriminate.
+Qed.
+
+(** While it waits, its segments and others have all cores. *)
+Lemma cores_conserved t : somebody_waits G run t = true ->
+  m <= own_cores G run (on_core tau k) t + others run t.
+Proof.
+  intros W. set (b := release s k n + t).
+  change (others run t) with (if somebody_waits G run t
+    then if lost s b then m else sum K (task_cores tau s b) - job_cores tau s b k n else 0).
+  change (own_cores G run (on_core tau k) t) with (job_cores tau s b k n). rewrite W.
+  apply somebody_waits_true in W. destruct W as (x & Rd & Ex). destruct (waiting_instance t x Rd Ex) as (Wv & Ri).
+  destruct (lost s b) eqn:Lo; [lia|].
+  destruct (dispatch _ _ _ _ _ rules b k n x in_K is_regular Wv Lo Ri (earlier_at t) Ex) as (All & _). lia.
+Qed.
+
 Section keeping.
 Hypothesis own : all_keep tau k.
 
-Lemma run_keeps_cores : keeps_cores G m run (K * Z) (low_holds k n) (longest_low k)
+Lemma run_keeps_cores : keeps_cores G m run (on_core tau k) (K * Z) (low_holds k n) (longest_low k)
   (fun t => if t <? period (tau k) then higher t else others run t) lost_tick.
 Proof.
   constructor.
   - exact run_legal.
   - intros t. rewrite count_low. set (b := release s k n + t).
     apply Nat.le_trans with (2 := cores _ _ _ _ _ rules b).
-    assert (B : busy G run t <= cores_held tau s b k).
-    { apply Nat.le_trans with (2 := executing_is_held tau s b k).
-      apply Nat.le_trans with (job_cores tau s b k n).
-      - apply sum_le. intros v Hv. simpl. unfold on_core. destruct (own v Hv) as (-> & _). apply Nat.le_refl.
-      - apply (sum_term (S b) (job_cores tau s b k)).
-        pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia. }
+    assert (B : own_cores G run (on_core tau k) t <= cores_held tau s b k).
+    { apply Nat.le_trans with (2 := executing_is_held tau s b k). apply (sum_term (S b) (job_cores tau s b k)).
+      pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia. }
     apply Nat.le_trans with (sum K (fun h => (if h =? k then cores_held tau s b k else 0)
       + count Z (holds_low k n b h))).
     + rewrite sum_plus. apply Nat.add_le_mono_r.
@@ -451,11 +490,14 @@ Proof.
            destruct (Nat.ltb_spec (size (graph (tau h)) + w) (size (graph (tau h)))); [lia|reflexivity].
   - intros t. destruct (Nat.ltb_spec t (period (tau k))); [|lia].
     pose proof (others_are_other_dags t H). destruct (somebody_waits G run t), (lost_tick t); simpl in *; lia.
-  - intros t v Hv Lo D N. simpl. destruct (own v Hv) as (C & Kp).
+  - intros t v Hv C Lo D N. simpl. apply negb_true_iff in C.
     rewrite (job_done_in_run K m tau pol s rules _ k n v in_K Hv) in D.
     apply (keeps_core _ _ _ _ _ rules); auto.
     + apply Nat.ltb_lt, D.
     + intros F. apply N. apply (job_finished_in_run K m tau pol s rules); auto.
+  - intros v Hv C. apply (executions _ _ _ _ _ rules k n v in_K Hv); auto. apply negb_true_iff, C.
+  - intros t v C Rd. destruct (runs run t v) eqn:E; auto. destruct (waiting_instance t v Rd E) as (W & _).
+    unfold on_core in C. rewrite W in C. discriminate.
   - intros t l Hl W E. apply low_held_before; auto.
   - intros b c l Hl H. apply (low_ends b c l Hl H).
 Qed.
@@ -463,26 +505,77 @@ Qed.
 End keeping.
 
 Lemma blocked_at_most_in_set j again level0 level1 r :
-  unblocked K tau pol k \/ all_keep tau k -> each_counts tau k again ->
+  unblocked K tau pol k \/ all_keep tau k -> unblocked K tau pol k \/ without_waits tau k -> each_counts tau k again ->
   sum r (fun t => if somebody_waits G run t && negb (lost_tick t)
                   then Nat.min (low (K * Z) (low_holds k n) t) (m - j) else 0)
   <= blocking K m tau pol k j again level0 level1.
 Proof.
-  intros [U|A] Often.
-  - rewrite sum_zero; [lia|]. intros t _.
-    assert (Z0 : low (K * Z) (low_holds k n) t = 0).
-    { apply sum_zero. intros l Hl. destruct (low_holds k n t l) eqn:E; auto. exfalso.
-      destruct (low_in_reach _ l Hl E) as (h & w & -> & Hh & Hw & Ex).
-      destruct (holds_low_true k n _ h w Ex) as (Hw' & Bl & _). rewrite U in Bl; auto. discriminate. }
-    rewrite Z0. destruct (somebody_waits G run t && negb (lost_tick t)); auto.
+  intros Own Waits Often.
+  assert (Cases : unblocked K tau pol k \/ all_keep tau k /\ without_waits tau k) by tauto.
+  destruct Cases as [U|(A & On)].
+  - rewrite sum_zero; [lia|]. intros t _. rewrite nothing_low by auto.
+    destruct (somebody_waits G run t && negb (lost_tick t)); auto.
   - pose proof (run_keeps_cores A) as Rk.
-    pose proof (blocked_at_most _ _ _ _ _ _ _ _ Rk j level0 level1 r) as B.
+    pose proof (blocked_at_most _ _ _ _ _ _ _ _ _ Rk
+      ltac:(intros v Hv; apply negb_true_iff; apply On; auto) j level0 level1 r) as B.
     unfold Blocking.blocking in B. rewrite !largest_low in B.
     match type of B with _ <= ?most => apply Nat.le_trans with most end;
       [|unfold blocking; apply Nat.add_le_mono_l, Nat.mul_le_mono_r, Often].
     apply Nat.le_trans with (2 := B). apply sum_le. intros t _.
     destruct (somebody_waits G run t) eqn:W; [|simpl; lia]. destruct (lost_tick t) eqn:Lo; [simpl; lia|].
-    rewrite (waits_or_skip _ _ _ _ _ _ _ _ Rk t W Lo). simpl. lia.
+    rewrite (waits_or_skip _ _ _ _ _ _ _ _ _ Rk t W Lo). simpl. lia.
+Qed.
+
+Lemma bounded_along_a_path j f level0 level1 most I r :
+  j < m -> disjoint_chains G j f -> (forall v, v < size G -> f (head (tau k) v) = f v) ->
+  heads_first G (head (tau k)) -> (forall v, v < size G -> on_core tau k (head (tau k) v) = on_core tau k v) ->
+  known (tau k) = true -> unblocked K tau pol k \/ all_keep tau k ->
+  r <= period (tau k) -> sum r (fun t => Nat.min (higher t) (m - j)) <= I ->
+  no_path_longer G (on_path K m tau pol k j f level0 level1) most ->
+  weight G (together (tau k)) (outside tau k j f)
+  + (largest_blocking K tau pol k m level0 - largest_blocking K tau pol k (m - 1) level1) + I + most <= (m - j) * r ->
+  complete G run r.
+Proof.
+  intros Hj D F Heads On Kn Own Hr HI Most H. rewrite <- !largest_low in H.
+  assert (Sums : forall b, b < size G -> sum (size G) (fun v => if head (tau k) v =? b then job_exec s k n v else 0)
+    <= together (tau k) b) by (intros b Hb; apply (shared_executions _ _ _ _ _ rules); auto).
+  assert (Out : forall v, v < size G -> outside tau k j f (head (tau k) v) = outside tau k j f v)
+    by (intros v Hv; unfold outside; rewrite F, On; auto).
+  pose proof (shared_weight G (head (tau k)) Heads _ _ Sums (outside tau k j f)
+    ltac:(intros v Hv E; rewrite Out; auto)) as Less.
+  set (counts := counted m (K * Z) (low_holds k n) lost_tick).
+  assert (None : unblocked K tau pol k -> forall t, counts t = 0).
+  { intros U t. unfold counts, counted. rewrite nothing_low by auto. destruct (lost_tick t); auto. }
+  assert (Zero : unblocked K tau pol k -> forall a d v, sum d (fun i => if runs run (a + i) v then 0 else counts (a + i)) = 0).
+  { intros U a d v. apply sum_zero. intros i _. rewrite None by auto. destruct (runs run (a + i) v); auto. }
+  refine (along_a_path G m run run_legal counts
+    (blocked_at G m (on_core tau k) (K * Z) (longest_low k) level0 level1)
+    (largest m level0 (K * Z) (longest_low k) - largest (m - 1) level1 (K * Z) (longest_low k)) _ _
+    (job_exec s k n) (m - j) (outside tau k j f) higher r I most _ (fun v _ => le_n _) _ HI _ _); [| |lia| | |lia].
+  - intros d v Hv Rd. destruct Own as [U|A]; [rewrite Zero by auto; lia|].
+    apply (blocked_at_release _ _ _ _ _ _ _ _ _ (run_keeps_cores A)); auto.
+  - intros p d v Hv Rd Np. destruct Own as [U|A]; [rewrite Zero by auto; lia|].
+    apply (blocked_later _ _ _ _ _ _ _ _ _ (run_keeps_cores A)); auto.
+  - intros t Ht Wt. pose proof (cores_conserved t Wt) as C. pose proof (others_are_other_dags t ltac:(lia)) as O.
+    rewrite Wt in O. unfold counts, counted.
+    assert (Own_cores : own_cores G run (on_core tau k) t <= count (size G) (fun v => (f v <? j) && runs run t v)
+      + count (size G) (fun v => outside tau k j f v && runs run t v)).
+    { unfold own_cores, outside, count. rewrite <- sum_plus. apply sum_le. intros v _.
+      destruct (on_core tau k v), (runs run t v), (Nat.ltb_spec (f v) j), (Nat.leb_spec j (f v)); simpl; lia. }
+    rewrite by_chains in Own_cores.
+    assert (J : sum j (fun z => count (size G) (fun v => (f v =? z) && runs run t v)) <= j).
+    { apply Nat.le_trans with (sum j (fun _ => 1)); [|rewrite sum_const; lia]. apply sum_le. intros z Hz.
+      apply (one_of_a_part G m run run_legal t j f z); auto. intros u v Huv Hv E L. apply D; auto. lia. }
+    destruct (lost_tick t); simpl andb in O; cbv iota in O; lia.
+  - unfold on_path in Most. rewrite <- !largest_low in Most.
+    apply (shared_paths G (head (tau k)) Heads (fun v => (m - j) * job_exec s k n v - (if outside tau k j f v then job_exec s k n v else 0))
+      (fun v => (m - j) * together (tau k) v - (if outside tau k j f v then together (tau k) v else 0))); [|exact Most].
+    intros b Hb. pose (q := m - j - (if outside tau k j f b then 1 else 0)).
+    apply Nat.le_trans with (sum (size G) (fun v => q * (if head (tau k) v =? b then job_exec s k n v else 0))).
+    + apply sum_le. intros v Hv. destruct (Nat.eqb_spec (head (tau k) v) b) as [E|]; [|lia].
+      unfold q. rewrite <- E, Out by auto. destruct (outside tau k j f v); nia.
+    + rewrite sum_times. specialize (Sums b Hb). apply (Nat.mul_le_mono_l _ _ q) in Sums.
+      unfold q in *. destruct (outside tau k j f b); nia.
 Qed.
 
 End one.
@@ -504,8 +597,8 @@ Proof.
   { induction now as [now IH] using (well_founded_induction lt_wf). intros k n Hk Bk Now.
     assert (Kept : forall h, h < K -> bounded h = true -> kept_before tau s now h (R h)).
     { intros h Hh Bh n' Hn. apply (IH (release s h n' + R h) Hn h n' Hh Bh eq_refl). }
-    destruct (Shown k Hk Bk) as
-      (Kn & Reg & Bkn & _ & _ & Outrank & Own & j & f & len & again & level0 & level1 & Hj & Len & D & (Hr & HR) & Ineq).
+    destruct (Shown k Hk Bk) as (Kn & Reg & Bkn & _ & _ & Heads & Same & Outrank & Own & j & f & len & again & level0 &
+      level1 & most & Hj & Len & D & F & (Hr & HR) & Ineq).
     simpl in Ineq.
     pose proof (periods_positive _ _ _ _ _ rules k Hk) as HT.
     assert (Apart : forall n', n' < n -> release s k n' + period (tau k) <= release s k n).
@@ -517,15 +610,24 @@ Proof.
       apply (job_complete_later tau s (release s k n' + R k)); [lia|].
       apply (IH (release s k n' + R k)); auto. lia. }
     pose proof (run_legal k n Hk Reg Before) as L.
-    assert (W : within_wcet (graph (tau k)) (job_run K m tau s k n) (wcet (tau k))).
-    { intros v Hv. apply (executions _ _ _ _ _ rules k n v Hk Hv), Kn. }
+    (* what the job executes, and its sums *)
+    set (x := job_exec s k n).
+    assert (W : within_wcet (graph (tau k)) (job_run K m tau s k n) x) by (intros v _; apply le_n).
+    assert (Sums : forall b, b < size (graph (tau k)) ->
+      sum (size (graph (tau k))) (fun v => if head (tau k) v =? b then x v else 0) <= together (tau k) b)
+      by (intros b Hb; apply (shared_executions _ _ _ _ _ rules); auto).
+    pose proof (shared_length _ _ Heads x _ Sums len Len) as LenX.
+    pose proof (shared_left_over _ _ Heads x _ Sums j f F) as LeftX.
     assert (Facts : forall h, h < K -> negb (h =? k) && outranks pol h k = true ->
-      known (tau h) = true /\ regular (tau h) = true /\ kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
-      disjoint_parts (graph (tau h)) (parts h) (part h)).
+      known (tau h) = true /\ regular (tau h) = true /\ heads_first (graph (tau h)) (head (tau h)) /\
+      (forall v, v < size (graph (tau h)) -> on_core tau h (head (tau h) v) = on_core tau h v) /\
+      kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
+      disjoint_parts (graph (tau h)) (parts h) (part h) /\
+      (forall v, v < size (graph (tau h)) -> part h (head (tau h) v) = part h v)).
     { intros h Hh O. apply andb_true_iff in O. destruct O as (N & O). apply negb_true_iff, Nat.eqb_neq in N.
       pose proof (Outrank h Hh N O) as Bh.
-      destruct (Shown h Hh Bh) as (H0 & H4 & _ & H1 & H2 & _ & _ & ? & ? & ? & ? & ? & ? & _ & _ & _ & (_ & H3) & _).
-      repeat (split; auto). }
+      destruct (Shown h Hh Bh) as (H0 & H4 & _ & H1 & H2 & H5 & H6 & _ & _ & ? & ? & ? & ? & ? & ? & ? & _ & _ & _ & _ & (_ & H3) & _).
+      repeat (split; auto); apply H6; auto. }
     assert (Due : forall h, match (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None)
       with None => True
       | Some (Dk, D) => forall n', may_delay tau pol s k n h n' = true ->
@@ -548,40 +650,22 @@ Proof.
       + rewrite sum_plus, sum_times. apply Nat.add_le_mono; [|apply Nat.mul_le_mono_l, losses; auto].
         unfold sum_over_others. rewrite sum_swap. apply sum_le. intros h Hh.
         destruct (negb (h =? k) && outranks pol h k) eqn:O; [|rewrite sum_zero; auto].
-        destruct (Facts h Hh O) as (Fk & Fr & F0 & F1 & F2 & F3).
-        apply (kept_workload K m tau pol s rules now h (R h) Hh Fk Fr F0 F1 _ (release s k n) _
+        destruct (Facts h Hh O) as (Fk & Fr & Fh & Fo & F0 & F1 & F2 & F3 & F4).
+        apply (kept_workload K m tau pol s rules now h (R h) Hh Fk Fr Fh Fo F0 F1 _ (release s k n) _
                  (Due h) (m - j) (width h) (R k)); auto. lia. }
     assert (C : complete (graph (tau k)) (job_run K m tau s k n) (R k)).
-    { destruct Ineq as [(I1 & [Often|(-> & A & Num)])|(I2 & Often)].
-      - apply (first_form _ m _ (wcet (tau k)) len j f (R k)
+    { destruct Ineq as [(Waits & Often & [I1|I2])|(Most & I3)].
+      - apply (first_form _ m _ x len j f (R k)
                  (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k))
                   + (m - j) * loss k + blocking K m tau pol k j again level0 level1)); auto;
           [|unfold first_inequality in I1; lia].
-        pose proof (blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Often) as B.
+        pose proof (blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Waits Often) as B.
         apply Nat.le_trans with (sum (R k) (fun t => Nat.min (higher k n t) (m - j))
           + sum (R k) (fun t => if somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)
                                 then Nat.min (low (K * Z) (low_holds k n) t) (m - j) else 0)); [|lia].
         rewrite <- sum_plus. apply sum_le. intros t Ht.
         pose proof (others_are_other_dags k n Hk Reg Before t ltac:(lia)) as O.
         destruct (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); lia.
-      - rewrite Nat.sub_0_r in *.
-        apply (first_form_blocked_along_a_path _ m _ _ _ _ _ _ (run_keeps_cores k n Hk Reg Before Bkn A) level0 level1
-          (wcet (tau k)) len (S again) (R k)
-          (sum_over_others K pol k (fun h => whole_work m tau pol R width k 0 h (R k)) + m * loss k)); auto.
-        + apply Nat.le_trans with (2 := Higher). apply sum_le. intros t Ht.
-          destruct (Nat.ltb_spec t (period (tau k))); lia.
-        + unfold path_blocking. rewrite !largest_low.
-          assert (V : volume (graph (tau k)) (wcet (tau k))
-            <= left_over (graph (tau k)) (wcet (tau k)) 0 f + len).
-          { apply Nat.le_trans with (left_over (graph (tau k)) (wcet (tau k)) 0 f
-              + weight (graph (tau k)) (wcet (tau k)) (fun v => f v <=? 0)).
-            - unfold left_over, weight, volume. rewrite <- sum_plus. apply sum_le. intros v _.
-              destruct (f v <=? 0); lia.
-            - apply Nat.add_le_mono_l. apply chain_at_most_length; auto. intros u v Huv Hv Eu Ev.
-              apply Nat.leb_le in Eu, Ev. apply D; auto; lia. }
-          unfold first_inequality, blocking in I1. rewrite !Nat.sub_0_r in I1.
-          replace (Nat.min m (m - 1)) with (m - 1) in I1 by lia.
-          replace (S again - 1) with again by lia. lia.
       - set (others_of h t := if negb (h =? k) && outranks pol h k
                then cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h else 0).
         set (phi h x := if negb (h =? k) && outranks pol h k
@@ -589,29 +673,29 @@ Proof.
         set (blocked := blocking K m tau pol k j again level0 level1) in *.
         set (low_of t := if somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)
                          then low (K * Z) (low_holds k n) t else 0).
-        set (F h x := if h <? K then phi h x else if h =? K then (m - j) * loss k else blocked).
-        assert (Sum : forall x, sum (S (S K)) (fun h => F h x) = sum K (fun h => phi h x) + (m - j) * loss k + blocked).
-        { intros x. unfold F. cbn [sum]. destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
+        set (Fn h x := if h <? K then phi h x else if h =? K then (m - j) * loss k else blocked).
+        assert (Sum : forall x, sum (S (S K)) (fun h => Fn h x) = sum K (fun h => phi h x) + (m - j) * loss k + blocked).
+        { intros y. unfold Fn. cbn [sum]. destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
           rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|]. do 2 f_equal.
           apply sum_ext. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia]. }
-        assert (Prop' : forall h a b, h < S (S K) -> a <= b -> a * F h b <= b * F h a).
-        { intros h a b Hh Hab. unfold F. destruct (Nat.ltb_spec h K).
+        assert (Prop' : forall h a b, h < S (S K) -> a <= b -> a * Fn h b <= b * Fn h a).
+        { intros h a b Hh Hab. unfold Fn. destruct (Nat.ltb_spec h K).
           * unfold phi. destruct (negb (h =? k) && outranks pol h k); [|lia].
             apply clipped_in_proportion; auto.
           * destruct (h =? K); apply Nat.mul_le_mono_r, Hab. }
-        apply (second_form_sharp _ m _ (wcet (tau k)) len j f (R k) (S (S K))
+        apply (second_form_sharp _ m _ x len j f (R k) (S (S K))
                  (fun h t => if h <? K then others_of h t
                              else if h =? K then (if lost s (release s k n + t) then m else 0) else low_of t)
-                 F); auto.
+                 Fn); auto.
         + intros t Ht. pose proof (others_are_other_dags k n Hk Reg Before t ltac:(lia)) as O. cbn [sum].
           destruct (Nat.ltb_spec K K); [lia|]. destruct (Nat.ltb_spec (S K) K); [lia|].
           rewrite Nat.eqb_refl. destruct (Nat.eqb_spec (S K) K); [lia|].
           apply Nat.le_trans with (1 := O). unfold higher. apply Nat.add_le_mono_r, Nat.add_le_mono_r.
           apply sum_le. intros h Hh. destruct (Nat.ltb_spec h K); [auto|lia].
-        + intros h w Hh. unfold F. destruct (Nat.ltb_spec h K).
+        + intros h w Hh. unfold Fn. destruct (Nat.ltb_spec h K).
           * unfold others_of, phi. destruct (negb (h =? k) && outranks pol h k) eqn:O.
-            -- destruct (Facts h H O) as (Fk & Fr & F0 & F1 & F2 & F3).
-               apply (kept_clipped K m tau pol s rules now h (R h) H Fk Fr F0 F1 _ (release s k n) _
+            -- destruct (Facts h H O) as (Fk & Fr & Fh & Fo & F0 & F1 & F2 & F3 & F4).
+               apply (kept_clipped K m tau pol s rules now h (R h) H Fk Fr Fh Fo F0 F1 _ (release s k n) _
                         (Due h) (m - j) (width h) (parts h) (part h) (R k) w); auto. lia.
             -- rewrite sum_zero; [lia|]. intros t _. destruct (w t); auto.
           * destruct (Nat.eqb_spec h K).
@@ -619,7 +703,7 @@ Proof.
                unfold count. rewrite <- sum_times. apply sum_le. intros t _.
                destruct (w t), (lost s (release s k n + t)); simpl Nat.b2n; lia.
             -- apply Nat.le_trans
-                 with (2 := blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Often).
+                 with (2 := blocked_at_most_in_set k n Hk Reg Before Bkn j again level0 level1 (R k) Own Waits Often).
                apply sum_le. intros t _. unfold low_of.
                destruct (w t), (somebody_waits (graph (tau k)) (job_run K m tau s k n) t && negb (lost_tick k n t)); simpl; lia.
         + unfold second_inequality, sum_over_others in I2. cbv zeta in I2. destruct I2 as [I2|(I2 & Up)].
@@ -630,7 +714,9 @@ Proof.
                                 then rising_work m tau pol R width parts part k j h (R k) (R k - len) else 0)).
             { rewrite <- sum_plus. apply sum_le. intros h _. unfold phi.
               destruct (negb (h =? k) && outranks pol h k); [apply clipped_further|lia]. }
-            unfold phi in *. lia. }
+            unfold phi in *. lia.
+      - apply (bounded_along_a_path k n Hk Reg Before Bkn j f level0 level1 most
+          (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k)) + (m - j) * loss k)); auto; [|lia]. intros v Hv. apply Same, Hv. }
     intros v Hv. apply (job_finished_in_run K m tau pol s rules); auto. }
   intros k n Hk Bk. apply (Main (release s k n + R k)); auto.
 Qed.

@@ -11,11 +11,13 @@
     Other work may be there if it gives up its core as soon as an instance of these DAGs is ready. *)
 
 Require Import Arith Lia Bool List.
-From Bounds Require Import Sums Model Chains OneTick Account ResponseTime Workload.
+From Bounds Require Import Sums Model Chains Shares OneTick Account ResponseTime Workload.
 
 Record task := {
   graph : dag;
   wcet : nat -> nat;
+  head : nat -> nat;    (* the vertex with which it shares a WCET: itself, if its own is known (Shares.v) *)
+  together : nat -> nat;(* of a head the most that all which share with it execute; else of no matter, as 0 *)
   waits : nat -> bool;  (* whether a vertex is a wait for a device, of [wcet] at most, on no core *)
   keeps : nat -> bool;  (* whether a vertex, once it executes, keeps its core until it ends *)
   regular : bool;       (* whether its jobs execute to their ends, and by rank; else they may be aborted or stopped *)
@@ -108,6 +110,8 @@ Record global_run (K m : nat) (tau : nat -> task) (pol : policy) (s : set_run) :
   executions : forall k n v, k < K -> v < size (graph (tau k)) ->
     (waits (tau k) v = false -> regular (tau k) = true -> 0 < job_exec s k n v) /\
     (known (tau k) = true -> job_exec s k n v <= wcet (tau k) v);
+  shared_executions : forall k n v, k < K -> v < size (graph (tau k)) -> known (tau k) = true ->
+    sum (size (graph (tau k))) (fun u => if head (tau k) u =? v then job_exec s k n u else 0) <= together (tau k) v;
   (** R1, R2, R3 *)
   only_ready_execute : forall t k n v, k < K -> v < size (graph (tau k)) ->
     executes s t k n v = true -> instance_ready tau s t k n v;
@@ -296,6 +300,8 @@ Variables (now k R : nat).
 Hypothesis in_K : k < K.
 Hypothesis wcets_known : known (tau k) = true.
 Hypothesis is_regular : regular (tau k) = true.
+Hypothesis heads : heads_first (graph (tau k)) (head (tau k)).
+Hypothesis heads_execute : forall v, v < size (graph (tau k)) -> on_core tau k (head (tau k) v) = on_core tau k v.
 Hypothesis kept : kept_before now k R.
 Hypothesis in_time : R <= period (tau k).
 
@@ -342,14 +348,20 @@ Lemma all_cores t n :
   (if jobs n then job_cores tau s t k n else 0) = part_cores (on_core tau k) t n.
 Proof. reflexivity. Qed.
 
+(** A part of the DAG is whole if it has the head of each of its vertices. *)
+Definition is_whole (p : nat -> bool) : Prop :=
+  forall v, v < size (graph (tau k)) -> p v = true -> p (head (tau k) v) = true.
+
 (** A job executes each of its vertices for the WCET at most, in all. *)
-Lemma work_of_part n l p :
-  sum l (fun t => part_cores p t n) <= weight (graph (tau k)) (wcet (tau k)) p.
+Lemma work_of_part n l p : is_whole p ->
+  sum l (fun t => part_cores p t n) <= weight (graph (tau k)) (together (tau k)) p.
 Proof.
+  intros Whole. apply Nat.le_trans with (weight (graph (tau k)) (job_exec s k n) p).
+  2: { apply (shared_weight _ (head (tau k)) heads); auto.
+       intros b Hb. apply (shared_executions _ _ _ _ _ rules); auto. }
   unfold part_cores. destruct (jobs n); [|rewrite sum_zero; [lia|auto]].
   unfold count. rewrite sum_swap. apply sum_le. intros v Hv.
   destruct (p v); simpl; [|rewrite sum_zero; auto].
-  apply Nat.le_trans with (job_exec s k n v); [|apply (executions _ _ _ _ _ rules k n v in_K Hv), wcets_known].
   change (job_done s l k n v <= job_exec s k n v).
   induction l.
   - unfold job_done, count. simpl. lia.
@@ -407,12 +419,12 @@ Proof.
 Qed.
 
 (** The workload bounds what a part of the DAG executes in any window before [now], on at most c cores. *)
-Lemma kept_part_workload p c r :
+Lemma kept_part_workload p c r : is_whole p ->
   a + r <= now ->
   sum r (fun t => sum (a + r) (fun n => Nat.min (part_cores p (a + t) n) c))
-  <= window_work cut (weight (graph (tau k)) (wcet (tau k)) p) c R (period (tau k)) r.
+  <= window_work cut (weight (graph (tau k)) (together (tau k)) p) c R (period (tau k)) r.
 Proof.
-  intros Hnow.
+  intros Whole Hnow.
   set (u n t := if t <? now then Nat.min (part_cores p t n) c else 0).
   apply Nat.le_trans with (sum r (fun t => sum (a + r) (fun n => u n (a + t)))).
   { apply sum_le. intros t Ht. apply sum_le. intros n _. unfold u.
@@ -424,10 +436,10 @@ Proof.
   assert (Hs : forall n t, 0 < u n t -> release s k n <= t < release s k n + R).
   { intros n t H. unfold u in H. destruct (Nat.ltb_spec t now); [|lia].
     apply (part_support p); auto. lia. }
-  assert (HV : forall n l, sum l (u n) <= weight (graph (tau k)) (wcet (tau k)) p).
+  assert (HV : forall n l, sum l (u n) <= weight (graph (tau k)) (together (tau k)) p).
   { intros n l. apply Nat.le_trans with (sum l (fun t => part_cores p t n)).
     - apply sum_le. intros t _. unfold u. destruct (t <? now); lia.
-    - apply work_of_part. }
+    - apply work_of_part, Whole. }
   assert (W1 := workload_bound (a + r) u (release s k) _ c R _ a r HT in_time Hrel Hc Hs HV).
   unfold window_work. destruct cut as [(Dk, D)|]; auto.
   apply Nat.min_glb; auto.
@@ -441,11 +453,12 @@ Qed.
 Lemma kept_workload q w r :
   a + r <= now -> enough_cores w ->
   sum r (fun t => Nat.min (cores_of_jobs tau s jobs (a + t) k) q)
-  <= window_work cut (weight (graph (tau k)) (wcet (tau k)) (on_core tau k)) (Nat.min q w) R
+  <= window_work cut (weight (graph (tau k)) (together (tau k)) (on_core tau k)) (Nat.min q w) R
        (period (tau k)) r.
 Proof.
   intros Hnow C.
-  apply Nat.le_trans with (2 := kept_part_workload (on_core tau k) (Nat.min q w) r Hnow).
+  apply Nat.le_trans with (2 := kept_part_workload (on_core tau k) (Nat.min q w) r
+    ltac:(intros v Hv; rewrite heads_execute; auto) Hnow).
   apply sum_le. intros t Ht. unfold cores_of_jobs.
   apply Nat.le_trans with (1 := min_sum _ _ _).
   apply Nat.le_trans
@@ -457,13 +470,16 @@ Qed.
 
 Lemma kept_clipped q w N g r (W : nat -> bool) :
   a + r <= now -> enough_cores w -> disjoint_parts (graph (tau k)) N g ->
+  (forall v, v < size (graph (tau k)) -> g (head (tau k) v) = g v) ->
   let work p c := window_work cut
-    (weight (graph (tau k)) (wcet (tau k)) (fun v => p v && on_core tau k v)) c R (period (tau k)) r in
+    (weight (graph (tau k)) (together (tau k)) (fun v => p v && on_core tau k v)) c R (period (tau k)) r in
   sum r (fun t => if W t then Nat.min (cores_of_jobs tau s jobs (a + t) k) q else 0)
   <= clipped (work (fun _ => true) (Nat.min q w)) (Nat.min q w)
        N (fun i => work (fun v => g v =? i) 1) (work (fun v => N <=? g v) (Nat.min q w)) (count r W).
 Proof.
-  intros Hnow C D work.
+  intros Hnow C D Same work.
+  assert (Whole : forall of : nat -> bool, is_whole (fun v => of (g v) && on_core tau k v))
+    by (intros of v Hv; rewrite Same, heads_execute; auto).
   set (p := Nat.min q w).
   apply (clipped_is_bound r _ p N _ _ (fun t => Nat.min (cores_of_jobs tau s jobs (a + t) k) q)
     (fun t => sum (a + r) (fun n => Nat.min (part_cores (fun v => (N <=? g v) && on_core tau k v) (a + t) n) p))
@@ -507,7 +523,7 @@ Proof.
     apply Nat.le_trans with (sum (a + r) (part_cores (fun v => (g v =? i) && on_core tau k v) (a + t))).
     + apply sum_le. intros n _. lia.
     + apply kept_part_width; [lia|]. intros n. apply (kept_one_of_part (a + t) n N g i); auto. lia.
-  - intros i Hi. apply kept_part_workload; auto.
+  - intros i Hi. apply kept_part_workload; auto. apply (Whole (fun h => h =? i)).
   - intros t Ht. cbv beta.
     apply (one_job_at_a_time _ _ (release s k) p R (period (tau k)) (a + t)); auto.
     + apply (periods_positive _ _ _ _ _ rules k in_K).
