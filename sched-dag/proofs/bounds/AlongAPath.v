@@ -147,28 +147,36 @@ Qed.
 
 (** *The bound along a path.*  While a vertex of the job waits, q cores at least execute vertices of the job that are
     [outside], higher-ranked work, or lower-ranked.  No path is heavier than [most] if each vertex weighs q times
-    its execution, less what it executes outside, and more what it waits for lower-ranked work. *)
-Theorem along_a_path c q outside high r I most :
+    its execution, less what it executes outside, and more what it waits for lower-ranked work.  If it is to be shown of
+    a [part] of the job, with all that precedes it, only the part of a path counts. *)
+Theorem along_a_path c q part outside high r I most :
   0 < q -> within_wcet G s c ->
+  (forall u v, edge G u v = true -> part v = true -> part u = true) ->
   (forall t, t < r -> somebody_waits G s t = true ->
      q <= count (size G) (fun v => outside v && runs s t v) + Nat.min (high t) q + counted t) ->
   sum r (fun t => Nat.min (high t) q) <= I ->
-  no_path_longer G (fun v => q * c v - (if outside v then c v else 0) + extra v) most ->
+  no_path_longer G (fun v => if part v then q * c v - (if outside v then c v else 0) + extra v else 0) most ->
   weight G c outside + at_release + I + most <= q * r ->
-  complete G s r.
+  forall v, v < size G -> part v = true -> finished s r v.
 Proof.
-  intros Hq W Full HI Most H.
-  destruct (complete_or_not G s r) as [C|(v0 & Hv0 & F0)]; auto. exfalso.
-  destruct (least (size G) (fun v => negb (finished_bool s r v))) as (v & Hv & F & Fl).
-  { exists v0. split; auto. apply negb_true_iff, finished_bool_false, F0. }
-  apply negb_true_iff, finished_bool_false in F.
+  intros Hq W Closed Full HI Most H v0 Hv0 Pv0. apply finished_bool_true.
+  destruct (finished_bool s r v0) eqn:F0; auto. exfalso.
+  assert (Up : forall u v, precedes G u v -> part v = true -> part u = true).
+  { induction 1 as [v E|v w P IH E]; intros Pv; [apply (Closed u v E Pv)|apply IH, (Closed v w E Pv)]. }
+  destruct (least (size G) (fun v => part v && negb (finished_bool s r v))) as (v & Hv & F & Fl).
+  { exists v0. split; auto. rewrite Pv0, F0. reflexivity. }
+  apply andb_true_iff in F. destruct F as (Pv & F). apply negb_true_iff, finished_bool_false in F.
   assert (Rd : ready G s r v).
-  { split; [auto|]. split; [auto|]. intros u Eu. apply precedes_up in Eu.
-    specialize (Fl u ltac:(lia)). apply negb_false_iff, finished_bool_true in Fl. auto. }
-  destruct (path_account r v Rd) as (K & w & CK & Kv & _ & Kw & Kr & Kb).
+  { split; [auto|]. split; [auto|]. intros u Eu. pose proof (Up u v Eu Pv) as Pu. apply precedes_up in Eu.
+    specialize (Fl u ltac:(lia)). cbv beta in Fl. rewrite Pu in Fl. apply negb_false_iff, finished_bool_true in Fl. auto. }
+  destruct (path_account r v Rd) as (K & w & CK & Kv & Kp & Kw & Kr & Kb).
   assert (Done : forall t x, x < size G -> done s t x <= c x).
   { intros t x Hx. pose proof (done_at_most_exec G m s rules t x Hx). specialize (W x Hx). lia. }
   pose proof (chain_at_most_length G _ _ K Most CK) as WK.
+  unfold weight in WK. rewrite (sum_ext (size G) _ (fun v => if K v
+    then q * c v - (if outside v then c v else 0) + extra v else 0)) in WK.
+  2: { intros x _. destruct (K x) eqn:E; auto. destruct (Kp x E) as [->|P]; [rewrite Pv|rewrite (Up x v P Pv)]; auto. }
+  fold (weight G (fun v => q * c v - (if outside v then c v else 0) + extra v) K) in WK.
   set (both := fun x => K x && outside x).
   assert (EK : weight G (fun v => q * c v - (if outside v then c v else 0) + extra v) K + weight G c both
     = q * weight G c K + weight G extra K).

@@ -7,7 +7,7 @@
     see Examples.v.) *)
 
 Require Import Arith Lia Bool List.
-From Bounds Require Import Sums Model Chains ResponseTime Blocking Workload TaskSet SetBounds Checker.
+From Bounds Require Import Sums Model Chains Shares ResponseTime Blocking Workload TaskSet SetBounds Checker.
 
 Section scale.
 Variable N : nat.
@@ -157,45 +157,58 @@ Proof.
   unfold blocking. rewrite !largest_blocking_finer, swap_factor, <- Nat.mul_add_distr_l. reflexivity.
 Qed.
 
+Lemma part_inequality_finer k q r x :
+  part_inequality K m tau pol bounded R width k q r x ->
+  part_inequality K m tau' pol bounded R' width k q (N * r) (N * x).
+Proof.
+  intros (C & [(j & f & level0 & level1 & most & Hj & D & F & Most & I)|(F & len & Len & I)]); (split; [exact C|]).
+  - left. exists j, f, (N * level0), (N * level1), (N * most). split; [exact Hj|]. split; [exact D|]. split; [exact F|]. split.
+    + apply (no_path_longer_ext _ (fun v => N * (if q v then on_path K m tau pol k j f level0 level1 v else 0)));
+        [|apply no_path_longer_finer, Most].
+      intros v. destruct (q v); [|lia]. unfold on_path. rewrite !largest_blocking_finer. simpl.
+      rewrite swap_factor, Nat.mul_add_distr_l, Nat.mul_sub_distr_l. unfold outside, on_core. simpl.
+      destruct (waits (tau k) v), (j <=? f v), (after_wait (graph (tau k)) (fun v => negb (waits (tau k) v)) v); simpl; lia.
+    + rewrite (sum_over_others_finer k (fun h => whole_work m tau pol R width k j h r)) by (intros; apply work_of_finer).
+      change (together (tau' k)) with (fun v => N * together (tau k) v). rewrite weight_finer, !largest_blocking_finer.
+      rewrite <- Nat.mul_sub_distr_l, !swap_factor, <- !Nat.mul_add_distr_l. apply Nat.mul_le_mono_l, I.
+  - right. split; [exact F|]. exists (N * len). split; [|rewrite <- Nat.mul_add_distr_l; apply Nat.mul_le_mono_l, I].
+    apply (no_path_longer_ext _ (fun v => N * (if q v then together (tau k) v else 0))); [|apply no_path_longer_finer, Len].
+    intros v. simpl. destruct (q v); lia.
+Qed.
+
 Lemma shown_finer k :
   shown K m tau pol bounded R loss width parts part k ->
   shown K m tau' pol bounded R' loss' width parts part k.
 Proof.
-  intros (Kn & Rg & Bk & W & P & Hd & Sm & O & B & j & f & len & again & level0 & level1 & most & Hj & Len & D & F & (H1 & H2) & Ineq).
+  intros (Kn & Rg & Bk & W & P & Hd & Sm & O & B & j & f & len & again & level0 & level1 & Hj & Len & D & F & (H1 & H2) & Ineq).
   do 9 (split; [assumption|]).
-  exists j, f, (N * len), again, (N * level0), (N * level1), (N * most).
+  exists j, f, (N * len), again, (N * level0), (N * level1).
   split; [auto|]. split; [apply no_path_longer_finer, Len|]. split; [exact D|]. split; [exact F|].
   split; [split; apply Nat.mul_le_mono_l; auto|].
-  cbv zeta in *. unfold first_inequality, second_inequality, path_inequality in *.
+  cbv zeta in *. destruct Ineq as [(Waits & Of & I)|Ineq]; [left|right; apply part_inequality_finer, Ineq].
+  unfold first_inequality, second_inequality in *.
   rewrite !(sum_over_others_finer k (fun h => whole_work m tau pol R width k j h (R k)))
     by (intros; apply work_of_finer).
   change (together (tau' k)) with (fun v => N * together (tau k) v).
-  change (graph (tau' k)) with (graph (tau k)). rewrite left_over_finer, blocking_finer, weight_finer, !largest_blocking_finer.
+  change (graph (tau' k)) with (graph (tau k)). rewrite left_over_finer, blocking_finer.
   unfold R', loss'. rewrite <- !Nat.mul_sub_distr_l, !swap_factor.
-  destruct Ineq as [(Waits & Of & I)|(Most & I)]; [left|right].
-  - split; [exact Waits|]. split; [exact Of|]. destruct I as [I|I]; [left|right].
-    + rewrite <- !Nat.mul_add_distr_l. apply Nat.mul_le_mono_l, I.
-    + rewrite (sum_over_others_finer k
-        (fun h => clipped_work m tau pol R width parts part k j h (R k) (R k - len))).
-      2: { intros h. unfold clipped_work, whole_work. rewrite <- clipped_finer. fold R'.
-           rewrite !work_of_finer. apply clipped_ext. intros i. apply work_of_finer. }
-      destruct I as [I|(I & Up)]; [left|right; split].
-      * apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I.
-        assert (Nat.max 1 (N * left_over (graph (tau k)) (together (tau k)) j f)
-                <= N * Nat.max 1 (left_over (graph (tau k)) (together (tau k)) j f)).
-        { rewrite <- Nat.mul_max_distr_l. lia. }
-        lia.
-      * apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I. exact I.
-      * apply Nat.le_lt_trans with (2 := Up). apply sum_le. intros h _.
-        destruct (negb (h =? k) && outranks pol h k); [|lia]. unfold rising_work, whole_work.
-        fold R'. rewrite !work_of_finer. apply Nat.eq_le_incl. rewrite <- (rise_finer (work_of _ _ _ _ _ _ _ _)).
-        apply rise_ext. intros i. apply work_of_finer.
-  - split; [|rewrite <- !Nat.mul_add_distr_l; apply Nat.mul_le_mono_l, I].
-    intros l Pl. apply Nat.le_trans with (2 := no_path_longer_finer _ _ _ Most l Pl).
-    apply Nat.eq_le_incl. unfold path_length. f_equal. apply map_ext. intros v. unfold on_path.
-    rewrite !largest_blocking_finer. simpl. rewrite swap_factor, Nat.mul_add_distr_l, Nat.mul_sub_distr_l.
-    unfold outside, on_core. simpl.
-    destruct (waits (tau k) v), (j <=? f v), (after_wait (graph (tau k)) (fun v => negb (waits (tau k) v)) v); simpl; lia.
+  split; [exact Waits|]. split; [exact Of|]. destruct I as [I|I]; [left|right].
+  - rewrite <- !Nat.mul_add_distr_l. apply Nat.mul_le_mono_l, I.
+  - rewrite (sum_over_others_finer k
+      (fun h => clipped_work m tau pol R width parts part k j h (R k) (R k - len))).
+    2: { intros h. unfold clipped_work, whole_work. rewrite <- clipped_finer. fold R'.
+         rewrite !work_of_finer. apply clipped_ext. intros i. apply work_of_finer. }
+    destruct I as [I|(I & Up)]; [left|right; split].
+    * apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I.
+      assert (Nat.max 1 (N * left_over (graph (tau k)) (together (tau k)) j f)
+              <= N * Nat.max 1 (left_over (graph (tau k)) (together (tau k)) j f)).
+      { rewrite <- Nat.mul_max_distr_l. lia. }
+      lia.
+    * apply (Nat.mul_le_mono_l _ _ N) in I. rewrite !Nat.mul_add_distr_l in I. exact I.
+    * apply Nat.le_lt_trans with (2 := Up). apply sum_le. intros h _.
+      destruct (negb (h =? k) && outranks pol h k); [|lia]. unfold rising_work, whole_work.
+      fold R'. rewrite !work_of_finer. apply Nat.eq_le_incl. rewrite <- (rise_finer (work_of _ _ _ _ _ _ _ _)).
+      apply rise_ext. intros i. apply work_of_finer.
 Qed.
 
 Theorem set_bounds_in_fractions s :
@@ -207,6 +220,21 @@ Proof.
   intros Rules Losses Shown.
   apply (set_bounds K m tau' pol s bounded R' loss' width parts part Rules Losses).
   intros k Hk Bk. apply shown_finer, Shown; auto.
+Qed.
+
+Theorem part_bounds_in_fractions s :
+  global_run K m tau' pol s ->
+  (forall k a, k < K -> bounded k = true -> count (N * R k) (fun t => lost s (a + t)) <= N * loss k) ->
+  (forall k, k < K -> bounded k = true -> shown K m tau pol bounded R loss width parts part k) ->
+  forall k q r x, k < K -> bounded k = true -> r <= R k -> part_inequality K m tau pol bounded R width k q r x ->
+  (forall a, count (N * r) (fun t => lost s (a + t)) <= N * x) ->
+  forall n v, v < size (graph (tau k)) -> q v = true -> job_finished s (release s k n + N * r) k n v.
+Proof.
+  intros Rules Losses Shown k q r x Hk Bk Hr I Lo n v Hv Qv.
+  apply (part_bounds K m tau' pol s bounded R' loss' width parts part Rules Losses
+    (fun k Hk Bk => shown_finer k (Shown k Hk Bk)) k q (N * r) (N * x) Hk Bk); auto.
+  - apply Nat.mul_le_mono_l, Hr.
+  - apply part_inequality_finer, I.
 Qed.
 
 End set.

@@ -34,13 +34,14 @@ Record claim := {
   free_chains : nat;            (* j *)
   chain_of : list nat;          (* by vertex: its chain among j + 1 disjoint ones (along a path, j), or a number above j *)
   first_level : N;              (* the (m - j)-th largest WCET of those that block, *)
-  later_level : N               (* and the (m - max(j, 1))-th; any numbers are right, these are best *)
+  later_level : N;              (* and the (m - max(j, 1))-th; any numbers are right, these are best *)
+  costless : bool               (* whether the platform's own time is no matter: else widths are of none *)
 }.
 
 Definition no_claim : claim :=
   {| wcets := []; shared := None; wait_list := []; preds := []; minimum_period := 1; relative_deadline := 1;
      least_deadline := 1; outranked_by := []; keeping := false; known_wcets := false; claimed := false; bound := 0; loss := 0; width := 0; cover := None;
-     parts := 0; part_of := []; free_chains := 0; chain_of := []; first_level := 0; later_level := 0 |}.
+     parts := 0; part_of := []; free_chains := 0; chain_of := []; first_level := 0; later_level := 0; costless := false |}.
 
 (** ** What a claim is about *)
 
@@ -289,18 +290,25 @@ Proof.
   - apply (is_ancestor_precedes c anc); auto.
 Qed.
 
+Lemma cover_ok_sound c anc m l :
+  edges_ok c = true -> ancestors_ok c anc = true -> width_ok c anc m = true -> cover c = Some l ->
+  chain_cover (stated_dag c) (width c) (label l).
+Proof.
+  intros E A W Co. unfold width_ok in W. rewrite Co in W. apply andb_true_iff in W. destruct W as (B & C).
+  assert (B' : forall v, v < vertices c -> label l v < width c).
+  { intros v Hv. apply Nat.ltb_lt. apply (all_vertices_true c _ B v Hv). }
+  split; [exact B'|].
+  intros u v H Hv Eq. apply (chains_ok_sound c anc l (width c) E A C); auto.
+Qed.
+
 Lemma width_ok_sound c anc m tau k :
   graph (tau k) = stated_dag c ->
   edges_ok c = true -> ancestors_ok c anc = true -> width_ok c anc m = true ->
   enough_cores m tau k (width c).
 Proof.
-  intros G E A W. unfold width_ok in W. unfold enough_cores. rewrite G.
-  destruct (cover c) as [l|]; [right|left; apply Nat.eqb_eq, W].
-  apply andb_true_iff in W. destruct W as (B & C). exists (label l).
-  assert (B' : forall v, v < vertices c -> label l v < width c).
-  { intros v Hv. apply Nat.ltb_lt. apply (all_vertices_true c _ B v Hv). }
-  split; [exact B'|].
-  intros u v H Hv Eq. apply (chains_ok_sound c anc l (width c) E A C); auto.
+  intros G E A W. unfold enough_cores. rewrite G. destruct (cover c) as [l|] eqn:Co.
+  - right. exists (label l). apply (cover_ok_sound c anc m l E A W Co).
+  - left. unfold width_ok in W. rewrite Co in W. apply Nat.eqb_eq, W.
 Qed.
 
 (** ** Segments that share a WCET
@@ -421,22 +429,42 @@ Definition blockingN (k j again : nat) : N :=
 
 Definition no_blocking (k : nat) : bool := forallb (fun h => negb (blocksN k h)) (seq 0 (length claims)).
 
-Definition outsideN (c : claim) (v : nat) : bool :=
-  negb (existsb (Nat.eqb v) (wait_list c)) && (free_chains c <=? label (chain_of c) v).
+Definition outsideN (c : claim) (j : nat) (f : nat -> nat) (v : nat) : bool :=
+  negb (existsb (Nat.eqb v) (wait_list c)) && (j <=? f v).
 
-Definition on_pathN (c : claim) (every later : N) (v : nat) : N :=
-  (N.of_nat (m - free_chains c) * togetherN c v - (if outsideN c v then togetherN c v else 0)
+Definition on_pathN (c : claim) (j : nat) (f : nat -> nat) (every later : N) (v : nat) : N :=
+  (N.of_nat (m - j) * togetherN c v - (if outsideN c j f v then togetherN c v else 0)
    + (if existsb (Nat.eqb v) (wait_list c) then 0
       else if after_wait (stated_dag c) (fun u => negb (existsb (Nat.eqb u) (wait_list c))) v then every else later))%N.
 
-Definition path_ok (k : nat) (whole : N) : bool :=
+(** No path of a [piece] of the DAG is heavier. *)
+Definition most_of (c : claim) (piece : nat -> bool) (w : nat -> N) : N :=
+  fold_right N.max 0%N (levels c (fun v => if piece v then w v else 0%N)).
+Definition most_ok (c : claim) (piece : nat -> bool) (w : nat -> N) : bool :=
+  let w' v := if piece v then w v else 0%N in levels_ok c w' (levels c w') (most_of c piece w).
+
+Definition path_ok (k : nat) (piece : nat -> bool) (j : nat) (f : nat -> nat) (level0 level1 r x : N) : bool :=
   let c := claim_of claims k in
-  let every := largest_blockingN k m (first_level c) in
-  let later := largest_blockingN k (m - 1) (later_level c) in
-  let lv := levels c (on_pathN c every later) in
-  let most := fold_right N.max 0%N lv in
-  levels_ok c (on_pathN c every later) lv most &&
-  (weightN c (togetherN c) (outsideN c) + (every - later) + whole + most <=? N.of_nat (m - free_chains c) * bound c)%N.
+  let every := largest_blockingN k m level0 in
+  let later := largest_blockingN k (m - 1) level1 in
+  let w := on_pathN c j f every later in
+  most_ok c piece w &&
+  (weightN c (togetherN c) (outsideN c j f) + (every - later) + sum_over_othersN k (fun h => whole_workN k j h r)
+   + N.of_nat (m - j) * x + most_of c piece w <=? N.of_nat (m - j) * r)%N.
+
+Definition delaysN (h k : nat) : bool :=
+  negb (h =? k) && (outranks (stated_policy due_no_later claims) h k || keeping (claim_of claims h)).
+
+Definition fits_ok (k : nat) : bool :=
+  (match cover (claim_of claims k) with Some _ => true | None => false end) &&
+  forallb (fun h => negb (delaysN h k) || claimed (claim_of claims h)) (seq 0 (length claims)) &&
+  (width (claim_of claims k) + sum (length claims) (fun h => if delaysN h k then width (claim_of claims h) else 0) <=? m).
+
+Definition part_ok (k : nat) (piece : nat -> bool) (j : nat) (f : nat -> nat) (level0 level1 r x : N) : bool :=
+  let c := claim_of claims k in
+  all_vertices c (fun v => negb (piece v) || forallb piece (nth v (preds c) [])) &&
+  (path_ok k piece j f level0 level1 r x ||
+   costless c && (x =? 0)%N && fits_ok k && most_ok c piece (togetherN c) && (most_of c piece (togetherN c) + x <=? r)%N).
 
 Definition inequality_ok (k : nat) (len : N) : bool :=
   let c := claim_of claims k in
@@ -453,7 +481,7 @@ Definition inequality_ok (k : nat) (len : N) : bool :=
     (N.max 1 left + blocked + clipped + lost <=? room) ||
     (left + blocked + clipped + lost <=? room) &&
     (sum_over_othersN k (fun h => rising_workN k j h r (r - len)) <? N.of_nat (m - j)))%N) ||
-  path_ok k whole.
+  part_ok k (fun _ => true) j (label (chain_of c)) (first_level c) (later_level c) r (loss c).
 
 Definition outrankers_ok (k : nat) : bool :=
   forallb (fun h => (h =? k) || negb (outranks (stated_policy due_no_later claims) h k)
@@ -585,19 +613,68 @@ Proof.
   specialize (B h ltac:(apply in_seq; lia)). apply negb_true_iff in B. rewrite blocksN_ok, B. reflexivity.
 Qed.
 
-Lemma on_pathN_ok k every later level0 level1 v :
+Lemma on_pathN_ok k j f every later level0 level1 v :
   let c := claim_of claims k in
   N.to_nat every = largest_blocking (length claims) tau pol k m level0 ->
   N.to_nat later = largest_blocking (length claims) tau pol k (m - 1) level1 ->
-  N.to_nat (on_pathN c every later v)
-  = on_path (length claims) m tau pol k (free_chains c) (label (chain_of c)) level0 level1 v.
+  N.to_nat (on_pathN c j f every later v) = on_path (length claims) m tau pol k j f level0 level1 v.
 Proof.
   intros c E1 E2. unfold on_pathN, on_path. rewrite <- E1, <- E2. to_nat. rewrite Nat2N.id. f_equal.
   - f_equal. unfold outsideN, outside. fold c. change (on_core tau k v) with (negb (existsb (Nat.eqb v) (wait_list c))).
-    destruct (negb (existsb (Nat.eqb v) (wait_list c)) && (free_chains c <=? label (chain_of c) v)); reflexivity.
+    destruct (negb (existsb (Nat.eqb v) (wait_list c)) && (j <=? f v)); reflexivity.
   - change (on_core tau k) with (fun v => negb (existsb (Nat.eqb v) (wait_list c))). cbv beta.
     change (graph (tau k)) with (stated_dag c). destruct (existsb (Nat.eqb v) (wait_list c)); [reflexivity|]. simpl negb.
     destruct (after_wait (stated_dag c) (fun u => negb (existsb (Nat.eqb u) (wait_list c))) v); reflexivity.
+Qed.
+
+Lemma most_ok_sound c piece w : edges_ok c = true -> most_ok c piece w = true ->
+  no_path_longer (stated_dag c) (fun v => if piece v then N.to_nat (w v) else 0) (N.to_nat (most_of c piece w)).
+Proof.
+  intros E M l P. apply Nat.le_trans with (2 := levels_bound c _ _ _ E M l P). apply Nat.eq_le_incl.
+  unfold path_length. f_equal. apply map_ext. intros v. destruct (piece v); reflexivity.
+Qed.
+
+Lemma part_ok_sound k piece j f level0 level1 r x : let c := claim_of claims k in
+  edges_ok c = true -> ancestors_ok c (ancestors c) = true -> width_ok c (ancestors c) m = true ->
+  j < m -> disjoint_chains (stated_dag c) j f -> (forall v, v < vertices c -> f (head_of c v) = f v) ->
+  part_ok k piece j f level0 level1 r x = true ->
+  part_inequality (length claims) m tau pol bd R wd k piece (N.to_nat r) (N.to_nat x).
+Proof.
+  intros c E A W Hj D Hf I. unfold part_ok in I. cbv zeta in I. fold c in I.
+  apply andb_true_iff in I. destruct I as (Cl & I). split.
+  { intros u v Ed Pv. simpl in Ed. pose proof (stated_dag c).(edges_lead_up) u v Ed as Up. simpl in Up.
+    pose proof (all_vertices_true c _ Cl v ltac:(lia)) as Q. cbv beta in Q. rewrite Pv in Q. simpl in Q.
+    rewrite forallb_forall in Q. apply Q. unfold stated_edge, listed_edge in Ed. apply andb_true_iff in Ed.
+    destruct Ed as (_ & Ed). apply existsb_exists in Ed. destruct Ed as (y & Hy & Ey). apply Nat.eqb_eq in Ey. subst. exact Hy. }
+  apply orb_true_iff in I. destruct I as [I|I].
+  - left. unfold path_ok in I. cbv zeta in I. fold c in I. apply andb_true_iff in I. destruct I as (M & I).
+    set (every := largest_blockingN k m level0) in *. set (later := largest_blockingN k (m - 1) level1) in *.
+    exists j, f, (N.to_nat level0), (N.to_nat level1), (N.to_nat (most_of c piece (on_pathN c j f every later))).
+    split; [exact Hj|]. split; [exact D|]. split; [exact Hf|]. split.
+    + intros l P. apply Nat.le_trans with (2 := most_ok_sound c piece _ E M l P). apply Nat.eq_le_incl.
+      unfold path_length. f_equal. apply map_ext. intros v. destruct (piece v); [|reflexivity].
+      symmetry. apply on_pathN_ok; apply largest_blockingN_ok.
+    + apply N.leb_le in I. rewrite <- !largest_blockingN_ok.
+      change (weight (graph (tau k)) (together (tau k)) (outside tau k j f))
+        with (weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outsideN c j f)).
+      rewrite <- (sum_over_othersN_ok k (fun h => whole_workN k j h r)) by (intros; apply work_ofN_ok).
+      rewrite <- weightN_ok, <- (Nat2N.id (m - j)). fold every later.
+      rewrite <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- !N2Nat.inj_add. lia.
+  - right. rewrite !andb_true_iff in I. destruct I as (((_ & F) & M) & I). split.
+    + unfold fits_ok in F. fold c in F. rewrite !andb_true_iff in F. destruct F as ((Co & Bd) & Room).
+      destruct (cover c) as [l|] eqn:Ec; [|discriminate].
+      assert (De : forall h, delays tau pol h k = true -> delaysN h k = true).
+      { intros h H. unfold delays in H. unfold delaysN. apply andb_true_iff in H. destruct H as (-> & H).
+        apply orb_true_iff. apply orb_true_iff in H. destruct H as [H|H]; [left; exact H|right].
+        apply existsb_exists in H. destruct H as (w & _ & H). rewrite blocksN_ok in H. unfold blocksN in H.
+        rewrite !andb_true_iff in H. tauto. }
+      split; [exists (label l); apply (cover_ok_sound c (ancestors c) m l); auto|]. split.
+      * intros h Hh H. apply De in H. rewrite forallb_forall in Bd. specialize (Bd h ltac:(apply in_seq; lia)).
+        rewrite H in Bd. exact Bd.
+      * apply Nat.leb_le in Room. apply Nat.le_trans with (2 := Room). apply Nat.add_le_mono_l. apply sum_le. intros h _.
+        destruct (delays tau pol h k) eqn:H; [rewrite (De h H)|]; unfold wd; lia.
+    + exists (N.to_nat (most_of c piece (togetherN c))). split; [apply (most_ok_sound c piece (togetherN c) E M)|].
+      apply N.leb_le in I. lia.
 Qed.
 
 Lemma claim_ok_shown k :
@@ -626,21 +703,21 @@ Proof.
   { apply orb_true_iff in B. destruct B as [B|B]; [left; apply no_blocking_ok, B|right; intros v _ _; exact B]. }
   set (j := free_chains c) in *.
   set (level0 := N.to_nat (first_level c)). set (level1 := N.to_nat (later_level c)).
-  set (every := largest_blockingN k m (first_level c)). set (later := largest_blockingN k (m - 1) (later_level c)).
-  exists j, (label (chain_of c)), (N.to_nat len), (followers c), level0, level1,
-    (N.to_nat (fold_right N.max 0%N (levels c (on_pathN c every later)))).
+  assert (Dis : disjoint_chains (stated_dag c) j (label (chain_of c))).
+  { intros u v H Hv Eq Le. apply (chains_ok_sound c (ancestors c) (chain_of c) (S (free_chains c))); auto. fold j. lia. }
+  exists j, (label (chain_of c)), (N.to_nat len), (followers c), level0, level1.
   split; [auto|]. split; [apply (levels_bound c (togetherN c) (levels c (togetherN c)) len E L)|].
-  split.
-  { intros u v H Hv Eq Le. apply (chains_ok_sound c (ancestors c) (chain_of c) (S (free_chains c))); auto.
-    fold j. lia. }
+  split; [exact Dis|].
   split; [intros v Hv; apply (Same v Hv)|].
   split; [unfold R, tau, stated_tasks, stated_task, period; fold c; lia|].
   cbv zeta.
-  change (together (tau k)) with (fun v => N.to_nat (togetherN c v)). change (R k) with (N.to_nat (bound c)).
-  unfold first_inequality, second_inequality, path_inequality.
+  unfold inequality_ok in I. cbv zeta in I. fold c j in I. apply orb_true_iff in I.
+  destruct I as [I|I]; [left|right; apply (part_ok_sound k (fun _ => true) j (label (chain_of c)) (first_level c) (later_level c)); auto;
+                             intros v Hv; apply (Same v Hv)].
+  unfold first_inequality, second_inequality.
   change (R k) with (N.to_nat (bound c)). change (ls k) with (N.to_nat (loss c)).
   change (graph (tau k)) with (stated_dag c). change (together (tau k)) with (fun v => N.to_nat (togetherN c v)).
-  rewrite <- left_overN_ok. unfold level0, level1. rewrite <- blockingN_ok, <- !largest_blockingN_ok.
+  rewrite <- left_overN_ok. unfold level0, level1. rewrite <- blockingN_ok.
   rewrite <- (sum_over_othersN_ok k (fun h => whole_workN k j h (bound c))) by (intros; apply work_ofN_ok).
   rewrite <- (sum_over_othersN_ok k (fun h => clipped_workN k j h (bound c) (bound c - len)))
     by (intros; rewrite clipped_workN_ok, N2Nat.inj_sub; reflexivity).
@@ -650,22 +727,12 @@ Proof.
   set (clipped := sum_over_othersN k (fun h => clipped_workN k j h (bound c) (bound c - len))) in *.
   set (rising := sum_over_othersN k (fun h => rising_workN k j h (bound c) (bound c - len))) in *.
   change (Nat.max 1) with (Nat.max (N.to_nat 1)). rewrite <- (Nat2N.id (m - j)).
-  fold every later.
-  unfold inequality_ok in I. cbv zeta in I. fold c j in I. apply orb_true_iff in I. destruct I as [I|I]; [left|right].
-  - apply andb_true_iff in I. destruct I as (U & I). split; [|split].
-    + apply orb_true_iff in U. destruct U as [U|U]; [left; apply no_blocking_ok, U|right].
-      intros v _. simpl. fold c. destruct (wait_list c); [reflexivity|discriminate].
-    + apply followers_ok.
-    + rewrite <- N2Nat.inj_max, <- !N2Nat.inj_mul, <- !N2Nat.inj_add.
-      rewrite !orb_true_iff, andb_true_iff, N.ltb_lt, !N.leb_le in I. destruct I as [I|[I|(I & Up)]]; [left|right; left|right; right]; lia.
-  - unfold path_ok in I. cbv zeta in I. fold c j every later in I. apply andb_true_iff in I. destruct I as (Lv & I).
-    split.
-    + intros l Pl. apply Nat.le_trans with (2 := levels_bound c _ _ _ E Lv l Pl). apply Nat.eq_le_incl.
-      unfold path_length. f_equal. apply map_ext. intros v. symmetry. apply on_pathN_ok; [apply largest_blockingN_ok|apply largest_blockingN_ok].
-    + apply N.leb_le in I.
-      change (weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outside tau k j (label (chain_of c))))
-        with (weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outsideN c)).
-      rewrite <- weightN_ok, <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- !N2Nat.inj_add. lia.
+  apply andb_true_iff in I. destruct I as (U & I). split; [|split].
+  - apply orb_true_iff in U. destruct U as [U|U]; [left; apply no_blocking_ok, U|right].
+    intros v _. simpl. fold c. destruct (wait_list c); [reflexivity|discriminate].
+  - apply followers_ok.
+  - rewrite <- N2Nat.inj_max, <- !N2Nat.inj_mul, <- !N2Nat.inj_add.
+    rewrite !orb_true_iff, andb_true_iff, N.ltb_lt, !N.leb_le in I. destruct I as [I|[I|(I & Up)]]; [left|right; left|right; right]; lia.
 Qed.
 
 Lemma check_each : check = true -> forall k, k < length claims -> claim_ok k = true.

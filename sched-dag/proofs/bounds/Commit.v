@@ -141,7 +141,8 @@ Definition claim_at (claimed_too : bool) (k : nat) : claim :=
      cover := if cover_chains d =? 0 then None else Some (map (fun v => in_cover (owner v)) vs);
      parts := part_chains d; part_of := map (fun v => in_part (owner v)) vs;
      free_chains := beside d; chain_of := map (fun v => in_chain (owner v)) vs;
-     first_level := level k (m - beside d); later_level := level k (Nat.min (m - beside d) (m - 1)) |}.
+     first_level := level k (m - beside d); later_level := level k (Nat.min (m - beside d) (m - 1));
+     costless := (overhead c =? 0)%N |}.
 
 (** The DAGs as tasks: as the claims' (Checker.v), but each subtask keeps its core just if it is stated to, and of
     DAGs without claims no rank and no end is asked. *)
@@ -171,11 +172,12 @@ Fixpoint settle (n : nat) (which : list bool) : list bool :=
       if forallb (fun p => Bool.eqb (fst p) (snd p)) (combine which shown) then which else settle n shown
   end.
 
+(** The DAGs whose claims are shown, if the checker accepts these. *)
+Definition settled : list bool := settle number (map has_claim (dags c)).
 Definition judge : list bool :=
-  let which := settle number (map has_claim (dags c)) in
-  if (length which =? number) && forallb (fun k => negb (nth k which false) || has_claim (dag_at k)) (seq 0 number) &&
-     forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with which)
-  then which else map (fun _ => false) (dags c).
+  if (length settled =? number) && forallb (fun k => negb (nth k settled false) || has_claim (dag_at k)) (seq 0 number) &&
+     forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with settled)
+  then settled else map (fun _ => false) (dags c).
 
 (** ** It is right *)
 
@@ -280,6 +282,58 @@ Proof.
   apply existsb_exists. exists v. split; [exact I|apply Nat.eqb_refl].
 Qed.
 
+(** What [judge] accepts the checker accepts, and a run keeps the rules of the claims' tasks and policy. *)
+Lemma judged N s k : nth k judge false = true ->
+  length settled = number /\ judge = settled /\ check (machine_cores c) by_due (claims_with settled) = true /\
+  (global_run number (machine_cores c) (fun k => finer N (committed k)) stated s ->
+   global_run number (machine_cores c) (fun k => finer N (stated_tasks (claims_with settled) k))
+     (stated_policy by_due (claims_with settled)) s).
+Proof.
+  intros J. assert (Eq : judge = settled /\ (length settled =? number) &&
+    forallb (fun k => negb (nth k settled false) || has_claim (dag_at k)) (seq 0 number) &&
+    forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with settled) = true).
+  { unfold judge in *. match goal with |- (if ?b then _ else _) = _ /\ _ => destruct b eqn:E end; [auto|]. exfalso. revert J. clear. generalize (dags c) k. induction l as [|d l IH]; intros [|i]; simpl; try discriminate.
+    apply IH. }
+  destruct Eq as (Eq & E). set (which := settled) in *.
+  rewrite !andb_true_iff, Nat.eqb_eq in E. destruct E as (((Len & Has) & _) & Ck). rewrite forallb_forall in Has.
+  split; [exact Len|]. split; [exact Eq|]. split; [exact Ck|]. intros R.
+  assert (Same : forall k, k < number -> with_keeps (finer N (committed k)) (fun _ => all_kept) (nth k which false)
+    = finer N (stated_tasks (claims_with which) k)).
+  { intros k' Hk'. unfold stated_tasks. rewrite claim_of_commit by auto. reflexivity. }
+  assert (Out : forall h k', h < number -> k' < number ->
+    outranks (stated_policy by_due (claims_with which)) h k'
+    = negb (h =? k') && (negb exact_order || may_outrank h k')).
+  { intros h k' Hh Hk'. cbn [stated_policy outranks]. rewrite claim_of_commit by auto. cbn [claim_at outranked_by].
+    unfold outranking. destruct (negb (h =? k') && (negb exact_order || may_outrank h k')) eqn:F.
+    - apply existsb_exists. exists h. rewrite Nat.eqb_refl, filter_In, in_seq. split; [split; [lia|exact F]|reflexivity].
+    - destruct (existsb _ _) eqn:X; auto. apply existsb_exists in X. destruct X as (h' & I & X).
+      apply Nat.eqb_eq in X. subst h'. apply filter_In in I. destruct I as (_ & I). congruence. }
+  apply (same_tasks number (machine_cores c) (fun k => with_keeps (finer N (committed k)) (fun _ => all_kept) (nth k which false)));
+    [exact Same|].
+  apply (weaker_rules _ _ _ _ _ _ (fun _ _ => all_kept) _ R).
+  - intros k' Hk' Rg. specialize (Has k' ltac:(apply in_seq; lia)). rewrite Rg in Has. exact Has.
+  - intros k' v Hk' Hv W A. change (kept_at k' v = true).
+    change (v < length (map time (expand (overhead c) (subtasks (dag_at k'))))) in Hv. rewrite map_length in Hv.
+    destruct (kept_is_stated k' v Hk' Hv) as (x & Ex & Ix). unfold kept_at. rewrite Ex.
+    pose proof (waits_of_vertex k' v x Ex W) as Wx.
+    unfold all_kept in A. rewrite forallb_forall in A. specialize (A x Ix). rewrite Wx in A. exact A.
+  - intros k' n0 h n' Hk' Hh [->|P]; [left; reflexivity|]. destruct (Nat.eq_dec h k') as [->|Ne]; [left; reflexivity|right].
+    unfold may_delay in *. apply Nat.eqb_neq in Ne. rewrite Out, Ne by auto. apply andb_true_iff in P. destruct P as (P1 & P2).
+    cbn [stated outranks] in P1. rewrite P1, orb_true_r. cbn [negb andb]. cbn [stated_policy by_deadline] in *. unfold by_due.
+    destruct exact_order; [exact P2|reflexivity].
+  - intros h w Hh Hw W Kp. destruct all_kept eqn:A; [left; reflexivity|right].
+    intros k' n0 n' Hk'. destruct (Nat.eq_dec h k') as [->|Ne]; [left; reflexivity|right].
+    assert (X : exact_order = false).
+    { unfold exact_order. rewrite A. destruct none_kept eqn:Nk; auto. exfalso.
+      change (kept_at h w = true) in Kp. unfold kept_at in Kp.
+      change (w < length (map time (expand (overhead c) (subtasks (dag_at h))))) in Hw. rewrite map_length in Hw.
+      destruct (kept_is_stated h w Hh Hw) as (x & Ex & Ix). rewrite Ex in Kp.
+      pose proof (waits_of_vertex h w x Ex W) as Wx.
+      unfold none_kept in Nk. rewrite forallb_forall in Nk. specialize (Nk x Ix). rewrite Wx, Kp in Nk. discriminate. }
+    unfold may_delay. apply Nat.eqb_neq in Ne. rewrite Out, Ne, X by auto. cbn [stated_policy by_deadline].
+    unfold by_due. rewrite X. reflexivity.
+Qed.
+
 (** *What [judge] accepts is true: in every run that obeys the rules, for the committed DAGs and policy, at any
     resolution N of time, each job of the DAG is complete within the claimed bound,* if losses are no more than charged. *)
 Theorem judge_sound N s : 0 < N ->
@@ -289,66 +343,14 @@ Theorem judge_sound N s : 0 < N ->
   forall k n, k < number -> nth k judge false = true ->
     job_complete (fun k => finer N (committed k)) s (release s k n + N * N.to_nat (claimed_bound (dag_at k))) k n.
 Proof.
-  intros HN R L k n Hk J. unfold judge in *. set (which := settle number (map has_claim (dags c))) in *. cbv zeta in *.
-  destruct ((length which =? number) && forallb (fun k => negb (nth k which false) || has_claim (dag_at k)) (seq 0 number) &&
-    forallb subtasks_ok (dags c) && check (machine_cores c) by_due (claims_with which))
-    eqn:E.
-  2: { exfalso. revert J. clear. generalize (dags c) k. induction l as [|d l IH]; intros [|i]; simpl; try discriminate.
-       apply IH. }
-  rewrite !andb_true_iff, Nat.eqb_eq in E. destruct E as (((Len & Has) & _) & Ck). rewrite forallb_forall in Has.
-  pose proof (claims_length which Len) as K0.
-  assert (Cl : forall k, k < number -> nth k which false = true -> claimed (claim_of (claims_with which) k) = true)
-    by (intros k' Hk' J'; rewrite claim_of_commit, J'; auto).
-  assert (Same : forall k, k < number -> with_keeps (finer N (committed k)) (fun _ => all_kept) (nth k which false)
-    = finer N (stated_tasks (claims_with which) k)).
-  { intros k' Hk'. unfold stated_tasks. rewrite claim_of_commit by auto. reflexivity. }
-  (* the run keeps the rules of the claims' tasks and policy *)
-  assert (R' : global_run number (machine_cores c) (fun k => finer N (stated_tasks (claims_with which) k))
-                 (stated_policy by_due (claims_with which)) s).
-  { assert (Out : forall h k', h < number -> k' < number ->
-      outranks (stated_policy by_due (claims_with which)) h k'
-      = negb (h =? k') && (negb exact_order || may_outrank h k')).
-    { intros h k' Hh Hk'. cbn [stated_policy outranks]. rewrite claim_of_commit by auto. cbn [claim_at outranked_by].
-      unfold outranking. destruct (negb (h =? k') && (negb exact_order || may_outrank h k')) eqn:F.
-      - apply existsb_exists. exists h. rewrite Nat.eqb_refl, filter_In, in_seq. split; [split; [lia|exact F]|reflexivity].
-      - destruct (existsb _ _) eqn:X; auto. apply existsb_exists in X. destruct X as (h' & I & X).
-        apply Nat.eqb_eq in X. subst h'. apply filter_In in I. destruct I as (_ & I). congruence. }
-    apply (same_tasks number (machine_cores c) (fun k => with_keeps (finer N (committed k)) (fun _ => all_kept) (nth k which false)));
-      [exact Same|].
-    apply (weaker_rules _ _ _ _ _ _ (fun _ _ => all_kept) _ R).
-    - intros k' Hk' Rg. specialize (Has k' ltac:(apply in_seq; lia)). rewrite Rg in Has. exact Has.
-    - intros k' v Hk' Hv W A. change (kept_at k' v = true).
-      change (v < length (map time (expand (overhead c) (subtasks (dag_at k'))))) in Hv. rewrite map_length in Hv.
-      destruct (kept_is_stated k' v Hk' Hv) as (x & Ex & Ix). unfold kept_at. rewrite Ex.
-      pose proof (waits_of_vertex k' v x Ex W) as Wx.
-      unfold all_kept in A. rewrite forallb_forall in A. specialize (A x Ix). rewrite Wx in A. exact A.
-    - intros k' n0 h n' Hk' Hh [->|P]; [left; reflexivity|]. destruct (Nat.eq_dec h k') as [->|Ne]; [left; reflexivity|right].
-      unfold may_delay in *. apply Nat.eqb_neq in Ne. rewrite Out, Ne by auto. apply andb_true_iff in P. destruct P as (P1 & P2).
-      cbn [stated outranks] in P1. rewrite P1, orb_true_r. cbn [negb andb]. cbn [stated_policy by_deadline] in *. unfold by_due.
-      destruct exact_order; [exact P2|reflexivity].
-    - intros h w Hh Hw W Kp. destruct all_kept eqn:A; [left; reflexivity|right].
-      intros k' n0 n' Hk'. destruct (Nat.eq_dec h k') as [->|Ne]; [left; reflexivity|right].
-      assert (X : exact_order = false).
-      { unfold exact_order. rewrite A. destruct none_kept eqn:Nk; auto. exfalso.
-        change (kept_at h w = true) in Kp. unfold kept_at in Kp.
-        change (w < length (map time (expand (overhead c) (subtasks (dag_at h))))) in Hw. rewrite map_length in Hw.
-        destruct (kept_is_stated h w Hh Hw) as (x & Ex & Ix). rewrite Ex in Kp.
-        pose proof (waits_of_vertex h w x Ex W) as Wx.
-        unfold none_kept in Nk. rewrite forallb_forall in Nk. specialize (Nk x Ix). rewrite Wx, Kp in Nk. discriminate. }
-      unfold may_delay. apply Nat.eqb_neq in Ne. rewrite Out, Ne, X by auto. cbn [stated_policy by_deadline].
-      unfold by_due. rewrite X. reflexivity. }
-  rewrite <- K0 in *. pose proof (check_sound_in_fractions N HN (machine_cores c) by_due (claims_with which) Ck s R') as S.
-  assert (B : forall k, k < length (claims_with which) -> bound (claim_of (claims_with which) k) = claimed_bound (dag_at k)
-                /\ loss (claim_of (claims_with which) k) = claimed_loss (dag_at k))
-    by (intros k' Hk'; rewrite claim_of_commit by (auto; lia); split; reflexivity).
-  assert (Fin : job_complete (fun k => finer N (stated_tasks (claims_with which) k)) s
-    (release s k n + N * N.to_nat (bound (claim_of (claims_with which) k))) k n).
-  { apply S; [|exact Hk|].
-    - intros k' a Hk' C. destruct (B k' Hk') as (-> & ->). apply L; auto.
-      rewrite claim_of_commit in C by (auto; lia). exact C.
-    - apply Cl; [lia|exact J]. }
-  destruct (B k Hk) as (E1 & _). rewrite E1 in Fin. intros v Hv. apply Fin.
-  rewrite <- Same by lia. exact Hv.
+  intros HN R L k n Hk J. destruct (judged N s k J) as (Len & Eq & Ck & R'). specialize (R' R). rewrite Eq in *.
+  pose proof (claims_length settled Len) as K0. rewrite <- K0 in *.
+  pose proof (check_sound_in_fractions N HN (machine_cores c) by_due (claims_with settled) Ck s R') as S.
+  assert (Fin : job_complete (fun k => finer N (stated_tasks (claims_with settled) k)) s
+    (release s k n + N * N.to_nat (bound (claim_of (claims_with settled) k))) k n).
+  { apply S; [|exact Hk|rewrite claim_of_commit by (auto; lia); exact J].
+    intros k' a Hk'. rewrite claim_of_commit by (auto; lia). intros C. apply L; auto. }
+  intros v Hv. unfold job_complete, stated_tasks in Fin. rewrite claim_of_commit in Fin by (auto; lia). apply Fin. exact Hv.
 Qed.
 
 End commit.

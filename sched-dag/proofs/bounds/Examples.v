@@ -207,14 +207,14 @@ Definition urgent_claim (r : N) : claim :=
      minimum_period := 8; relative_deadline := 8; least_deadline := 8;
      outranked_by := []; keeping := true; known_wcets := true; claimed := true; bound := r; loss := 0;
      width := 1; cover := None; parts := 0; part_of := [0]; free_chains := 0; chain_of := [0];
-     first_level := 3; later_level := 3 |}.
+     first_level := 3; later_level := 3; costless := false |}.
 
 Definition no_claim_of_3 : claim :=
   {| wcets := [3]%N; shared := None; wait_list := []; preds := [[]];
      minimum_period := 8; relative_deadline := 8; least_deadline := 8;
      outranked_by := [0]; keeping := true; known_wcets := true; claimed := false; bound := 0; loss := 0;
      width := 1; cover := None; parts := 0; part_of := [0]; free_chains := 0; chain_of := [0];
-     first_level := 0; later_level := 0 |}.
+     first_level := 0; later_level := 0; costless := false |}.
 
 Example blocking_counts :
   check 1 false [urgent_claim 4; no_claim_of_3] = true /\ check 1 false [urgent_claim 3; no_claim_of_3] = false.
@@ -231,14 +231,14 @@ Definition diamond : claim :=
      minimum_period := ms 10; relative_deadline := ms 10; least_deadline := ms 10;
      outranked_by := []; keeping := false; known_wcets := true; claimed := true; bound := ms 4; loss := 0;
      width := 2; cover := Some [0; 0; 1; 0]; parts := 2; part_of := [0; 0; 1; 0];
-     free_chains := 1; chain_of := [0; 0; 1; 0]; first_level := 0; later_level := 0 |}.
+     free_chains := 1; chain_of := [0; 0; 1; 0]; first_level := 0; later_level := 0; costless := false |}.
 
 Definition fork (r : N) : claim :=
   {| wcets := map ms [1; 3; 3; 3; 1]%N; shared := None; wait_list := []; preds := [[]; [0]; [0]; [0]; [1; 2; 3]];
      minimum_period := ms 20; relative_deadline := ms 20; least_deadline := ms 20;
      outranked_by := [0]; keeping := false; known_wcets := true; claimed := true; bound := r; loss := 0;
      width := 3; cover := Some [0; 0; 1; 2; 0]; parts := 3; part_of := [0; 0; 1; 2; 0];
-     free_chains := 0; chain_of := [0; 0; 1; 1; 0]; first_level := 0; later_level := 0 |}.
+     free_chains := 0; chain_of := [0; 0; 1; 1; 0]; first_level := 0; later_level := 0; costless := false |}.
 
 (** 14 ms, and no less by one ns. *)
 Example claims_hold : check 2 false [diamond; fork (ms 14)] = true.
@@ -269,7 +269,7 @@ Definition two_subtasks (lost : N) : claim :=
      minimum_period := 10; relative_deadline := 10; least_deadline := 10;
      outranked_by := []; keeping := false; known_wcets := true; claimed := true; bound := 3; loss := lost;
      width := 2; cover := Some [0; 1]; parts := 2; part_of := [0; 1];
-     free_chains := 1; chain_of := [0; 1]; first_level := 0; later_level := 0 |}.
+     free_chains := 1; chain_of := [0; 1]; first_level := 0; later_level := 0; costless := false |}.
 
 Definition both_cores_lost : set_run :=
   lap_run (fun _ => 0) (fun _ _ => 2) [
@@ -293,7 +293,7 @@ Definition small (outranked : list nat) (w D least r : N) : claim :=
      minimum_period := 10; relative_deadline := D; least_deadline := least;
      outranked_by := outranked; keeping := false; known_wcets := true; claimed := true; bound := r; loss := 0;
      width := 1; cover := None; parts := 0; part_of := [0]; free_chains := 0; chain_of := [0];
-     first_level := 0; later_level := 0 |}.
+     first_level := 0; later_level := 0; costless := false |}.
 
 (** Of two DAGs neither may outrank the other; under EDF not both may; a least deadline above the DAG's; a WCET of 0. *)
 Example nothing_is_proven_of_nothing : map (fun c => check 1 (fst c) (snd c)) [

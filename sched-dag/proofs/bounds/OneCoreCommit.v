@@ -2,8 +2,8 @@
 
     The commit is that of Commit.v, and so are the tasks.  The keys are computed: from the priorities of the subtasks,
       or
-    from the deadlines of sinks.  [judge_core] says of which DAGs it has shown the claimed bound and
-    those of sinks. *)
+    from the deadlines of sinks.  [judge_core] says of which DAGs it has shown all that is claimed: the bound, if
+    one is, and those of sinks. *)
 
 Require Import Arith Lia Bool List NArith.
 From Bounds Require Import Sums Model TaskSet Checker AnyResolution Commit OneCoreStretch OneCore OneCoreOrder
@@ -44,7 +44,8 @@ Definition with_bound (c : claim) (r : option N) : claim :=
      claimed := match r with Some _ => true | None => false end;
      bound := match r with Some r => r | None => 0%N end; loss := Checker.loss c; width := width c; cover := cover c;
      parts := parts c; part_of := part_of c; free_chains := free_chains c; chain_of := chain_of c;
-     first_level := first_level c; later_level := later_level c |}.
+     first_level := first_level c; later_level := later_level c;
+     costless := costless c |}.
 
 Section commit.
 Variables (c : commit) (more : list core_statement) (bursts : list burst).
@@ -83,10 +84,10 @@ Definition judge_core : list bool :=
   let cs := core_claims in
   let fine := (machine_cores c =? 1) && match ranking c with Any => false | _ => true end &&
               forallb subtasks_ok (dags c) in
-  map (fun k => if fine && claimed (dag_of cs k)
-                then if core_claim_ok (is_edf c) bursts cs k
-                     then forallb (fun b => b) (core_sinks_ok (is_edf c) bursts cs k) else false
-                else false) (seq 0 (Commit.number c)).
+  map (fun k => if fine && (if claimed (dag_of cs k) then core_claim_ok (is_edf c) bursts cs k
+                            else has_some (core_sinks (more_of k)))
+                then forallb (fun b => b) (core_sinks_ok (is_edf c) bursts cs k) else false)
+    (seq 0 (Commit.number c)).
 
 (** A run of the same tasks by the same keys. *)
 Lemma keyed_same K tau tau' edf key key' s :
@@ -142,13 +143,14 @@ Proof.
   intros HN Run Whole Losses k Hk J.
   assert (Len : length core_claims = Commit.number c) by (unfold core_claims; rewrite map_length, seq_length;
     reflexivity).
-  assert (Ok : core_claim_ok (is_edf c) bursts core_claims k = true /\
+  assert (Ok : (if claimed (dag_of core_claims k) then core_claim_ok (is_edf c) bursts core_claims k else true) = true /\
     forallb (fun b => b) (core_sinks_ok (is_edf c) bursts core_claims k) = true).
   { unfold judge_core in J. cbv zeta in J.
     set (f := fun k => _) in J. rewrite (nth_indep _ false (f 0)) in J by (rewrite map_length, seq_length; exact Hk).
     rewrite map_nth, seq_nth in J by exact Hk. rewrite Nat.add_0_l in J. unfold f in J.
-    destruct (_ && claimed (dag_of core_claims k)); [|discriminate].
-    destruct (core_claim_ok (is_edf c) bursts core_claims k); [auto|discriminate]. }
+    match type of J with (if _ && ?b then _ else _) = _ => destruct b eqn:E end; [|rewrite andb_false_r in J; discriminate].
+    match type of J with (if ?b then _ else _) = _ => destruct b; [|discriminate] end.
+    split; [|exact J]. destruct (claimed (dag_of core_claims k)); auto. }
   assert (Same : forall k, k < Commit.number c -> finer N (committed_by_rank k) = finer N (core_tasks core_claims k)).
   { intros k' Hk'. unfold core_tasks. rewrite core_claim_of_commit by exact Hk'. reflexivity. }
   assert (Run' : keyed_run (length core_claims) (fun k => finer N (core_tasks core_claims k)) (is_edf c)
@@ -159,7 +161,9 @@ Proof.
   rewrite <- Len in Whole.
   pose proof (Build_core_run (is_edf c) bursts core_claims N s HN Run' Whole Losses) as CoreRun.
   destruct Ok as (Ok & Sinks). split.
-  - intros r B n. pose proof (one_core_check_sound (is_edf c) bursts core_claims N s CoreRun k Ok n) as Fin.
+  - intros r B n. unfold dag_of in Ok. rewrite core_claim_of_commit in Ok by exact Hk.
+    cbn [core_claim_at of_dag with_bound claimed] in Ok. rewrite B in Ok.
+    pose proof (one_core_check_sound (is_edf c) bursts core_claims N s CoreRun k Ok n) as Fin.
     unfold dag_of in Fin. rewrite core_claim_of_commit in Fin by exact Hk.
     cbn [core_claim_at of_dag with_bound bound] in Fin. rewrite B in Fin.
     intros v Hv. apply Fin. rewrite Same in Hv by exact Hk. exact Hv.

@@ -121,7 +121,7 @@ Definition core_dag (works : list N) (before : list (list nat)) (key : N) (keep 
        {| wcets := works; shared := None; wait_list := []; preds := before; minimum_period := gap; relative_deadline := key;
           least_deadline := key; outranked_by := []; keeping := keep; known_wcets := true; claimed := true; bound := r;
           loss := 0; width := 1; cover := None; parts := 0; part_of := []; free_chains := 0; chain_of := [];
-          first_level := 0; later_level := 0 |};
+          first_level := 0; later_level := 0; costless := false |};
      key_at := fun _ => key; number_at := fun v => v; keeps_at := fun _ => keep; least_urgent := 0;
      longest_stretch := busy; points := ps; sinks := [] |}.
 

@@ -227,6 +227,22 @@ Proof.
   specialize (Bound (S j) (le_n _)). destruct (Nat.ltb_spec y (S j)); lia.
 Qed.
 
+(** While one of its vertices waits, a job executes on fewer cores than its graph is wide. *)
+Lemma busy_below_width n f v : chain_cover G n f -> ready G s t v -> A v = false -> busy G s t < n.
+Proof.
+  intros (Cover & C) Rv Av. pose proof Rv as (Hv & _). destruct n as [|j]; [specialize (Cover v Hv); lia|].
+  assert (B : busy G s t = count (size G) (fun u => (f u <=? j) && A u)).
+  { apply sum_ext. intros u Hu. specialize (Cover u Hu). destruct (Nat.leb_spec (f u) j); [auto|lia]. }
+  rewrite B. apply le_n_S, (at_most_j_cores j f (f v)).
+  - intros u w H Hw E _. apply C; auto.
+  - specialize (Cover v Hv). lia.
+  - intros u Hu E. destruct (A u) eqn:Au; auto. exfalso.
+    pose proof (only_ready_run G m s rules t u Hu Au) as Ru.
+    destruct (lt_eq_lt_dec u v) as [[H|H]|H]; [|congruence|].
+    + apply (ready_not_ordered G s t u v Ru Rv). apply C; auto.
+    + apply (ready_not_ordered G s t v u Rv Ru). apply C; auto.
+Qed.
+
 (** The exchange: each family has one that leaves no more, and of which one chain does not execute. *)
 Lemma exchange j f k :
   waiting_chain k -> disjoint_chains G j f ->

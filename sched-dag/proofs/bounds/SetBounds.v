@@ -104,11 +104,32 @@ Definition on_path (k j : nat) (f : nat -> nat) (level0 level1 v : nat) : nat :=
           else largest_blocking k (m - 1) level1
      else 0).
 
-Definition path_inequality (k j : nat) (f : nat -> nat) (level0 level1 most : nat) : Prop :=
-  no_path_longer (graph (tau k)) (on_path k j f level0 level1) most /\
-  weight (graph (tau k)) (together (tau k)) (outside k j f)
-  + (largest_blocking k m level0 - largest_blocking k (m - 1) level1)
-  + sum_over_others k (fun h => whole_work k j h (R k)) + (m - j) * loss k + most <= (m - j) * R k.
+Definition path_inequality (k : nat) (piece : nat -> bool) (r x : nat) : Prop :=
+  exists j f level0 level1 most,
+    j < m /\ disjoint_chains (graph (tau k)) j f /\ (forall v, v < size (graph (tau k)) -> f (head (tau k) v) = f v) /\
+    no_path_longer (graph (tau k)) (fun v => if piece v then on_path k j f level0 level1 v else 0) most /\
+    weight (graph (tau k)) (together (tau k)) (outside k j f)
+    + (largest_blocking k m level0 - largest_blocking k (m - 1) level1)
+    + sum_over_others k (fun h => whole_work k j h r) + (m - j) * x + most <= (m - j) * r.
+
+(** *** Widths that fit
+
+    DAG k and all that may delay it are no wider than there are cores. *)
+Definition delays (h k : nat) : bool :=
+  negb (h =? k) && (outranks pol h k || existsb (blocks k h) (seq 0 (size (graph (tau h))))).
+
+Definition widths_fit (k : nat) : Prop :=
+  (exists f, chain_cover (graph (tau k)) (width k) f) /\
+  (forall h, h < K -> delays h k = true -> bounded h = true) /\
+  width k + sum K (fun h => if delays h k then width h else 0) <= m.
+
+(** *** What shows that a part of DAG k is complete after r, with all that precedes it
+
+    [x]: in so many ticks of such a window, at most, any core is lost. *)
+Definition part_inequality (k : nat) (piece : nat -> bool) (r x : nat) : Prop :=
+  (forall u v, edge (graph (tau k)) u v = true -> piece v = true -> piece u = true) /\
+  (path_inequality k piece r x \/
+   widths_fit k /\ exists len, no_path_longer (graph (tau k)) (fun v => if piece v then together (tau k) v else 0) len /\ len + x <= r).
 
 Definition shown (k : nat) : Prop :=
   known (tau k) = true /\ regular (tau k) = true /\ blockers_known k /\
@@ -119,7 +140,7 @@ Definition shown (k : nat) : Prop :=
      on_core tau k (head (tau k) v) = on_core tau k v /\ part k (head (tau k) v) = part k v) /\
   (forall h, h < K -> h <> k -> outranks pol h k = true -> bounded h = true) /\
   (unblocked k \/ all_keep k) /\
-  exists j f len again level0 level1 most,
+  exists j f len again level0 level1,
     j < m /\
     no_path_longer (graph (tau k)) (together (tau k)) len /\
     disjoint_chains (graph (tau k)) j f /\ (forall v, v < size (graph (tau k)) -> f (head (tau k) v) = f v) /\
@@ -128,7 +149,7 @@ Definition shown (k : nat) : Prop :=
     let blocked := blocking k j again level0 level1 in
     (unblocked k \/ without_waits k) /\ each_counts k again /\
     (first_inequality k j len left blocked \/ second_inequality k j len left blocked) \/
-    path_inequality k j f level0 level1 most.
+    part_inequality k (fun _ => true) (R k) (loss k).
 
 End inequalities.
 
@@ -395,6 +416,23 @@ Definition higher (t : nat) : nat :=
 
 Definition lost_tick (t : nat) : bool := lost s (release s k n + t).
 
+(** Until the next release it is the only job of its DAG. *)
+Lemma only_this_job t : t < period (tau k) ->
+  task_cores tau s (release s k n + t) k = job_cores tau s (release s k n + t) k n.
+Proof.
+  intros Ht. set (b := release s k n + t).
+  unfold task_cores. apply (sum_only _ (job_cores tau s b k)).
+  - pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia.
+  - intros n' _ Ne. apply sum_zero. intros v Hv.
+    destruct (executes s b k n' v) eqn:E; [|rewrite andb_false_r; auto]. exfalso.
+    apply (only_ready_execute _ _ _ _ _ rules) in E; auto. destruct E as (_ & Rel & N & _).
+    destruct (lt_eq_lt_dec n' n) as [[H|H]|H]; [|lia|].
+    + apply N. apply job_finished_later with (release s k n); [unfold b; lia|]. apply before; auto.
+    + pose proof (releases_apart K m tau pol s rules k n (n' - n) in_K) as Ap.
+      replace (n + (n' - n)) with n' in Ap by lia.
+      destruct (n' - n) as [|d] eqn:Ed; [lia|]. rewrite Nat.mul_succ_l in Ap. unfold b in Rel. lia.
+Qed.
+
 Lemma others_are_other_dags t : t < period (tau k) ->
   others run t <= higher t + (if somebody_waits G run t && negb (lost_tick t)
                               then low (K * Z) (low_holds k n) t else 0).
@@ -407,17 +445,7 @@ Proof.
   apply somebody_waits_true in W. destruct W as (x & Rd & Ex). simpl in Ex.
   destruct (waiting_instance t x Rd Ex) as (Wv & Ri).
   destruct (dispatch _ _ _ _ _ rules b k n x in_K is_regular Wv Lo Ri (earlier_at t) Ex) as (_ & Ord).
-  assert (Own : task_cores tau s b k = job_cores tau s b k n).
-  { unfold task_cores. apply (sum_only _ (job_cores tau s b k)).
-    - pose proof (release_at_least K m tau pol s rules k n in_K). unfold b. lia.
-    - intros n' _ Ne. apply sum_zero. intros v Hv.
-      destruct (executes s b k n' v) eqn:E; [|rewrite andb_false_r; auto]. exfalso.
-      apply (only_ready_execute _ _ _ _ _ rules) in E; auto. destruct E as (_ & Rel & N & _).
-      destruct (lt_eq_lt_dec n' n) as [[H|H]|H]; [|lia|].
-      + apply N. apply job_finished_later with (release s k n); [unfold b; lia|]. apply before; auto.
-      + pose proof (releases_apart K m tau pol s rules k n (n' - n) in_K) as Ap.
-        replace (n + (n' - n)) with n' in Ap by lia.
-        destruct (n' - n) as [|d] eqn:Ed; [lia|]. rewrite Nat.mul_succ_l in Ap. unfold b in Rel. lia. }
+  pose proof (only_this_job t Ht) as Own. fold b in Own.
   assert (Split : sum K (task_cores tau s b) <= job_cores tau s b k n
     + sum_over_others K pol k (fun h => cores_of_jobs tau s (may_delay tau pol s k n h) b h)
     + low (K * Z) (low_holds k n) t).
@@ -526,17 +554,18 @@ Proof.
     rewrite (waits_or_skip _ _ _ _ _ _ _ _ _ Rk t W Lo). simpl. lia.
 Qed.
 
-Lemma bounded_along_a_path j f level0 level1 most I r :
+Lemma bounded_along_a_path piece j f level0 level1 most I r :
   j < m -> disjoint_chains G j f -> (forall v, v < size G -> f (head (tau k) v) = f v) ->
   heads_first G (head (tau k)) -> (forall v, v < size G -> on_core tau k (head (tau k) v) = on_core tau k v) ->
   known (tau k) = true -> unblocked K tau pol k \/ all_keep tau k ->
   r <= period (tau k) -> sum r (fun t => Nat.min (higher t) (m - j)) <= I ->
-  no_path_longer G (on_path K m tau pol k j f level0 level1) most ->
+  (forall u v, edge G u v = true -> piece v = true -> piece u = true) ->
+  no_path_longer G (fun v => if piece v then on_path K m tau pol k j f level0 level1 v else 0) most ->
   weight G (together (tau k)) (outside tau k j f)
   + (largest_blocking K tau pol k m level0 - largest_blocking K tau pol k (m - 1) level1) + I + most <= (m - j) * r ->
-  complete G run r.
+  forall v, v < size G -> piece v = true -> finished run r v.
 Proof.
-  intros Hj D F Heads On Kn Own Hr HI Most H. rewrite <- !largest_low in H.
+  intros Hj D F Heads On Kn Own Hr HI Closed Most H. rewrite <- !largest_low in H.
   assert (Sums : forall b, b < size G -> sum (size G) (fun v => if head (tau k) v =? b then job_exec s k n v else 0)
     <= together (tau k) b) by (intros b Hb; apply (shared_executions _ _ _ _ _ rules); auto).
   assert (Out : forall v, v < size G -> outside tau k j f (head (tau k) v) = outside tau k j f v)
@@ -551,7 +580,8 @@ Proof.
   refine (along_a_path G m run run_legal counts
     (blocked_at G m (on_core tau k) (K * Z) (longest_low k) level0 level1)
     (largest m level0 (K * Z) (longest_low k) - largest (m - 1) level1 (K * Z) (longest_low k)) _ _
-    (job_exec s k n) (m - j) (outside tau k j f) higher r I most _ (fun v _ => le_n _) _ HI _ _); [| |lia| | |lia].
+    (job_exec s k n) (m - j) piece (outside tau k j f) higher r I most _ (fun v _ => le_n _) Closed _ HI _ _);
+    [| |lia| | |lia].
   - intros d v Hv Rd. destruct Own as [U|A]; [rewrite Zero by auto; lia|].
     apply (blocked_at_release _ _ _ _ _ _ _ _ _ (run_keeps_cores A)); auto.
   - intros p d v Hv Rd Np. destruct Own as [U|A]; [rewrite Zero by auto; lia|].
@@ -568,16 +598,151 @@ Proof.
       apply (one_of_a_part G m run run_legal t j f z); auto. intros u v Huv Hv E L. apply D; auto. lia. }
     destruct (lost_tick t); simpl andb in O; cbv iota in O; lia.
   - unfold on_path in Most. rewrite <- !largest_low in Most.
-    apply (shared_paths G (head (tau k)) Heads (fun v => (m - j) * job_exec s k n v - (if outside tau k j f v then job_exec s k n v else 0))
-      (fun v => (m - j) * together (tau k) v - (if outside tau k j f v then together (tau k) v else 0))); [|exact Most].
+    set (weigh z v := (m - j) * z v - (if outside tau k j f v then z v else 0)) in *.
+    assert (Split : forall z e v, (if piece v then z v else 0) + (if piece v then e v else 0)
+      = if piece v then z v + e v else 0) by (intros z e v; destruct (piece v); reflexivity).
+    refine (no_path_longer_ext G _ _ most (Split (weigh (job_exec s k n)) _) _).
+    apply (shared_paths G (head (tau k)) Heads _ (fun v => if piece v then weigh (together (tau k)) v else 0)).
+    2: { refine (no_path_longer_ext G _ _ most (fun v => eq_sym (Split (weigh (together (tau k))) _ v)) _). exact Most. }
+    apply (sums_of_part G (head (tau k)) piece).
+    { intros v Hv. apply (heads_closed G (head (tau k)) Heads piece Closed v Hv). }
     intros b Hb. pose (q := m - j - (if outside tau k j f b then 1 else 0)).
     apply Nat.le_trans with (sum (size G) (fun v => q * (if head (tau k) v =? b then job_exec s k n v else 0))).
     + apply sum_le. intros v Hv. destruct (Nat.eqb_spec (head (tau k) v) b) as [E|]; [|lia].
-      unfold q. rewrite <- E, Out by auto. destruct (outside tau k j f v); nia.
+      unfold q, weigh. rewrite <- E, Out by auto. destruct (outside tau k j f v); nia.
     + rewrite sum_times. specialize (Sums b Hb). apply (Nat.mul_le_mono_l _ _ q) in Sums.
-      unfold q in *. destruct (outside tau k j f b); nia.
+      unfold q, weigh in *. destruct (outside tau k j f b); nia.
 Qed.
 
+(** *** Among DAGs that have kept their bounds so far *)
+
+Section kept.
+Variable now : nat.
+Hypothesis shown_all : forall h, h < K -> bounded h = true -> shown K m tau pol bounded R loss width parts part h.
+Hypothesis outranking : forall h, h < K -> h <> k -> outranks pol h k = true -> bounded h = true.
+Hypothesis kept : forall h, h < K -> bounded h = true -> kept_before tau s now h (R h).
+
+Lemma facts_of_bounded h : h < K -> bounded h = true ->
+  known (tau h) = true /\ regular (tau h) = true /\ heads_first (graph (tau h)) (head (tau h)) /\
+  (forall v, v < size (graph (tau h)) -> on_core tau h (head (tau h) v) = on_core tau h v) /\
+  kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
+  disjoint_parts (graph (tau h)) (parts h) (part h) /\
+  (forall v, v < size (graph (tau h)) -> part h (head (tau h) v) = part h v).
+Proof.
+  intros Hh Bh. destruct (shown_all h Hh Bh) as (H0 & H4 & _ & H1 & H2 & H5 & H6 & _ & _ & ? & ? & ? & ? & ? & ? &
+    _ & _ & _ & _ & (_ & H3) & _).
+  repeat (split; auto); apply H6; auto.
+Qed.
+
+Lemma facts h : h < K -> negb (h =? k) && outranks pol h k = true ->
+  known (tau h) = true /\ regular (tau h) = true /\ heads_first (graph (tau h)) (head (tau h)) /\
+  (forall v, v < size (graph (tau h)) -> on_core tau h (head (tau h) v) = on_core tau h v) /\
+  kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
+  disjoint_parts (graph (tau h)) (parts h) (part h) /\
+  (forall v, v < size (graph (tau h)) -> part h (head (tau h) v) = part h v).
+Proof.
+  intros Hh O. apply andb_true_iff in O. destruct O as (N & O). apply negb_true_iff, Nat.eqb_neq in N.
+  apply facts_of_bounded; auto.
+Qed.
+
+Lemma due h : match (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None) with
+  None => True
+  | Some (Dk, D) => forall n', may_delay tau pol s k n h n' = true -> release s h n' + D <= release s k n + Dk end.
+Proof.
+  unfold may_delay. destruct (by_deadline pol); auto. intros n' M.
+  apply andb_true_iff in M. destruct M as (_ & M). apply Nat.leb_le, M.
+Qed.
+
+Lemma higher_at_most j r x : release s k n + r <= now -> count r (fun t => lost s (release s k n + t)) <= x ->
+  sum r (fun t => Nat.min (higher t) (m - j))
+  <= sum_over_others K pol k (fun h => whole_work m tau pol R width k j h r) + (m - j) * x.
+Proof.
+  intros Hr Lo.
+  apply Nat.le_trans with (sum r (fun t => sum_over_others K pol k (fun h =>
+    Nat.min (cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h) (m - j))
+    + (m - j) * Nat.b2n (lost s (release s k n + t)))).
+  - apply sum_le. intros t Ht. unfold higher.
+    assert (sum_over_others K pol k (fun h => Nat.min
+        (cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h) (m - j))
+      >= Nat.min (sum_over_others K pol k (fun h =>
+        cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h)) (m - j)).
+    { apply Nat.le_trans with (1 := min_sum _ _ _). apply sum_le. intros h _.
+      destruct (negb (h =? k) && outranks pol h k); lia. }
+    destruct (lost s (release s k n + t)); simpl Nat.b2n; lia.
+  - rewrite sum_plus, sum_times. apply Nat.add_le_mono; [|apply Nat.mul_le_mono_l, Lo].
+    unfold sum_over_others. rewrite sum_swap. apply sum_le. intros h Hh.
+    destruct (negb (h =? k) && outranks pol h k) eqn:O; [|rewrite sum_zero; auto].
+    destruct (facts h Hh O) as (Fk & Fr & Fh & Fo & F0 & F1 & F2 & F3 & F4).
+    apply (kept_workload K m tau pol s rules now h (R h) Hh Fk Fr Fh Fo F0 F1 _ (release s k n) _
+             (due h) (m - j) (width h) r); auto.
+Qed.
+
+(** Where widths fit, an instance waits in no tick that is not lost. *)
+Lemma nobody_waits t : widths_fit K m tau pol bounded width k -> t < period (tau k) -> release s k n + t < now ->
+  lost_tick t = false -> somebody_waits G run t = false.
+Proof.
+  intros ((f & Cover) & Bd & Room) Ht Hn Lo. destruct (somebody_waits G run t) eqn:W; auto. exfalso.
+  apply somebody_waits_true in W. destruct W as (v & Rd & Ex). destruct (waiting_instance t v Rd Ex) as (Wv & Ri).
+  set (b := release s k n + t) in *.
+  destruct (dispatch _ _ _ _ _ rules b k n v in_K is_regular Wv Lo Ri (earlier_at t) Ex) as (All & Ord).
+  assert (Own : task_cores tau s b k < width k).
+  { unfold b. rewrite only_this_job by auto. apply Nat.le_lt_trans with (1 := job_cores_in_run K m tau s t k n).
+    apply (busy_below_width G m run run_legal t _ f v Cover Rd Ex). }
+  assert (Le : sum K (fun h => if h =? k then 0 else task_cores tau s b h)
+    <= sum K (fun h => if delays tau pol h k then width h else 0)).
+  { apply sum_le. intros h Hh. destruct (Nat.eqb_spec h k) as [->|Ne]; [lia|].
+    destruct (delays tau pol h k) eqn:De.
+    - destruct (facts_of_bounded h Hh (Bd h Hh De)) as (Fk & Fr & _ & _ & F0 & F1 & F2 & _).
+      apply (kept_part_width K m tau pol s rules now h (R h) Hh F0 F1 (fun _ => true)
+               b (on_core tau h) (width h) Hn
+               (fun n' => kept_width K m tau pol s rules now h (R h) Hh Fr F0 F1 b n' (width h) Hn F2)).
+    - apply Nat.eq_le_incl, sum_zero. intros n' _. apply sum_zero. intros w Hw.
+      destruct (on_core tau h w && executes s b h n' w) eqn:E; auto. exfalso.
+      apply andb_true_iff in E. destruct E as (Ow & Ew). pose proof Ow as Ww. apply negb_true_iff in Ww.
+      unfold delays in De. apply Nat.eqb_neq in Ne. rewrite Ne in De. simpl in De. apply orb_false_iff in De.
+      destruct De as (O & Bl). apply Nat.eqb_neq in Ne.
+      destruct (Ord h n' w Hh Hw Ww Ew) as [[P|P]|Kp]; [tauto| |].
+      + unfold may_delay in P. rewrite O in P. discriminate.
+      + assert (existsb (blocks tau pol k h) (seq 0 (size (graph (tau h)))) = true); [|congruence].
+        apply existsb_exists. exists w. split; [apply in_seq; lia|]. unfold blocks, may_block.
+        apply Nat.eqb_neq in Ne. rewrite Ne, O, Ow, Kp, orb_true_r. reflexivity. }
+  assert (Split : sum K (task_cores tau s b) = task_cores tau s b k + sum K (fun h => if h =? k then 0 else task_cores tau s b h)).
+  { pose proof (sum_only K (fun h => if h =? k then task_cores tau s b h else 0) k in_K
+      ltac:(intros h _ Ne; cbv beta; destruct (Nat.eqb_spec h k); [lia|auto])) as P.
+    cbv beta in P. rewrite Nat.eqb_refl in P. rewrite <- P, <- sum_plus.
+    apply sum_ext. intros h _. destruct (h =? k); lia. }
+  lia.
+Qed.
+
+(** *What is shown of a part of a job is true of it.* *)
+Lemma part_in_time q r x : known (tau k) = true -> heads_first G (head (tau k)) ->
+  (forall v, v < size G -> on_core tau k (head (tau k) v) = on_core tau k v) -> unblocked K tau pol k \/ all_keep tau k ->
+  r <= period (tau k) -> release s k n + r <= now -> count r (fun t => lost s (release s k n + t)) <= x ->
+  part_inequality K m tau pol bounded R width k q r x ->
+  forall v, v < size G -> q v = true -> finished run r v.
+Proof.
+  intros Kn Heads On Own Hr Hn Lo (Closed & [(j & f & level0 & level1 & most & Hj & D & F & Most & H)|(F & len & Len & H)]).
+  - pose proof (higher_at_most j r x Hn Lo) as Higher.
+    apply (bounded_along_a_path q j f level0 level1 most
+      (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h r) + (m - j) * x) r); auto. lia.
+  - assert (LenX : no_path_longer G (fun v => if q v then job_exec s k n v else 0) len).
+    { apply (shared_length G (head (tau k)) Heads _ (fun v => if q v then together (tau k) v else 0)); [|exact Len].
+      apply (sums_of_part G (head (tau k)) q).
+      - intros v Hv. apply (heads_closed G (head (tau k)) Heads q Closed v Hv).
+      - intros b Hb. apply (shared_executions _ _ _ _ _ rules); auto. }
+    refine (along_a_path G m run run_legal (fun _ => 0) (fun _ => 0) 0 _ _ (job_exec s k n) 1 q (fun _ => false)
+      (fun t => Nat.b2n (lost_tick t)) r x len ltac:(lia) (fun v _ => le_n _) Closed _ _ _ _).
+    + intros d v _ _. rewrite sum_zero; [lia|]. intros i _. destruct (runs run (0 + i) v); auto.
+    + intros p d v _ _ _. rewrite sum_zero; [lia|]. intros i _. destruct (runs run (S p + i) v); auto.
+    + intros t Ht Wt. destruct (lost_tick t) eqn:L; [simpl; lia|].
+      rewrite (nobody_waits t F ltac:(lia) ltac:(lia) L) in Wt. discriminate.
+    + apply Nat.le_trans with (2 := Lo). apply sum_le. intros t _. unfold lost_tick.
+      destruct (lost s (release s k n + t)); simpl; lia.
+    + apply (no_path_longer_ext G _ _ len) with (2 := LenX). intros v. destruct (q v); lia.
+    + unfold weight. rewrite sum_zero by auto. lia.
+Qed.
+
+End kept.
 End one.
 
 (** ** The theorem
@@ -598,7 +763,7 @@ Proof.
     assert (Kept : forall h, h < K -> bounded h = true -> kept_before tau s now h (R h)).
     { intros h Hh Bh n' Hn. apply (IH (release s h n' + R h) Hn h n' Hh Bh eq_refl). }
     destruct (Shown k Hk Bk) as (Kn & Reg & Bkn & _ & _ & Heads & Same & Outrank & Own & j & f & len & again & level0 &
-      level1 & most & Hj & Len & D & F & (Hr & HR) & Ineq).
+      level1 & Hj & Len & D & F & (Hr & HR) & Ineq).
     simpl in Ineq.
     pose proof (periods_positive _ _ _ _ _ rules k Hk) as HT.
     assert (Apart : forall n', n' < n -> release s k n' + period (tau k) <= release s k n).
@@ -618,43 +783,10 @@ Proof.
       by (intros b Hb; apply (shared_executions _ _ _ _ _ rules); auto).
     pose proof (shared_length _ _ Heads x _ Sums len Len) as LenX.
     pose proof (shared_left_over _ _ Heads x _ Sums j f F) as LeftX.
-    assert (Facts : forall h, h < K -> negb (h =? k) && outranks pol h k = true ->
-      known (tau h) = true /\ regular (tau h) = true /\ heads_first (graph (tau h)) (head (tau h)) /\
-      (forall v, v < size (graph (tau h)) -> on_core tau h (head (tau h) v) = on_core tau h v) /\
-      kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
-      disjoint_parts (graph (tau h)) (parts h) (part h) /\
-      (forall v, v < size (graph (tau h)) -> part h (head (tau h) v) = part h v)).
-    { intros h Hh O. apply andb_true_iff in O. destruct O as (N & O). apply negb_true_iff, Nat.eqb_neq in N.
-      pose proof (Outrank h Hh N O) as Bh.
-      destruct (Shown h Hh Bh) as (H0 & H4 & _ & H1 & H2 & H5 & H6 & _ & _ & ? & ? & ? & ? & ? & ? & ? & _ & _ & _ & _ & (_ & H3) & _).
-      repeat (split; auto); apply H6; auto. }
-    assert (Due : forall h, match (if by_deadline pol then Some (deadline (tau k), first_deadline (tau h)) else None)
-      with None => True
-      | Some (Dk, D) => forall n', may_delay tau pol s k n h n' = true ->
-                          release s h n' + D <= release s k n + Dk end).
-    { intros h. unfold may_delay. destruct (by_deadline pol); auto. intros n' M.
-      apply andb_true_iff in M. destruct M as (_ & M). apply Nat.leb_le, M. }
-    assert (Higher : sum (R k) (fun t => Nat.min (higher k n t) (m - j))
-      <= sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k)) + (m - j) * loss k).
-    { apply Nat.le_trans with (sum (R k) (fun t => sum_over_others K pol k (fun h =>
-        Nat.min (cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h) (m - j))
-        + (m - j) * Nat.b2n (lost s (release s k n + t)))).
-      + apply sum_le. intros t Ht. unfold higher.
-        assert (sum_over_others K pol k (fun h => Nat.min
-            (cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h) (m - j))
-          >= Nat.min (sum_over_others K pol k (fun h =>
-            cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + t) h)) (m - j)).
-        { apply Nat.le_trans with (1 := min_sum _ _ _). apply sum_le. intros h _.
-          destruct (negb (h =? k) && outranks pol h k); lia. }
-        destruct (lost s (release s k n + t)); simpl Nat.b2n; lia.
-      + rewrite sum_plus, sum_times. apply Nat.add_le_mono; [|apply Nat.mul_le_mono_l, losses; auto].
-        unfold sum_over_others. rewrite sum_swap. apply sum_le. intros h Hh.
-        destruct (negb (h =? k) && outranks pol h k) eqn:O; [|rewrite sum_zero; auto].
-        destruct (Facts h Hh O) as (Fk & Fr & Fh & Fo & F0 & F1 & F2 & F3 & F4).
-        apply (kept_workload K m tau pol s rules now h (R h) Hh Fk Fr Fh Fo F0 F1 _ (release s k n) _
-                 (Due h) (m - j) (width h) (R k)); auto. lia. }
+    pose proof (facts k now Shown Outrank Kept) as Facts. pose proof (due k n) as Due.
+    pose proof (higher_at_most k n Hk now Shown Outrank Kept j (R k) (loss k) ltac:(lia) (losses k _ Hk Bk)) as Higher.
     assert (C : complete (graph (tau k)) (job_run K m tau s k n) (R k)).
-    { destruct Ineq as [(Waits & Often & [I1|I2])|(Most & I3)].
+    { destruct Ineq as [(Waits & Often & [I1|I2])|I3].
       - apply (first_form _ m _ x len j f (R k)
                  (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k))
                   + (m - j) * loss k + blocking K m tau pol k j again level0 level1)); auto;
@@ -715,10 +847,29 @@ Proof.
             { rewrite <- sum_plus. apply sum_le. intros h _. unfold phi.
               destruct (negb (h =? k) && outranks pol h k); [apply clipped_further|lia]. }
             unfold phi in *. lia.
-      - apply (bounded_along_a_path k n Hk Reg Before Bkn j f level0 level1 most
-          (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h (R k)) + (m - j) * loss k)); auto; [|lia]. intros v Hv. apply Same, Hv. }
+      - intros v Hv. apply (part_in_time k n Hk Reg Before Bkn now Shown Outrank Kept (fun _ => true) (R k) (loss k)); auto;
+          [|lia]. intros u Hu. apply Same, Hu. }
     intros v Hv. apply (job_finished_in_run K m tau pol s rules); auto. }
   intros k n Hk Bk. apply (Main (release s k n + R k)); auto.
+Qed.
+
+(** *And a part of a job, such as a sink with all that precedes it, within its own bound.* *)
+Theorem part_bounds :
+  (forall k, k < K -> bounded k = true -> shown K m tau pol bounded R loss width parts part k) ->
+  forall k q r x, k < K -> bounded k = true -> r <= R k -> part_inequality K m tau pol bounded R width k q r x ->
+  (forall a, count r (fun t => lost s (a + t)) <= x) ->
+  forall n v, v < size (graph (tau k)) -> q v = true -> job_finished s (release s k n + r) k n v.
+Proof.
+  intros Shown k q r x Hk Bk Hr I Lo n v Hv Qv. pose proof (set_bounds Shown) as Fin.
+  destruct (Shown k Hk Bk) as (Kn & Reg & Bkn & _ & _ & Heads & Same & Outrank & Own & ? & ? & ? & ? & ? & ? & _ & _ & _ & _ & (_ & HR) & _).
+  assert (Before : forall n', n' < n -> job_complete tau s (release s k n) k n').
+  { intros n' Hn. pose proof (releases_apart K m tau pol s rules k n' (n - n') Hk) as Ap.
+    replace (n' + (n - n')) with n in Ap by lia. destruct (n - n') as [|d] eqn:Ed; [lia|]. rewrite Nat.mul_succ_l in Ap.
+    apply (job_complete_later tau s (release s k n' + R k)); [lia|auto]. }
+  apply (job_finished_in_run K m tau pol s rules); auto.
+  apply (part_in_time k n Hk Reg Before Bkn (release s k n + r) Shown Outrank
+    ltac:(intros h Hh Bh n' _; auto) q r x); auto; [|lia].
+  intros u Hu. apply Same, Hu.
 Qed.
 
 End proof.

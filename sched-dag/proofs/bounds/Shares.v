@@ -15,6 +15,11 @@ Definition heads_first (G : dag) (head : nat -> nat) : Prop := forall v, v < siz
 Lemma path_length_monotone c c' l : (forall v, c v <= c' v) -> path_length c l <= path_length c' l.
 Proof. intros H. unfold path_length. induction l as [|v l IH]; simpl; [lia|]. specialize (H v). lia. Qed.
 
+Lemma no_path_longer_ext G c c' len : (forall v, c v = c' v) -> no_path_longer G c len -> no_path_longer G c' len.
+Proof.
+  intros E H l P. apply Nat.le_trans with (2 := H l P). apply path_length_monotone. intros v. rewrite E. lia.
+Qed.
+
 (** The vertices of a path are a chain. *)
 Lemma path_is_chain G l : path G l -> exists k, chain G k /\ (forall c, path_length c l = weight G c k) /\
   forall v, k v = true -> match l with nil => False | last :: _ => v = last \/ precedes G v last end.
@@ -53,6 +58,14 @@ Proof.
   pose proof (edges_lead_up _ _ _ Eu). pose proof (edges_lead_up _ _ _ Ew).
   assert (P : precedes G u v) by (apply precedes_further with w; [apply precedes_edge|]; auto).
   destruct (IH u ltac:(lia) ltac:(lia)) as [->|Q]; [exact P|apply precedes_trans with u; auto].
+Qed.
+
+Lemma heads_closed (p : nat -> bool) : (forall u v, edge G u v = true -> p v = true -> p u = true) ->
+  forall v, v < size G -> p v = true -> p (head v) = true.
+Proof.
+  intros Closed v Hv Pv. assert (Up : forall u v, precedes G u v -> p v = true -> p u = true).
+  { induction 1 as [w E|w z P IH E]; intros Pw; [apply (Closed u w E Pw)|apply IH, (Closed w z E Pw)]. }
+  destruct (head_before v Hv) as [->|P]; [exact Pv|apply (Up _ _ P Pv)].
 Qed.
 
 Lemma head_in v : v < size G -> head v < size G.
@@ -118,6 +131,18 @@ Proof.
     - apply (Cmp a b u v); auto.
     - destruct (Cmp b a v u Hv Hu) as [E|[E|E]]; auto. }
   destruct H as [H|[H|H]]; [lia|exact H|]. apply precedes_up in H. lia.
+Qed.
+
+(** Sums of a part that has each head of its vertices. *)
+Lemma sums_of_part (p : nat -> bool) x y : (forall v, v < size G -> p v = true -> p (head v) = true) ->
+  (forall b, b < size G -> sum (size G) (fun v => if head v =? b then x v else 0) <= y b) ->
+  forall b, b < size G -> sum (size G) (fun v => if head v =? b then if p v then x v else 0 else 0)
+                          <= if p b then y b else 0.
+Proof.
+  intros Closed Sums b Hb. destruct (p b) eqn:Pb.
+  - apply Nat.le_trans with (2 := Sums b Hb). apply sum_le. intros v _. destruct (head v =? b), (p v); lia.
+  - rewrite sum_zero; [lia|]. intros v Hv. destruct (Nat.eqb_spec (head v) b) as [<-|]; auto.
+    destruct (p v) eqn:Pv; auto. rewrite (Closed v Hv Pv) in Pb. discriminate.
 Qed.
 
 Variables (x y : nat -> nat).

@@ -1,6 +1,6 @@
 (** What is proven, and what it says; statements.txt has the answers. *)
 From Bounds Require Import Sums Model Chains ResponseTime AlongAPath Blocking Workload TaskSet SetBounds Checker AnyResolution
-  Laps Examples Commit OneCoreStretch OneCore OneCoreOrder OneCoreCheck OneCoreCommit OneCoreExamples.
+  Laps Examples Commit SinkCommit OneCoreStretch OneCore OneCoreOrder OneCoreCheck OneCoreCommit OneCoreExamples.
 Set Printing Width 110.
 
 (** The rules. *)
@@ -11,7 +11,7 @@ Print alone.
 Print task. Print policy. Print set_run. Print job_done. Print job_finished. Print job_complete.
 Print instance_ready. Print earlier_complete. Print on_core. Print job_cores. Print task_cores. Print may_delay.
 Print has_begun. Print holds_core. Print cores_held. Print may_pass. Print global_run.
-Print workload. Print workload_by_deadline. Print clipped. Print blocking. Print first_inequality. Print second_inequality. Print rise. Print on_path. Print path_inequality. Print shown.
+Print workload. Print workload_by_deadline. Print clipped. Print blocking. Print first_inequality. Print second_inequality. Print rise. Print on_path. Print path_inequality. Print delays. Print widths_fit. Print part_inequality. Print shown.
 Print subtask. Print dag_statement. Print commit. Print vertex. Print vertices_of. Print expand.
 Print may_outrank. Print stated. Print claim. Print claim_at. Print stated_task. Print committed. Print committed_by_rank. Print finer.
 Print keys. Print urgency. Print job_before. Print goes_before. Print any_order. Print asked. Print keyed_run.
@@ -33,8 +33,11 @@ Check first_form_blocked.
 Check along_a_path.
 Check set_bounds.
 Check set_bounds_in_fractions.
+Check part_bounds.
+Check part_bounds_in_fractions.
 Check check_sound_in_fractions.
 Check judge_sound.
+Check judge_sinks_sound.
 Check one_core.
 Check one_core_by_start.
 Check order_tells_last.
@@ -50,7 +53,7 @@ Check sharp_form_fails_in_fractions.
 Definition all_of_them :=
   (@graham, @multi_path_alone, @first_form_in_fractions, @multi_path_alone_in_fractions,
   @response_time_equation, @second_form, @second_form_sharp, @first_form_blocked,
-  @along_a_path, @set_bounds, @set_bounds_in_fractions, @check_sound_in_fractions,
-  @judge_sound, @one_core, @one_core_by_start, @order_tells_last, @one_core_check_sound, @sink_check_sound,
+  @along_a_path, @set_bounds, @set_bounds_in_fractions, @part_bounds, @part_bounds_in_fractions, @check_sound_in_fractions,
+  @judge_sound, @judge_sinks_sound, @one_core, @one_core_by_start, @order_tells_last, @one_core_check_sound, @sink_check_sound,
   @judge_core_sound, @preempted_run_obeys, @three_obey_the_rules, @losses_of_any_core, @sharp_form_fails_in_fractions).
 Print Assumptions all_of_them.

@@ -4,10 +4,13 @@
     carried in, the period, and the time; then of each DAG: the deadlines of its subtasks (0: none of its own) and their
     numbers, of both first how many there are; 1 if a bound is claimed, the bound, stretch and level; how many points,
     and of each the distance, how many finishes, and these; how many sinks have bounds of their own, and of each the
-    vertex, bound, stretch, and points. *)
+    vertex, bound, stretch, and points.
+
+    3, then a commit likewise, and of each DAG how many sinks have bounds of their own, and of each the subtask, the
+    bound, and the loss. *)
 
 Require Import Bool List NArith.
-From Bounds Require Import Commit OneCoreCheck OneCoreCommit.
+From Bounds Require Import Commit SinkCommit OneCoreCheck OneCoreCommit.
 From Judge Require Import Reader.
 Import ListNotations.
 
@@ -39,6 +42,19 @@ Definition judge_core_numbers (l : list N) : option (list bool) :=
   | None => None
   end.
 
-(** [judge_sound], [judge_core_sound], [accepted_bounds_hold], [sporadic_bounds_hold]. *)
+Definition an_own_claim : parser own_claim :=
+  v <- small;; r <- one;; x <- one;; give {| subtask_number := v; own_bound := r; own_loss := x |}.
+
+Definition judge_sink_numbers (l : list N) : option (list bool) :=
+  match a_commit l with
+  | Some (c, l) =>
+      match many (length (dags c)) (listed an_own_claim) l with
+      | Some (own, []) => Some (judge_sinks c own)
+      | _ => None
+      end
+  | None => None
+  end.
+
+(** [judge_sound], [judge_sinks_sound], [judge_core_sound], [accepted_bounds_hold], [sporadic_bounds_hold]. *)
 Definition judge_all (l : list N) : option (list bool) :=
-  match l with 2%N :: l => judge_core_numbers l | _ => judge_numbers l end.
+  match l with 2%N :: l => judge_core_numbers l | 3%N :: l => judge_sink_numbers l | _ => judge_numbers l end.
