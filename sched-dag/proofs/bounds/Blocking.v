@@ -1,9 +1,9 @@
 (** * Subtasks that keep their cores: blocking by lower-ranked work
 
     MULTI_PATH.md, section 6, for one job among others.  All its vertices [on] a core keep it until they end, and
-    the others, its waits, need nobody.  In each tick others are higher-ranked work, [high t] cores, and lower-ranked subtasks [0 .. L - 1], of which
-    [low_holds t l] says whether l has a core; a run of it takes [longest l] at most.  In the ticks [skip] what
-    has a core may be interrupted; then what executes is [high].
+    the others, its waits, need nobody.  In each tick others are higher-ranked work, [high t] cores, and lower-ranked
+    subtasks [0 .. L - 1], of which [low_holds t l] says whether l has a core; a run of it takes [longest l] at most.
+    In the ticks [skip] what has a core may be interrupted; then what executes is [high].
 
     Two things are used: a lower-ranked subtask starts in no tick in which a ready vertex of the job waits to begin;
     and those that hold cores when a stretch of such ticks begins, after the release, leave one to a predecessor. *)

@@ -259,6 +259,41 @@ Proof.
   intros k a Hk _. simpl in Hk. destruct k as [|[|k]]; try lia; apply no_losses_bound, No.
 Qed.
 
+(** ** Waits off the path
+
+    On one core, two subtasks of segments that take 2 together, with a wait of 3 between them.  One wait counts, as
+    one path has no more: 4 + 3. *)
+Definition two_wait (r : N) : claim :=
+  {| wcets := [2; 3; 2; 2; 3; 2]%N; shared := Some ([0; 1; 0; 3; 4; 3], [2; 3; 0; 2; 3; 0]%N); wait_list := [1; 4];
+     preds := [[]; [0]; [1]; []; [3]; [4]]; minimum_period := 10; relative_deadline := 10; least_deadline := 10;
+     outranked_by := []; keeping := false; known_wcets := true; claimed := true; bound := r; loss := 0; width := 1;
+     cover := None; parts := 0; part_of := []; free_chains := 0; chain_of := [0; 0; 0; 1; 1; 1]; first_level := 0;
+     later_level := 0; costless := false |}.
+
+Example one_wait_counts : check 1 false [two_wait 7] = true /\ check 1 false [two_wait 6] = false.
+Proof. vm_compute. auto. Qed.
+
+Example two_wait_together : global_run 1 1 (stated_tasks [two_wait 7]) (stated_policy false [two_wait 7])
+  (lap_run (fun _ => 0) (fun _ v => nth v [1; 3; 1; 1; 3; 1] 0) [([(0, 0)], false); ([(0, 1); (0, 3)], false);
+    ([(0, 1); (0, 4)], false); ([(0, 1); (0, 4)], false); ([(0, 2); (0, 4)], false); ([(0, 5)], false);
+    ([], false); ([], false); ([], false); ([], false)]).
+Proof. apply lap_obeys_the_rules. vm_compute. reflexivity. Qed.
+
+(** Where all keep their cores, something of 5 blocks each of two segments, of 1 and 2 around a wait of 3. *)
+Definition waits_and_is_blocked (r : N) : list claim := [
+  {| wcets := [1; 3; 2]%N; shared := None; wait_list := [1]; preds := [[]; [0]; [1]]; minimum_period := 20;
+     relative_deadline := 20; least_deadline := 20; outranked_by := []; keeping := true; known_wcets := true;
+     claimed := true; bound := r; loss := 0; width := 1; cover := None; parts := 0; part_of := []; free_chains := 0;
+     chain_of := [0; 0; 0]; first_level := 5; later_level := 0; costless := false |};
+  {| wcets := [5]%N; shared := None; wait_list := []; preds := [[]]; minimum_period := 20; relative_deadline := 20;
+     least_deadline := 20; outranked_by := [0]; keeping := true; known_wcets := true; claimed := false; bound := 0;
+     loss := 0; width := 1; cover := None; parts := 0; part_of := []; free_chains := 0; chain_of := [0];
+     first_level := 0; later_level := 0; costless := false |}].
+
+Example each_wait_may_be_blocked : check 1 false (waits_and_is_blocked 16) = true /\
+  check 1 false (waits_and_is_blocked 15) = false.
+Proof. vm_compute. auto. Qed.
+
 (** ** Losses of all cores together
 
     Two subtasks of 2 ticks on two cores.  Core 0 is lost in the first tick of 10, core 1 in the second: each core by

@@ -46,6 +46,7 @@ Check sink_check_sound.
 Check judge_core_sound.
 Check preempted_run_obeys.
 Check three_obey_the_rules.
+Check two_wait_together.
 Check losses_of_any_core.
 Check sharp_form_fails_in_fractions.
 
@@ -55,5 +56,5 @@ Definition all_of_them :=
   @response_time_equation, @second_form, @second_form_sharp, @first_form_blocked,
   @along_a_path, @set_bounds, @set_bounds_in_fractions, @part_bounds, @part_bounds_in_fractions, @check_sound_in_fractions,
   @judge_sound, @judge_sinks_sound, @one_core, @one_core_by_start, @order_tells_last, @one_core_check_sound, @sink_check_sound,
-  @judge_core_sound, @preempted_run_obeys, @three_obey_the_rules, @losses_of_any_core, @sharp_form_fails_in_fractions).
+  @judge_core_sound, @preempted_run_obeys, @three_obey_the_rules, @two_wait_together, @losses_of_any_core, @sharp_form_fails_in_fractions).
 Print Assumptions all_of_them.

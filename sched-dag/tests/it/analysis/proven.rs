@@ -141,16 +141,20 @@ fn small(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
 fn what_it_proves_of_altered_witnesses_holds() {
     let folder = std::env::temp_dir().join(format!("proven-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder");
-    let (mut witnesses, mut on_core, mut fewer, mut sound) = (0, 0, 0, 0);
+    let (mut witnesses, mut on_core, mut blocked, mut fewer, mut sound) = (0, 0, 0, 0, 0);
     let mut sinks = [0; 2];
     let own_sinks = WITH_SINKS.iter().map(|&number| drawn(number));
-    for (task_set, settings) in (0..80).map(small).chain(own_sinks).flatten() {
+    // Bounds along a path are rare.
+    let numbers = (0..80).chain([269, 789, 1557, 2185]);
+    for (task_set, settings) in numbers.map(small).chain(own_sinks).flatten() {
         let text = witness(&task_set, &settings);
         let forms = [
             " paths ",
             " waiting ",
             " sharp ",
             " widths\n",
+            " reserved ",
+            " blocked ",
             " core ",
             " table\n",
         ];
@@ -176,6 +180,7 @@ fn what_it_proves_of_altered_witnesses_holds() {
             .iter()
             .filter(|line| line.contains("sink "))
             .count();
+        blocked += usize::from(text.contains(" blocked ") && !found[0].is_empty());
         for (lines, altered) in found.iter().zip(&texts) {
             let flaw = if lines.is_empty() {
                 None
@@ -196,7 +201,7 @@ fn what_it_proves_of_altered_witnesses_holds() {
     println!("sinks on several cores and on one: {sinks:?}");
     assert!(sinks.iter().all(|&count| count >= 5), "{sinks:?}");
     assert!(
-        on_core > 0 && witnesses > on_core + 5 && fewer > 700,
+        on_core > 0 && blocked == 2 && witnesses > on_core + 5 && fewer > 700,
         "{witnesses}, {fewer}"
     );
     fs::remove_dir_all(&folder).expect("it was made");
