@@ -935,6 +935,3 @@ Proof.
 Qed.
 
 End theorems.
-
-Print Assumptions one_core.
-Print Assumptions one_core_by_start.

@@ -842,6 +842,3 @@ Qed.
 
 End sound.
 End check.
-
-Print Assumptions one_core_check_sound.
-Print Assumptions sink_check_sound.

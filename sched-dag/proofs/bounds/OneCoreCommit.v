@@ -175,5 +175,3 @@ Proof.
 Qed.
 
 End commit.
-
-Print Assumptions judge_core_sound.

@@ -212,5 +212,3 @@ Definition far_deadlines (r : N) : list core_claim := [
 Example far_deadlines_count :
   core_sinks_ok true [] (far_deadlines 5) 0 = [true] /\ core_sinks_ok true [] (far_deadlines 4) 0 = [false].
 Proof. vm_compute. auto. Qed.
-
-Print Assumptions third_within_8_ms.

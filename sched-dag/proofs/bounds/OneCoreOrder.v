@@ -158,5 +158,3 @@ Proof.
   - split; [exact O1|]. intros x y Hx Hy L. unfold finer_key. cbn [urgent number]. specialize (O2 x y Hx Hy L). simpl.
     destruct edf; [|exact O2]. destruct O2 as [H|[(H & H')|H]]; [left; nia|right; left; split; [nia|auto]|auto].
 Qed.
-
-Print Assumptions order_tells_last.

@@ -31,9 +31,19 @@ Definition goes_before edf (key : keys) s (h n' w k n v : nat) : bool :=
   let y := urgency edf key s k n v in
   job_before x h n' y k n || (x =? y) && (h =? k) && (n' =? n) && (number key h w <? number key k v).
 
-Ltac by_keys := unfold goes_before, job_before in *; cbv zeta in *;
-  repeat first [rewrite orb_true_iff in * | rewrite andb_true_iff in * | rewrite Nat.ltb_lt in *
-                | rewrite Nat.eqb_eq in *].
+(** Hypothesis by hypothesis, for `in *` takes long. *)
+Ltac is_key b := match b with _ || _ => idtac | _ && _ => idtac | _ <? _ => idtac | _ =? _ => idtac end.
+Ltac by_keys :=
+  repeat match goal with
+  | H : ?b = true |- _ =>
+      match b with context [goes_before] => idtac | context [job_before] => idtac end;
+      unfold goes_before, job_before in H; cbv zeta in H
+  | H : context [?b = true] |- _ => is_key b; progress
+      repeat first [rewrite orb_true_iff in H | rewrite andb_true_iff in H | rewrite Nat.ltb_lt in H
+                    | rewrite Nat.eqb_eq in H]
+  end;
+  unfold goes_before, job_before; cbv zeta;
+  repeat first [rewrite orb_true_iff | rewrite andb_true_iff | rewrite Nat.ltb_lt | rewrite Nat.eqb_eq].
 
 (** Nothing is said by the policy of TaskSet.v: all may delay all, by keys. *)
 Definition any_order : policy := {| by_deadline := false; outranks := fun _ _ => true |}.
