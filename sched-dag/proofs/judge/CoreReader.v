@@ -55,6 +55,7 @@ Definition judge_sink_numbers (l : list N) : option (list bool) :=
   | None => None
   end.
 
-(** [judge_sound], [judge_sinks_sound], [judge_core_sound], [accepted_bounds_hold], [sporadic_bounds_hold]. *)
+(** [judge_sound], [judge_sinks_sound], [judge_core_sound], [accepted_bounds_hold], [sporadic_bounds_hold],
+    [losing_bounds_hold]. *)
 Definition judge_all (l : list N) : option (list bool) :=
   match l with 2%N :: l => judge_core_numbers l | 3%N :: l => judge_sink_numbers l | _ => judge_numbers l end.

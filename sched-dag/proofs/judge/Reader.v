@@ -8,13 +8,14 @@
     each subtask: priority, 1 if it keeps its core, its chains in cover, division and bound, its predecessors and its
     times, of both first how many there are.
 
-    A table: 1, 1 if it may begin at each release of its only DAG, lap, DAGs; of each DAG: period, offset, 1 if it is
-    never preempted, subtasks; of each subtask: WCET, bound, how many predecessors, and these.  Then lists; of each list
-    how many entries; of each entry: DAG, job as a difference of two numbers, subtask, start, finish, depth. *)
+    A table: 1, how laps begin (0: on the grid, 1: at releases, 2: at releases, with losses), lap, least time between laps,
+    what a lap may lose, DAGs; of each DAG: period, offset, subtasks; of each subtask: WCET, bound, loss in it, 1 if it
+    keeps its core, how many predecessors, and these.  Then lists; of each list how many entries; of each entry: DAG,
+    job as a difference of two numbers, subtask, start, finish, depth. *)
 
 Require Import Bool List NArith ZArith.
 From Bounds Require Import Commit.
-From Table Require Checker Sporadic.
+From Table Require Checker Sporadic Losses.
 Import ListNotations.
 
 Definition parser (A : Type) : Type := list N -> option (A * list N).
@@ -56,29 +57,34 @@ Definition a_commit : parser commit :=
 
 Definition whole : parser Z := n <- one;; give (Z.of_N n).
 
-Definition a_table : parser (bool * Checker.witness) :=
-  s <- flag;; lap <- whole;;
-  ds <- listed (t <- whole;; o <- whole;; a <- flag;;
-    vs <- listed (c <- whole;; r <- whole;; u <- listed small;;
-      give (Checker.Subtask c r (map (fun u => (u, 0%Z)) u)));;
-    give (Checker.Dag t o a vs));;
+Definition a_table : parser (N * Z * Z * Checker.witness) :=
+  k <- one;; lap <- whole;; g <- whole;; x <- whole;;
+  ds <- listed (t <- whole;; o <- whole;;
+    vs <- listed (c <- whole;; r <- whole;; x <- whole;; a <- flag;; u <- listed small;;
+      give (Checker.Subtask c (r - x) a (map (fun u => (u, 0%Z)) u)));;
+    give (Checker.Dag t o vs));;
   ls <- listed (listed (d <- small;; j <- whole;; i <- whole;; v <- small;; b <- whole;; f <- whole;; n <- whole;;
     give (Checker.Entry d (j - i)%Z v b f n)));;
-  give (s, Checker.Witness lap ds ls).
+  give (k, g, x, Checker.Witness lap ds ls).
 
 (** A WCET of 0 is an unknown one, here too. *)
 Definition known_wcets (w : Checker.witness) : bool :=
   forallb (fun d => forallb (fun v => 0 <? Checker.s_wcet v)%Z (Checker.d_subtasks d)) (Checker.w_dags w).
 
 (** For each DAG of a commit whether its bound is proven, or for all of a table together ([judge_sound],
-    [accepted_bounds_hold], [sporadic_bounds_hold]); nothing if the list is neither, or goes on. *)
+    [accepted_bounds_hold], [sporadic_bounds_hold], [losing_bounds_hold]); nothing if the list is neither, or goes on. *)
 Definition judge_numbers (l : list N) : option (list bool) :=
   match l with
   | 0%N :: l => match a_commit l with Some (c, []) => Some (judge c) | _ => None end
   | 1%N :: l =>
       match a_table l with
-      | Some ((at_each_release, w), []) =>
-          let ok := if at_each_release : bool then Sporadic.check_sporadic w else Checker.check w in
+      | Some ((k, g, x, w), []) =>
+          let ok := match k with
+            | 0%N => Checker.check w
+            | 1%N => Sporadic.check_sporadic w
+            | 2%N => Losses.check_losing w g x
+            | _ => false
+            end in
           Some (map (fun _ => known_wcets w && ok) (Checker.w_dags w))
       | _ => None
       end

@@ -49,7 +49,7 @@ Definition family_in (l : list entry) (i : nat) : Prop :=
     e_depth (get l (S i + n)) <= e_depth (get l i) /\
     e_finish (get l i) <= e_start (get l (S i + n)) /\
     e_start (get l i) + cost w (get l i) + sum (fun j => cost w (get l j)) (S i) n <= e_finish (get l i)) /\
-  (d_alone (dag_of w (get l i)) = true -> e_depth (get l (S i)) <= e_depth (get l i)).
+  (s_alone (subtask_of w (get l i)) = true -> e_depth (get l (S i)) <= e_depth (get l i)).
 
 Lemma core_ok_sound : forall n l, core_ok w n l = true -> forall i, (i < n)%nat -> family_in l i.
 Proof.
@@ -119,7 +119,7 @@ Lemma list_ok_sound : forall l, list_ok w l = true ->
     e_depth (line l (S n + m)) <= e_depth (line l n) /\
     e_finish (line l n) <= e_start (line l (S n + m)) /\
     e_start (line l n) + cost w (line l n) + sum (fun j => cost w (line l j)) (S n) m <= e_finish (line l n)) /\
-  (d_alone (dag_of w (line l n)) = true -> e_depth (line l (S n)) <= e_depth (line l n)).
+  (s_alone (subtask_of w (line l n)) = true -> e_depth (line l (S n)) <= e_depth (line l n)).
 Proof.
   intros l E. destruct l as [|x0 l0]; [discriminate|]. unfold list_ok in E.
   set (l := x0 :: l0) in *.
@@ -305,16 +305,12 @@ Proof.
   assert (Hfinish : forall k n, finish tb (k, n) = e_finish (line (list_of w k) n)) by reflexivity.
   assert (Hdepth : forall k n, depth tb (k, n) = e_depth (line (list_of w k) n)) by reflexivity.
   assert (Hcost : forall k n, wcet tb (k, n) = cost w (line (list_of w k) n)) by reflexivity.
-  constructor.
+  constructor; [constructor| |].
   - intros p _. apply cost_nonneg.
-  - intros k Hk. destruct (list_ok_sound _ (Hline k Hk)) as (_ & Hz & _). exact Hz.
   - intros k i Hk. destruct (list_ok_sound _ (Hline k Hk)) as (_ & _ & Hs). apply (Hs i).
   - intros k x Hk. destruct (list_ok_sound _ (Hline k Hk)) as (_ & _ & Hs).
     destruct (Hs x) as (_ & (m & F1 & F2 & F3 & F4) & _).
     exists m. rewrite work_is_sum. unfold encloses. split; [split; [left; split|]|]; auto.
-  - intros p Hp. destruct (row_at p Hp) as (Hin & _ & _ & _ & H1 & _).
-    destruct (lap_is_jobs _ Hin) as (_ & _ & _ & Hq). simpl. unfold job_at, nominal in *. fold H.
-    rewrite Z.mul_add_distr_r, <- Z.mul_assoc, Hq. lia.
   - intros p y Hy (Hp & Hd & Hj). split; auto.
     destruct (row_at y Hy) as (_ & _ & _ & _ & _ & _ & Hpred & Hbefore).
     change (wait tb p y) with (wait_of w p y). unfold wait_of.
@@ -329,6 +325,10 @@ Proof.
     + destruct (Z.eqb_spec (job_at w p) (job_at w y)) as [|_]; [lia|]. split; [lia|].
       apply (over_by_sound p y (e_sub (entry_at w y)) (e_job (entry_at w y) - 1)); auto.
       rewrite Hj. unfold job_at. lia.
+  - intros k Hk. destruct (list_ok_sound _ (Hline k Hk)) as (_ & Hz & _). exact Hz.
+  - intros p Hp. destruct (row_at p Hp) as (Hin & _ & _ & _ & H1 & _).
+    destruct (lap_is_jobs _ Hin) as (_ & _ & _ & Hq). simpl. unfold job_at, nominal in *. fold H.
+    rewrite Z.mul_add_distr_r, <- Z.mul_assoc, Hq. lia.
 Qed.
 
 (** **Each instance is at exactly one place**: subtask [v] of job [job] of DAG [d], from the grid's job 0 on. *)
@@ -422,10 +422,10 @@ Proof.
   destruct (sustainable tb accepted_is_right env late Hpun Hl s Hrun p Hp) as [_ Hfin]. specialize (Hfin Hnf). lia.
 Qed.
 
-(** **Subtasks of an np DAG are never preempted**, in an accepted table: once begun, they are on top until they end. *)
+(** **What keeps its core is never preempted**, in an accepted table: once begun, it is on top until it ends. *)
 Theorem accepted_alone : forall env late s,
   0 <= late -> punctual tb env late -> run tb env initial s ->
-  forall k n, (k < cores tb)%nat -> d_alone (dag_of w (entry_at w (k, n))) = true ->
+  forall k n, (k < cores tb)%nat -> s_alone (subtask_of w (entry_at w (k, n))) = true ->
   In n (map fst (stack s k)) -> exists left below, stack s k = (n, left) :: below.
 Proof.
   intros env late s Hl Hpun Hrun k n Hk Ha Hin.

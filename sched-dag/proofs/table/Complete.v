@@ -27,7 +27,7 @@ Record well_formed : Prop := {
   edges : forall d v x, In d (w_dags w) -> In v (d_subtasks d) -> In x (s_preds v) ->
     (fst x < length (d_subtasks d))%nat;
   bounds : forall p, (fst p < cores tb)%nat -> finish tb p <= release tb p + s_bound (subtask_of w (entry_at w p));
-  alone : forall k n, (k < cores tb)%nat -> d_alone (dag_of w (entry_at w (k, n))) = true ->
+  alone : forall k n, (k < cores tb)%nat -> s_alone (subtask_of w (entry_at w (k, n))) = true ->
     depth tb (k, S n) <= depth tb (k, n);
   everywhere : forall d job v, (d < length (w_dags w))%nat -> (v < length (d_subtasks (dag_at d)))%nat -> 0 <= job ->
     exists p, (fst p < cores tb)%nat /\ instance_at w p = (d, job, v);
@@ -64,7 +64,7 @@ Proof.
       * replace (sum (fun j => cost w (get (y :: rest) j)) 0 m)
           with (sum (fun j => cost w (nth j (x :: y :: rest) no_entry)) 1 m) by (apply sum_ext; intros; auto).
         change (nth 0 (x :: y :: rest) no_entry) with x in F7. lia.
-      * destruct (d_alone (dag_of w x)) eqn:A; [right; apply F8; exact A|left; auto].
+      * destruct (s_alone (subtask_of w x)) eqn:A; [right; apply F8; exact A|left; auto].
     + simpl in *. lia.
     + intros j Hj. apply (F4 (S j)). lia.
     + exact F5.
@@ -88,7 +88,7 @@ Proof.
   intros k Hk. pose proof (not_empty k Hk) as Hlen. set (l := list_of w k) in *.
   assert (L : forall j, (j < length l + length l)%nat -> let e := nth j (l ++ map (later H) l) no_entry in
     e_start e = start tb (k, j) /\ e_finish e = finish tb (k, j) /\ e_depth e = depth tb (k, j) /\
-    cost w e = wcet tb (k, j) /\ dag_of w e = dag_of w (entry_at w (k, j))).
+    cost w e = wcet tb (k, j) /\ subtask_of w e = subtask_of w (entry_at w (k, j))).
   { intros j Hj. cbv zeta. unfold H. rewrite (two_laps w l j Hj). repeat split. }
   assert (F : forall i, (i < length l)%nat -> family_in w (l ++ map (later H) l) i).
   { intros i Hi. destruct (family tb R k i Hk) as (n & (Hin & Hfin) & Hsum).

@@ -29,14 +29,12 @@ Record conditions (tb : table) : Prop := {
 
 Theorem conditions_suffice : forall tb, conditions tb -> right tb.
 Proof.
-  intros tb C. constructor.
+  intros tb C. constructor; [constructor|apply (from_0 tb C)|apply (c1 tb C)].
   - intros p Hp. pose proof (positive tb C p Hp). lia.
-  - apply (from_0 tb C).
   - apply (by_start tb C).
   - intros k x Hk. destruct (c4 tb C k x Hk) as (n & Hin & Hout & Hf). exists n. split; [|lia].
     split; [auto|]. destruct (Z_lt_ge_dec (start tb (k, (S x + n)%nat)) (finish tb (k, x))) as [Hlt|]; [|lia].
     pose proof (c3 tb C k x (S x + n)%nat Hk ltac:(lia) Hlt). lia.
-  - apply (c1 tb C).
   - intros p y Hy Hb. destruct (c2 tb C p y Hy Hb) as (Hp & Hw & Hf). repeat split; auto.
     destruct p as [k x]; simpl in Hp. destruct (c4 tb C k x Hp) as (n & _ & _ & E).
     pose proof (positive tb C (k, x) Hp).

@@ -109,7 +109,7 @@ Local Opaque Z.mul Z.add.
 
 Theorem nest_is_right : right nest.
 Proof.
-  constructor; simpl; try tauto; try lia.
+  constructor; [constructor| |]; simpl; try tauto; try lia.
   - intros [k [|n]] _; simpl; lia.
   - intros k [|[|n]] _; simpl; lia.
   - intros k [|[|x]] _.

@@ -2,24 +2,24 @@
 
     TABLE.md, section 6: for one DAG the origin of the lap is each release, not a grid, so it may be sporadic. Here each lap has
     its own origin; two origins are at least a lap apart. All DAGs of the table have the lap as their period, no offset, and
-    one job a lap. *)
+    one job a lap. As in AnyResolution.v a tick is 1/N of a nanosecond; laps begin at any tick. *)
 
 From Coq Require Import ZArith List Bool Lia.
 From Table Require Import Model Sustainable Checker CheckerProof.
 Import ListNotations.
 Open Scope Z_scope.
 
-(** The table of [w], with lap [n] at [origin_of n]. *)
-Definition table_at (w : witness) (origin_of : nat -> Z) : table :=
+(** The table of [w], in ticks, with lap [n] at [origin_of n], and its release at [release_of n]. *)
+Definition laps_at (N : Z) (w : witness) (origin_of release_of : nat -> Z) : table :=
   let lap p := (snd p / length (list_of w (fst p)))%nat in {|
   cores := length (w_lists w);
-  wcet := fun p => cost w (entry_at w p);
-  start := fun p => e_start (entry_at w p) + origin_of (lap p);
-  finish := fun p => e_finish (entry_at w p) + origin_of (lap p);
-  release := fun p => origin_of (lap p);
+  wcet := fun p => N * cost w (entry_at w p);
+  start := fun p => N * e_start (entry_at w p) + origin_of (lap p);
+  finish := fun p => N * e_finish (entry_at w p) + origin_of (lap p);
+  release := fun p => release_of (lap p);
   depth := fun p => e_depth (entry_at w p);
   before := waits_for w;
-  wait := wait_of w
+  wait := fun p y => N * wait_of w p y
 |}.
 
 (** One job of each DAG in a lap. *)
@@ -30,32 +30,14 @@ Definition one_job_a_lap (w : witness) : bool :=
 Definition check_sporadic (w : witness) : bool := check w && one_job_a_lap w.
 
 Section Sporadic.
-Variable w : witness.
+Variables (N : Z) (w : witness).
+Hypothesis positive : 0 < N.
 Hypothesis accepted : check_sporadic w = true.
-Variable origin_of : nat -> Z.
-Hypothesis first_origin : 0 <= origin_of O.
-Hypothesis apart : forall n, origin_of n + w_lap w <= origin_of (S n).
 
-Let tb := table_at w origin_of.
 Let lap (p : place) := (snd p / length (list_of w (fst p)))%nat.
 
 Lemma checked : check w = true.
 Proof. pose proof accepted as A. unfold check_sporadic in A. apply andb_prop in A. tauto. Qed.
-
-(** By how much lap [n] is later than in the periodic table. *)
-Let gap (n : nat) : Z := origin_of n - Z.of_nat n * w_lap w.
-
-Lemma gap_grows : forall n m, (n <= m)%nat -> gap n <= gap m.
-Proof.
-  intros n m Hnm. induction Hnm as [|m Hnm IH]; [lia|].
-  pose proof (apart m). unfold gap in *. lia.
-Qed.
-
-Lemma start_at : forall p, start tb p = start (table_of w) p + gap (lap p).
-Proof. intros p. unfold tb, table_at, table_of, gap, lap, lap_of; simpl. lia. Qed.
-
-Lemma finish_at : forall p, finish tb p = finish (table_of w) p + gap (lap p).
-Proof. intros p. unfold tb, table_at, table_of, gap, lap, lap_of; simpl. lia. Qed.
 
 Lemma list_not_empty : forall k, (k < length (w_lists w))%nat -> length (list_of w k) <> O.
 Proof.
@@ -93,33 +75,11 @@ Proof.
   unfold job_at. rewrite Hlists. unfold lap_of. fold (lap p). nia.
 Qed.
 
-Lemma table_at_is_right : right tb.
-Proof.
-  pose proof (accepted_is_right w checked) as R. constructor.
-  - apply (wcets _ R).
-  - intros k Hk. rewrite start_at. pose proof (zero _ R k Hk). pose proof (gap_grows 0 (lap (k, O)) ltac:(lia)) as G.
-    unfold gap in G at 1. simpl in G. lia.
-  - intros k i Hk. rewrite !start_at. pose proof (sorted _ R k i Hk).
-    pose proof (gap_grows _ _ (lap_grows k i (S i) Hk ltac:(lia))). lia.
-  - intros k x Hk. destruct (family _ R k x Hk) as (n & (Hin & Hfin) & Hsum). exists n.
-    rewrite work_is_sum in *. unfold encloses. rewrite !start_at, finish_at.
-    pose proof (gap_grows _ _ (lap_grows k x (S x + n) Hk ltac:(lia))).
-    split; [split; [exact Hin|lia]|].
-    change (sum (fun j => wcet tb (k, j)) (S x) n) with (sum (fun j => wcet (table_of w) (k, j)) (S x) n).
-    change (wcet tb (k, x)) with (wcet (table_of w) (k, x)). lia.
-  - intros p Hp. pose proof (start_nonneg p Hp). unfold tb; simpl. lia.
-  - intros p y Hy Hb. destruct (precedence _ R p y Hy Hb) as (Hp & Hw & Hf & Hs).
-    split; auto. split; [exact Hw|]. rewrite !start_at, finish_at. change (wait tb p y) with (wait (table_of w) p y).
-    assert (Hl : (lap p <= lap y)%nat).
-    { destruct Hb as (_ & _ & Hj). rewrite !job_is_lap in Hj by auto. destruct Hj as [[Hj _]|[Hj _]]; lia. }
-    pose proof (gap_grows _ _ Hl). lia.
-Qed.
-
 (** Each instance has a place, and is finished in the table within its stated bound. *)
 Lemma finish_in_lap : forall d n v, (d < length (w_dags w))%nat -> let g := nth d (w_dags w) no_dag in
   (v < length (d_subtasks g))%nat ->
-  exists p, (fst p < cores tb)%nat /\ instance_at w p = (d, Z.of_nat n, v) /\ lap p = n /\
-    finish tb p <= origin_of n + s_bound (nth v (d_subtasks g) no_subtask).
+  exists p, (fst p < length (w_lists w))%nat /\ instance_at w p = (d, Z.of_nat n, v) /\ lap p = n /\
+    e_finish (entry_at w p) <= s_bound (nth v (d_subtasks g) no_subtask).
 Proof.
   intros d n v Hd g Hv.
   destruct (instance_has_place w checked d (Z.of_nat n) v Hd Hv ltac:(lia)) as (p & Hp & Hi).
@@ -132,25 +92,68 @@ Proof.
   specialize (Hlists _ (in_list p Hp)). apply Z.eqb_eq in Hlists.
   assert (Hg : dag_of w (entry_at w p) = g) by (unfold dag_of; rewrite Hi1; reflexivity).
   unfold nominal, origin, subtask_of in Hb. rewrite Hlists, (proj2 Hdags), Zmod_0_l in Hb. rewrite Hg, Hi3 in Hb.
-  unfold tb, table_at; simpl. fold (lap p). rewrite Hlap. lia.
+  lia.
 Qed.
+
+Section Origins.
+Variables origin_of release_of : nat -> Z.
+Hypothesis apart : forall n, origin_of n + N * w_lap w <= origin_of (S n).
+
+Let tb := laps_at N w origin_of release_of.
+Let ahead (n : nat) := origin_of n - Z.of_nat n * (N * w_lap w).
+
+Lemma ahead_grows : forall n m, (n <= m)%nat -> ahead n <= ahead m.
+Proof. intros n m H. induction H as [|m H IH]; [lia|]. unfold ahead in *. pose proof (apart m). nia. Qed.
+
+Lemma laps_fit : fits tb.
+Proof.
+  pose proof (accepted_is_right w checked) as R.
+  assert (S0 : forall p, start tb p = N * start (table_of w) p + ahead (lap p)).
+  { intros p. unfold ahead, lap. simpl. unfold lap_of. ring. }
+  assert (F0 : forall p, finish tb p = N * finish (table_of w) p + ahead (lap p)).
+  { intros p. unfold ahead, lap. simpl. unfold lap_of. ring. }
+  constructor.
+  - intros p Hp. pose proof (wcets _ R p Hp) as H. simpl in H |- *. nia.
+  - intros k i Hk. rewrite !S0. pose proof (sorted _ R k i Hk).
+    pose proof (ahead_grows _ _ (lap_grows k i (S i) Hk ltac:(lia))). nia.
+  - intros k x Hk. destruct (family _ R k x Hk) as (n & (Hin & Hfin) & Hsum). exists n.
+    unfold encloses. rewrite !S0, F0.
+    pose proof (ahead_grows _ _ (lap_grows k x (S x + n) Hk ltac:(lia))).
+    assert (W : forall m i, work tb k i m = N * work (table_of w) k i m).
+    { induction m as [|m IH]; intros i; simpl; [ring|]. rewrite IH. simpl. ring. }
+    rewrite W. change (wcet tb (k, x)) with (N * wcet (table_of w) (k, x)).
+    split; [split; [exact Hin|nia]|nia].
+  - intros p y Hy Hb. destruct (precedence _ R p y Hy Hb) as (Hp & Hw & Hf & Hs).
+    split; auto. rewrite !S0, F0. change (wait tb p y) with (N * wait (table_of w) p y).
+    assert (Hl : (lap p <= lap y)%nat).
+    { destruct Hb as (_ & _ & Hj). rewrite !job_is_lap in Hj by auto.
+      destruct Hj as [[Hj _]|[Hj _]]; lia. }
+    pose proof (ahead_grows _ _ Hl). repeat split; nia.
+Qed.
+
+End Origins.
 
 (** **The checker's theorem for sporadic DAGs.** If [check_sporadic] accepts, then wherever the laps begin, a lap apart at least, in
     every run that obeys the rules, with releases at most [late] after the origins of their laps: subtask [v] of DAG [d] in lap
     [n] is finished (or passed, as void) at the latest the stated bound, [late], and what was lost after the lap's origin. *)
-Theorem sporadic_bounds_hold : forall env late s,
+Theorem sporadic_bounds_hold : forall origin_of env late s,
+  0 <= origin_of O -> (forall n, origin_of n + N * w_lap w <= origin_of (S n)) ->
+  let tb := laps_at N w origin_of origin_of in
   0 <= late -> punctual tb env late -> run tb env initial s ->
   forall d n v, (d < length (w_dags w))%nat -> let g := nth d (w_dags w) no_dag in
   (v < length (d_subtasks g))%nat ->
   exists p, (fst p < cores tb)%nat /\ instance_at w p = (d, Z.of_nat n, v) /\ lap p = n /\
-    (~ finished s p -> now s <= origin_of n + s_bound (nth v (d_subtasks g) no_subtask) + late + lost s).
+    (~ finished s p -> now s <= origin_of n + N * s_bound (nth v (d_subtasks g) no_subtask) + late + lost s).
 Proof.
-  intros env late s Hl Hpun Hrun d n v Hd g Hv.
+  intros origin_of env late s First Apart tb Hl Hpun Hrun d n v Hd g Hv.
   destruct (finish_in_lap d n v Hd Hv) as (p & Hp & Hi & Hlap & Hf). fold g in Hf.
   exists p. split; auto. split; auto. split; auto. intros Hnf.
-  destruct (sustainable tb table_at_is_right env late Hpun Hl s Hrun p Hp) as [_ Hfin]. specialize (Hfin Hnf). lia.
+  assert (R : right tb).
+  { constructor; [apply laps_fit, Apart| |].
+    - intros k Hk. pose proof (start_nonneg (k, O) Hk). simpl. rewrite Nat.div_0_l by (apply list_not_empty, Hk). nia.
+    - intros q Hq. pose proof (start_nonneg q Hq). simpl. nia. }
+  destruct (sustainable tb R env late Hpun Hl s Hrun p Hp) as [_ Hfin].
+  specialize (Hfin Hnf). simpl in Hfin. fold (lap p) in Hfin. rewrite Hlap in Hfin. nia.
 Qed.
 
 End Sporadic.
-
-

@@ -22,17 +22,21 @@ Definition encloses (k x i n : nat) : Prop :=
 (** The conditions on a table, as far as the theorem needs them.
     - [sorted], [family] are C3 and C4 of TABLE.md, but weaker: a finish may be later than start + WCETs of the family;
       nothing is said of the number of entries that are open.
-    - [ready] is C1 without the deadline.
-    - [precedence] is C2. Its last part follows from a WCET of 1 or more; with WCETs of 0 it is a condition of its own. *)
-Record right : Prop := {
+    - [precedence] is C2. Its last part follows from a WCET of 1 or more; with WCETs of 0 it is a condition of its own.
+    - [ready] is C1 without the deadline. *)
+Record fits : Prop := {
   wcets : forall p, (fst p < cores tb)%nat -> 0 <= wcet tb p;
-  zero : forall k, (k < cores tb)%nat -> 0 <= start tb (k, O);
   sorted : forall k i, (k < cores tb)%nat -> start tb (k, i) <= start tb (k, S i);
   family : forall k x, (k < cores tb)%nat -> exists n, encloses k x (S x) n /\
     start tb (k, x) + wcet tb (k, x) + work k (S x) n <= finish tb (k, x);
-  ready : forall p, (fst p < cores tb)%nat -> release tb p <= start tb p;
   precedence : forall p y, (fst y < cores tb)%nat -> before tb p y ->
     (fst p < cores tb)%nat /\ 0 <= wait tb p y /\ finish tb p + wait tb p y <= start tb y /\ start tb p < start tb y
+}.
+
+Record right : Prop := {
+  in_order :> fits;
+  zero : forall k, (k < cores tb)%nat -> 0 <= start tb (k, O);
+  ready : forall p, (fst p < cores tb)%nat -> release tb p <= start tb p
 }.
 
 (** The stack of core [k], at time [b] of the table, with the next entry at index [i]: what is left of each entry and of all
@@ -59,13 +63,13 @@ Definition waits_on_time (late : Z) (s : state) : Prop :=
 
 Definition on_time (late : Z) (s : state) : Prop := lists_on_time late s /\ waits_on_time late s.
 
-Hypothesis table_is_right : right.
+Hypothesis table_fits : fits.
 
 Lemma sorted_from : forall k i n, (k < cores tb)%nat -> start tb (k, i) <= start tb (k, (i + n)%nat).
 Proof.
   intros k i n Hk; induction n.
   - rewrite Nat.add_0_r; lia.
-  - rewrite Nat.add_succ_r. pose proof (sorted table_is_right k (i + n) Hk). lia.
+  - rewrite Nat.add_succ_r. pose proof (sorted table_fits k (i + n) Hk). lia.
 Qed.
 
 Lemma good_earlier : forall k i st b b', b' <= b -> good k i b st -> good k i b' st.
@@ -111,7 +115,7 @@ Proof.
   exists O. assert (n = O) as ->.
   { destruct Hin as [[Hin _]|[_ ?]]; auto. destruct n; auto. specialize (Hin i ltac:(lia)). specialize (Hp x i). lia. }
   simpl in *. rewrite Nat.add_0_r in *. split; [|lia]. split; [auto|]. rewrite Nat.add_0_r.
-  pose proof (sorted table_is_right k i Hk). lia.
+  pose proof (sorted table_fits k i Hk). lia.
 Qed.
 
 Lemma good_end : forall k i above x w below b,
@@ -149,7 +153,7 @@ Qed.
 Lemma work_nonneg : forall k n i, (k < cores tb)%nat -> 0 <= work k i n.
 Proof.
   intros k n; induction n; simpl; intros i Hk; try lia.
-  pose proof (wcets table_is_right (k, i) Hk). specialize (IHn (S i) Hk). lia.
+  pose proof (wcets table_fits (k, i) Hk). specialize (IHn (S i) Hk). lia.
 Qed.
 
 (** What is on the stack leaves time for itself and for what runs. *)
@@ -168,12 +172,13 @@ Qed.
 
 Section Run.
 Variable env : environment.
-Variable late : Z.
-Hypothesis environment_is_punctual : punctual tb env late.
-Hypothesis late_nonneg : 0 <= late.
+
+(** What is about to fall behind has been released, or is void. *)
+Definition released_by (d : Z) (s : state) : Prop := forall k, (k < cores tb)%nat -> start tb (next s k) <= now s - d ->
+  released env (next s k) (now s) = true \/ release tb (next s k) <= now s /\ void env (next s k) (now s) = true.
 
 (** The heart of the proof: if time may go on, no list is about to fall behind. *)
-Lemma quiet_ahead : forall s d, late <= d -> on_time d s -> quiet tb env s ->
+Lemma quiet_ahead : forall s d, released_by d s -> on_time d s -> quiet tb env s ->
   forall k, (k < cores tb)%nat -> now s - d < start tb (next s k).
 Proof.
   intros s d Hd [Hot Hwaits] Hq k Hk.
@@ -191,11 +196,9 @@ Proof.
     + destruct Hin as [[Hin _]|[_ ?]]; [|discriminate]. assert (depth tb (k, x) < depth tb (k, position s k)) by (apply Hin; lia).
       unfold next in Hge. lia.
   - (* it is released or void, and what it waits for has ended *)
-    assert (Hr : release tb (next s k) + late <= now s).
-    { pose proof (ready table_is_right (next s k) Hk). lia. }
-    destruct (environment_is_punctual (next s k) (now s) Hk Hr) as [Hrel|Hv]; [right|left; split; [lia|auto]].
+    destruct (Hd k Hk ltac:(lia)) as [Hrel|Hv]; [right|left; tauto].
     split; auto. intros [kp n] Hb.
-    destruct (precedence table_is_right _ (next s k) Hk Hb) as (Hkp & Hw0 & Hfs & Hss). simpl in Hkp.
+    destruct (precedence table_fits _ (next s k) Hk Hb) as (Hkp & Hw0 & Hfs & Hss). simpl in Hkp.
     destruct (Hot kp Hkp) as [Hs' Hg']. destruct (Hq kp Hkp) as [_ Htop'].
     assert (Hst : (n < position s kp)%nat).
     { destruct (Nat.lt_ge_cases n (position s kp)) as [|Hge]; auto. exfalso.
@@ -216,19 +219,19 @@ Proof. intros; unfold set; rewrite Nat.eqb_refl; auto. Qed.
 Lemma set_other : forall A (f : nat -> A) k j a, j <> k -> set f k a j = f j.
 Proof. intros; unfold set; apply Nat.eqb_neq in H; rewrite H; auto. Qed.
 
-Lemma step_lists_on_time : forall s t d, late <= d -> on_time d s -> step tb env s t ->
+Lemma step_lists_on_time : forall s t d, released_by d s -> on_time d s -> step tb env s t ->
   lists_on_time (d + (lost t - lost s)) t.
 Proof.
   intros s t d Hd Hon Hst. destruct Hon as [Hot Hwaits] eqn:E; clear E.
   inversion Hst; subst; intros j Hj; destruct (Hot j Hj) as [Hs Hg];
     unfold next; simpl; try rewrite Z.sub_diag; try rewrite Z.add_0_r.
   - destruct (Nat.eq_dec j k) as [->|Hjk].
-    + rewrite !set_same. pose proof (sorted table_is_right k (position s k) Hj) as Hsort.
+    + rewrite !set_same. pose proof (sorted table_fits k (position s k) Hj) as Hsort.
       unfold next in Hs. split; [lia|].
       pose proof (room_on_all _ _ _ _ (depth tb (next s k)) Hg H0) as Hroom.
-      destruct (family table_is_right k (position s k) Hj) as (n & He & Hn).
+      destruct (family table_fits k (position s k) Hj) as (n & He & Hn).
       simpl. repeat split; auto.
-      * apply (wcets table_is_right (k, position s k) Hj).
+      * apply (wcets table_fits (k, position s k) Hj).
       * exists n; split; auto. unfold next in *. lia.
       * assert (Hlt : Forall (fun e => (fst e < position s k)%nat) (stack s k)).
         { clear - Hg. revert Hg. generalize (now s - d).
@@ -240,11 +243,11 @@ Proof.
         apply good_start; auto.
     + rewrite !set_other by auto. split; auto.
   - destruct (Nat.eq_dec j k) as [->|Hjk].
-    + rewrite !set_same. pose proof (sorted table_is_right k (position s k) Hj) as Hsort.
+    + rewrite !set_same. pose proof (sorted table_fits k (position s k) Hj) as Hsort.
       unfold next in Hs. split; [lia|].
       destruct H0 as [H0|Hplain]; [|apply good_pass_plain; auto].
       pose proof (room_on_all _ _ _ _ (depth tb (next s k)) Hg H0) as Hroom.
-      pose proof (wcets table_is_right (k, position s k) Hj) as Hc.
+      pose proof (wcets table_fits (k, position s k) Hj) as Hc.
       apply good_earlier with (now s - d + wcet tb (k, position s k)); [lia|].
       apply good_start; auto.
     + rewrite !set_other by auto. split; auto.
@@ -267,8 +270,8 @@ Qed.
 
 Lemma start_finish : forall p, (fst p < cores tb)%nat -> start tb p <= finish tb p.
 Proof.
-  intros [k n] Hk; simpl in Hk. destruct (family table_is_right k n Hk) as (m & _ & Hf).
-  pose proof (work_nonneg k m (S n) Hk). pose proof (wcets table_is_right (k, n) Hk). lia.
+  intros [k n] Hk; simpl in Hk. destruct (family table_fits k n Hk) as (m & _ & Hf).
+  pose proof (work_nonneg k m (S n) Hk). pose proof (wcets table_fits (k, n) Hk). lia.
 Qed.
 
 Lemma set_place_same : forall A (f : place -> A) p a, set_place f p a p = a.
@@ -317,34 +320,15 @@ Proof.
     (destruct (Nat.eq_dec kp k) as [->|Hk]; [rewrite set_same; lia|rewrite set_other; auto]).
 Qed.
 
-Lemma step_on_time : forall s t d, late <= d -> on_time d s -> step tb env s t ->
+Lemma step_on_time : forall s t d, released_by d s -> on_time d s -> step tb env s t ->
   on_time (d + (lost t - lost s)) t /\ 0 <= lost t - lost s.
 Proof.
   intros s t d Hd Hon Hst. assert (Hl : 0 <= lost t - lost s) by (inversion Hst; subst; simpl; lia).
   split; auto. split; [apply step_lists_on_time; auto|]. intros p y Hy Hb Hf Hns.
-  destruct (precedence table_is_right p y Hy Hb) as (Hp & Hw & Hfs & _).
+  destruct (precedence table_fits p y Hy Hb) as (Hp & Hw & Hfs & _).
   destruct (step_finished s t d p Hon Hst Hp Hf) as [[Hf' ->]|He]; [|lia].
   assert (ended s p + wait tb p y <= start tb y + d); [|lia].
   apply (proj2 Hon); auto. intros Hs. apply Hns. eapply step_started; eauto.
-Qed.
-
-(** **Theorem T with losses.** From an instant at which all lists are at most [d] behind (and releases at most [late <= d]),
-    after any run all lists are at most [d] behind, plus what was lost since then. *)
-Theorem stays_on_time : forall s t d, late <= d -> on_time d s -> run tb env s t ->
-  on_time (d + (lost t - lost s)) t /\ 0 <= lost t - lost s.
-Proof.
-  intros s t d Hd Hot Hrun. induction Hrun as [s|s t u Hrun IH Hstep].
-  - rewrite Z.sub_diag, Z.add_0_r. split; auto; lia.
-  - destruct (IH Hot) as [IHo IHn].
-    destruct (step_on_time t u (d + (lost t - lost s))) as [H1 H2]; auto; try lia.
-    split; [|lia]. replace (d + (lost u - lost s)) with (d + (lost t - lost s) + (lost u - lost t)) by lia. auto.
-Qed.
-
-Lemma initial_on_time : on_time late initial.
-Proof.
-  split.
-  - intros k Hk. split; simpl; auto. pose proof (zero table_is_right k Hk). unfold next; simpl. lia.
-  - intros p y _ _ [Hs _]. unfold started in Hs; simpl in Hs. lia.
 Qed.
 
 (** When nothing is open on any core, no start has been missed, and no pending wait ends too late, all is on time, whatever was
@@ -353,24 +337,6 @@ Lemma idle_on_time : forall d s,
   (forall k, (k < cores tb)%nat -> stack s k = [] /\ now s <= start tb (next s k) + d) -> waits_on_time d s ->
   on_time d s.
 Proof. intros d s Hi Hw. split; auto. intros k Hk. destruct (Hi k Hk) as [-> Hs]. split; [lia|simpl; auto]. Qed.
-
-Lemma ended_by_now : forall s, run tb env initial s -> forall p, ended s p <= now s.
-Proof.
-  intros s Hrun. remember initial as i. induction Hrun as [|i s t Hrun IH Hstep]; subst; intros p; [simpl; lia|].
-  specialize (IH eq_refl p). destruct Hstep; simpl in *; try lia; unfold set_place;
-    match goal with |- context [if ?c then _ else _] => destruct c end; lia.
-Qed.
-
-(** In a table without waits the last condition is met. *)
-Lemma idle_without_waits : forall d s, (forall p y, wait tb p y = 0) -> run tb env initial s ->
-  (forall k, (k < cores tb)%nat -> stack s k = [] /\ now s <= start tb (next s k) + d) -> on_time d s.
-Proof.
-  intros d s Hw Hrun Hi. apply idle_on_time; auto. intros p [k n] Hk _ _ Hns. simpl in Hk.
-  rewrite Hw. pose proof (ended_by_now s Hrun p). destruct (Hi k Hk) as [_ Hs]. unfold next in Hs.
-  unfold started in Hns; simpl in Hns.
-  pose proof (sorted_from k (position s k) (n - position s k) Hk) as Hm.
-  replace (position s k + (n - position s k))%nat with n in Hm by lia. lia.
-Qed.
 
 (** What [on_time] says of one entry. *)
 Lemma on_time_bounds : forall d s p, on_time d s -> (fst p < cores tb)%nat ->
@@ -382,13 +348,44 @@ Proof.
     pose proof (sorted_from k (position s k) (n - position s k) Hk) as Hm.
     replace (position s k + (n - position s k))%nat with n in Hm by lia. unfold next in Hs. lia. }
   split; auto. intros Hn.
-  destruct (family table_is_right k n Hk) as (m & _ & Hf).
-  pose proof (work_nonneg k m (S n) Hk). pose proof (wcets table_is_right (k, n) Hk).
+  destruct (family table_fits k n Hk) as (m & _ & Hf).
+  pose proof (work_nonneg k m (S n) Hk). pose proof (wcets table_fits (k, n) Hk).
   destruct (Nat.lt_ge_cases n (position s k)) as [Hlt|Hge].
   - destruct (in_dec Nat.eq_dec n (map fst (stack s k))) as [Hin|Hnin].
     + destruct (good_in _ _ _ _ _ Hk Hg Hin) as (_ & Hfin & _). lia.
     + exfalso. apply Hn. split; auto.
   - assert (now s <= start tb (k, n) + d) by (apply H1; unfold started; simpl; lia). lia.
+Qed.
+
+End Run.
+End Table.
+
+Section Right.
+Variable tb : table.
+Hypothesis table_is_right : right tb.
+Variables (env : environment) (late : Z).
+Hypothesis environment_is_punctual : punctual tb env late.
+Hypothesis late_nonneg : 0 <= late.
+
+(** **Theorem T with losses.** From an instant at which all lists are at most [d] behind (and releases at most [late <= d]),
+    after any run all lists are at most [d] behind, plus what was lost since then. *)
+Theorem stays_on_time : forall s t d, late <= d -> on_time tb d s -> run tb env s t ->
+  on_time tb (d + (lost t - lost s)) t /\ 0 <= lost t - lost s.
+Proof.
+  intros s t d Hd Hot Hrun. induction Hrun as [s|s t u Hrun IH Hstep].
+  - rewrite Z.sub_diag, Z.add_0_r. split; auto; lia.
+  - destruct (IH Hot) as [IHo IHn].
+    destruct (step_on_time tb table_is_right env t u (d + (lost t - lost s))) as [H1 H2]; auto.
+    + intros k Hk Hs. pose proof (ready tb table_is_right (next t k) Hk).
+      destruct (environment_is_punctual (next t k) (now t) Hk ltac:(lia)); [left|right; split; [lia|]]; auto.
+    + split; [|lia]. replace (d + (lost u - lost s)) with (d + (lost t - lost s) + (lost u - lost t)) by lia. auto.
+Qed.
+
+Lemma initial_on_time : on_time tb late initial.
+Proof.
+  split.
+  - intros k Hk. split; simpl; auto. pose proof (zero tb table_is_right k Hk). unfold next; simpl. lia.
+  - intros p y _ _ [Hs _]. unfold started in Hs; simpl in Hs. lia.
 Qed.
 
 (** **Theorem T (sustainable).** In a right table, with releases at most [late] late, in every run: while an entry has not started
@@ -404,7 +401,7 @@ Proof.
   destruct (stays_on_time initial s late) as [Hot _]; auto; try lia.
   { apply initial_on_time. }
   simpl in Hot. rewrite Z.sub_0_r in Hot.
-  destruct (on_time_bounds _ _ p Hot Hp). split; intros; [specialize (H H1)|specialize (H0 H1)]; lia.
+  destruct (on_time_bounds tb table_is_right _ _ p Hot Hp). split; intros; [specialize (H H1)|specialize (H0 H1)]; lia.
 Qed.
 
 (** **An entry with an empty family is never preempted** (what an np DAG needs): when it has begun and not ended, it is the
@@ -418,7 +415,7 @@ Proof.
   { apply initial_on_time. }
   destruct (proj1 Hot k Hk) as [_ Hg]. revert Hg.
   generalize (now s - (late + (lost s - lost initial))). intros b Hg.
-  destruct (good_in _ _ _ _ _ Hk Hg Hin) as (_ & _ & Hlt & m & (Hbetween & _)).
+  destruct (good_in tb table_is_right _ _ _ _ _ Hk Hg Hin) as (_ & _ & Hlt & m & (Hbetween & _)).
   destruct (stack s k) as [|[x w] st]; [contradiction|].
   destruct Hin as [Heq|Hin]; simpl in *; [subst; eauto|]. exfalso.
   destruct Hg as (_ & Hx & _ & Hf & _).
@@ -430,7 +427,4 @@ Proof.
   assert (depth tb (k, n) < depth tb (k, S n)) by (apply Hbetween; lia). lia.
 Qed.
 
-End Run.
-End Table.
-
-
+End Right.

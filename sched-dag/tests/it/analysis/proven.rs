@@ -38,7 +38,7 @@ for name in sys.argv[2:]:
     try:
         witness = Witness(open(name).read())
         space['of_sinks'](witness, range(len(witness.dags)), 1)
-        [space['of_table'](table) for table in witness.tables]
+        [space['of_table'](witness, table) for table in witness.tables]
         space['of_core'](witness)
         found.append(witness)
     except Exception:
