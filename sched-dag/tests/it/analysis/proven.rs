@@ -39,7 +39,7 @@ for name in sys.argv[2:]:
         witness = Witness(open(name).read())
         space['of_sinks'](witness, range(len(witness.dags)), 1)
         [space['of_table'](witness, table) for table in witness.tables]
-        space['of_core'](witness)
+        space['of_core'](witness, range(len(witness.dags)))
         found.append(witness)
     except Exception:
         found.append(None)
