@@ -7,7 +7,7 @@
     see Examples.v.) *)
 
 Require Import Arith Lia Bool List.
-From Bounds Require Import Sums Model Chains Shares ResponseTime Blocking Workload TaskSet SetBounds Checker.
+From Bounds Require Import Sums Model Chains Shares ResponseTime Blocking Workload TaskSet Windows SetBounds Checker.
 
 Section scale.
 Variable N : nat.
@@ -52,6 +52,13 @@ Lemma mod_finer a b : (N * a) mod (N * b) = N * (a mod b).
 Proof.
   destruct (Nat.eq_dec b 0) as [->|Hb]; [rewrite Nat.mul_0_r; simpl; lia|].
   apply Nat.mul_mod_distr_l; lia.
+Qed.
+
+Lemma up_finer a b : up (N * a) (N * b) = up a b.
+Proof.
+  unfold up. destruct (Nat.eq_dec b 0) as [->|Hb]; [rewrite Nat.mul_0_r; reflexivity|]. symmetry.
+  pose proof (Nat.div_mod (a + (b - 1)) b Hb) as E. pose proof (Nat.mod_upper_bound (a + (b - 1)) b Hb) as L.
+  apply (Nat.div_unique _ _ _ (N * ((a + (b - 1)) mod b + 1) - 1)); nia.
 Qed.
 
 Lemma swap_factor a b : a * (N * b) = N * (a * b).
@@ -161,16 +168,21 @@ Lemma part_inequality_finer k q r x :
   part_inequality K m tau pol bounded R width k q r x ->
   part_inequality K m tau' pol bounded R' width k q (N * r) (N * x).
 Proof.
-  intros (C & [(j & f & level0 & level1 & most & Hj & D & F & Most & I)|(F & len & Len & I)]); (split; [exact C|]).
-  - left. exists j, f, (N * level0), (N * level1), (N * most). split; [exact Hj|]. split; [exact D|]. split; [exact F|]. split.
+  intros (C & [(j & f & level0 & level1 & most & full & Hj & D & F & Most & Full & I)|(F & len & Len & I)]); (split; [exact C|]).
+  - left. exists j, f, (N * level0), (N * level1), (N * most), full. cbv zeta in *.
+    change (together (tau' k)) with (fun v => N * together (tau k) v). rewrite weight_finer, !largest_blocking_finer.
+    split; [exact Hj|]. split; [exact D|]. split; [exact F|]. split; [|split].
     + apply (no_path_longer_ext _ (fun v => N * (if q v then on_path K m tau pol k j f level0 level1 v else 0)));
         [|apply no_path_longer_finer, Most].
       intros v. destruct (q v); [|lia]. unfold on_path. rewrite !largest_blocking_finer. simpl.
       rewrite swap_factor, Nat.mul_add_distr_l, Nat.mul_sub_distr_l. unfold outside, on_core. simpl.
       destruct (waits (tau k) v), (j <=? f v), (after_wait (graph (tau k)) (fun v => negb (waits (tau k) v)) v); simpl; lia.
-    + rewrite (sum_over_others_finer k (fun h => whole_work m tau pol R width k j h r)) by (intros; apply work_of_finer).
-      change (together (tau' k)) with (fun v => N * together (tau k) v). rewrite weight_finer, !largest_blocking_finer.
-      rewrite <- Nat.mul_sub_distr_l, !swap_factor, <- !Nat.mul_add_distr_l. apply Nat.mul_le_mono_l, I.
+    + intros h Hh Fh. destruct (Full h Hh Fh) as (M1 & Rank & Pos & Rest). split; [exact M1|]. split; [exact Rank|].
+      split; [|exact Rest]. apply Nat.mul_pos_pos; [exact positive|exact Pos].
+    + rewrite (sum_over_others_finer k (fun h => if full h then full_work tau h r else whole_work m tau pol R width k j h r)).
+      * rewrite <- Nat.mul_sub_distr_l, !swap_factor, <- !Nat.mul_add_distr_l. apply Nat.mul_le_mono_l, I.
+      * intros h. destruct (full h); [|apply work_of_finer]. unfold full_work. simpl. rewrite up_finer, weight_finer, swap_factor.
+        reflexivity.
   - right. split; [exact F|]. exists (N * len). split; [|rewrite <- Nat.mul_add_distr_l; apply Nat.mul_le_mono_l, I].
     apply (no_path_longer_ext _ (fun v => N * (if q v then together (tau k) v else 0))); [|apply no_path_longer_finer, Len].
     intros v. simpl. destruct (q v); lia.

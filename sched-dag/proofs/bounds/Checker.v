@@ -6,7 +6,7 @@
 
 Require Import Arith Lia Bool List NArith.
 From Bounds Require Import Sums Model Chains Shares OneTick Account ResponseTime Blocking Workload TaskSet
-  SetBounds.
+  Windows SetBounds.
 Import ListNotations.
 
 (** A DAG and the bound claimed for it.  Vertices are numbered such that predecessors come first.
@@ -386,6 +386,11 @@ Definition work_ofN (k h : nat) (vertices : nat -> bool) (p : nat) (r : N) : N :
     (weightN c (togetherN c) (fun v => vertices v && negb (existsb (Nat.eqb v) (wait_list c))))
     (N.of_nat p) (bound c) (minimum_period c) r.
 
+Definition full_workN (h : nat) (r : N) : N :=
+  let c := claim_of claims h in
+  ((r + (minimum_period c - 1)) / minimum_period c
+   * weightN c (togetherN c) (fun v => negb (existsb (Nat.eqb v) (wait_list c))))%N.
+
 Definition cores_usedN (j h : nat) : nat := Nat.min (m - j) (width (claim_of claims h)).
 
 Definition whole_workN (k j h : nat) (r : N) : N := work_ofN k h (fun _ => true) (cores_usedN j h) r.
@@ -443,14 +448,26 @@ Definition most_of (c : claim) (piece : nat -> bool) (w : nat -> N) : N :=
 Definition most_ok (c : claim) (piece : nat -> bool) (w : nat -> N) : bool :=
   let w' v := if piece v then w v else 0%N in levels_ok c w' (levels c w') (most_of c piece w).
 
-Definition path_ok (k : nat) (piece : nat -> bool) (j : nat) (f : nat -> nat) (level0 level1 r x : N) : bool :=
+Definition path_ok (k : nat) (piece : nat -> bool) (j : nat) (f : nat -> nat) (full : nat -> bool) (level0 level1 r x : N)
+    : bool :=
   let c := claim_of claims k in
   let every := largest_blockingN k m level0 in
   let later := largest_blockingN k (m - 1) level1 in
   let w := on_pathN c j f every later in
   most_ok c piece w &&
-  (weightN c (togetherN c) (outsideN c j f) + (every - later) + sum_over_othersN k (fun h => whole_workN k j h r)
+  (weightN c (togetherN c) (outsideN c j f) + (every - later)
+   + sum_over_othersN k (fun h => if full h then full_workN h r else whole_workN k j h r)
    + N.of_nat (m - j) * x + most_of c piece w <=? N.of_nat (m - j) * r)%N.
+
+(** On one core: whether the jobs of DAG h count in full, from where none is left. *)
+Definition in_fullN (k h : nat) : bool :=
+  let o := outranks (stated_policy due_no_later claims) in
+  negb (h =? k) && o h k && negb (has_some (wait_list (claim_of claims h))) &&
+  forallb (fun g => (g =? h) || negb (o g h) || negb (g =? k) && o g k) (seq 0 (length claims)).
+
+Definition window_ok (k j : nat) (f : nat -> nat) : bool :=
+  (m =? 1) && negb due_no_later && forallb (fun c => negb (keeping c)) claims &&
+  (0 <? weightN (claim_of claims k) (togetherN (claim_of claims k)) (outsideN (claim_of claims k) j f))%N.
 
 Definition delaysN (h k : nat) : bool :=
   negb (h =? k) && (outranks (stated_policy due_no_later claims) h k || keeping (claim_of claims h)).
@@ -463,7 +480,8 @@ Definition fits_ok (k : nat) : bool :=
 Definition part_ok (k : nat) (piece : nat -> bool) (j : nat) (f : nat -> nat) (level0 level1 r x : N) : bool :=
   let c := claim_of claims k in
   all_vertices c (fun v => negb (piece v) || forallb piece (nth v (preds c) [])) &&
-  (path_ok k piece j f level0 level1 r x ||
+  (path_ok k piece j f (fun _ => false) level0 level1 r x ||
+   window_ok k j f && path_ok k piece j f (in_fullN k) level0 level1 r x ||
    costless c && (x =? 0)%N && fits_ok k && most_ok c piece (togetherN c) && (most_of c piece (togetherN c) + x <=? r)%N).
 
 Definition inequality_ok (k : nat) (len : N) : bool :=
@@ -528,6 +546,11 @@ Lemma work_ofN_ok k h vertices p r :
 Proof.
   unfold work_ofN, work_of. cbv zeta. rewrite window_workN_ok, weightN_ok, Nat2N.id.
   unfold pol. simpl. destruct due_no_later; reflexivity.
+Qed.
+
+Lemma full_workN_ok h r : N.to_nat (full_workN h r) = full_work tau h (N.to_nat r).
+Proof.
+  unfold full_workN, full_work, up. cbv zeta. to_nat. rewrite weightN_ok. reflexivity.
 Qed.
 
 Lemma clipped_workN_ok k j h r x :
@@ -647,17 +670,33 @@ Proof.
     rewrite forallb_forall in Q. apply Q. unfold stated_edge, listed_edge in Ed. apply andb_true_iff in Ed.
     destruct Ed as (_ & Ed). apply existsb_exists in Ed. destruct Ed as (y & Hy & Ey). apply Nat.eqb_eq in Ey. subst. exact Hy. }
   apply orb_true_iff in I. destruct I as [I|I].
-  - left. unfold path_ok in I. cbv zeta in I. fold c in I. apply andb_true_iff in I. destruct I as (M & I).
+  - assert (Any : exists full, path_ok k piece j f full level0 level1 r x = true /\ forall h, h < length claims -> full h = true ->
+      window_applies (length claims) m tau pol k (weight (graph (tau k)) (together (tau k)) (outside tau k j f)) h).
+    { apply orb_true_iff in I. destruct I as [I|I]; [exists (fun _ => false); split; [exact I|discriminate]|].
+      apply andb_true_iff in I. destruct I as (Wn & I). exists (in_fullN k). split; [exact I|]. intros h Hh Fh.
+      unfold window_ok in Wn. rewrite !andb_true_iff, Nat.eqb_eq, negb_true_iff, N.ltb_lt in Wn.
+      destruct Wn as (((M1 & Rank) & Keep) & Pos). rewrite forallb_forall in Keep.
+      unfold in_fullN in Fh. rewrite !andb_true_iff in Fh. destruct Fh as (((Ne & Ou) & Wt) & Closed).
+      rewrite forallb_forall in Closed. split; [exact M1|]. split; [exact Rank|]. split; [|split].
+      - change (0 < weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outsideN c j f)). rewrite <- weightN_ok. fold c in Pos. lia.
+      - intros g w Hg. change (keeping (claim_of claims g) = false). apply negb_true_iff, Keep, nth_In, Hg.
+      - split; [unfold above; rewrite Ne; exact Ou|]. split.
+        + intros w _. simpl. destruct (wait_list (claim_of claims h)); [reflexivity|discriminate].
+        + intros g Hg Ng Og. specialize (Closed g ltac:(apply in_seq; lia)). apply Nat.eqb_neq in Ng. rewrite Ng in Closed.
+          change (outranks (stated_policy due_no_later claims) g h = true) in Og. rewrite Og in Closed. exact Closed. }
+    destruct Any as (full & Ok & Full). clear I. rename Ok into I.
+    left. unfold path_ok in I. cbv zeta in I. fold c in I. apply andb_true_iff in I. destruct I as (M & I).
     set (every := largest_blockingN k m level0) in *. set (later := largest_blockingN k (m - 1) level1) in *.
-    exists j, f, (N.to_nat level0), (N.to_nat level1), (N.to_nat (most_of c piece (on_pathN c j f every later))).
-    split; [exact Hj|]. split; [exact D|]. split; [exact Hf|]. split.
+    exists j, f, (N.to_nat level0), (N.to_nat level1), (N.to_nat (most_of c piece (on_pathN c j f every later))), full. cbv zeta.
+    split; [exact Hj|]. split; [exact D|]. split; [exact Hf|]. split; [|split; [exact Full|]].
     + intros l P. apply Nat.le_trans with (2 := most_ok_sound c piece _ E M l P). apply Nat.eq_le_incl.
       unfold path_length. f_equal. apply map_ext. intros v. destruct (piece v); [|reflexivity].
       symmetry. apply on_pathN_ok; apply largest_blockingN_ok.
     + apply N.leb_le in I. rewrite <- !largest_blockingN_ok.
       change (weight (graph (tau k)) (together (tau k)) (outside tau k j f))
         with (weight (stated_dag c) (fun v => N.to_nat (togetherN c v)) (outsideN c j f)).
-      rewrite <- (sum_over_othersN_ok k (fun h => whole_workN k j h r)) by (intros; apply work_ofN_ok).
+      rewrite <- (sum_over_othersN_ok k (fun h => if full h then full_workN h r else whole_workN k j h r))
+        by (intros h; destruct (full h); [apply full_workN_ok|apply work_ofN_ok]).
       rewrite <- weightN_ok, <- (Nat2N.id (m - j)). fold every later.
       rewrite <- N2Nat.inj_sub, <- !N2Nat.inj_mul, <- !N2Nat.inj_add. lia.
   - right. rewrite !andb_true_iff in I. destruct I as (((_ & F) & M) & I). split.

@@ -6,7 +6,7 @@
     times are listed, and each must satisfy an inequality; any that do are right. *)
 
 Require Import Arith Lia Bool List NArith.
-From Bounds Require Import Sums Model TaskSet Checker AnyResolution OneCoreStretch OneCore OneCoreOrder.
+From Bounds Require Import Sums Model Workload TaskSet Checker AnyResolution OneCoreStretch OneCore OneCoreOrder.
 Import ListNotations.
 
 (** A DAG, its keys, and what shows its bound.  Of [of_dag] the fields of the task, and [claimed] and [bound] are

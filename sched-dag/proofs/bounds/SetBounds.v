@@ -2,7 +2,7 @@
 
 Require Import Arith Lia Bool List.
 From Bounds Require Import Sums Model Chains Shares OneTick Account ResponseTime AlongAPath Blocking Workload
-  TaskSet.
+  TaskSet Windows.
 
 (** ** What has to be shown of each DAG: an inequality between numbers
 
@@ -104,13 +104,21 @@ Definition on_path (k j : nat) (f : nat -> nat) (level0 level1 v : nat) : nat :=
           else largest_blocking k (m - 1) level1
      else 0).
 
+(** On one core, where nothing keeps it, the jobs of some more urgent DAGs count in [full] from the begin of a window that
+    may precede the release; see Windows.v. *)
+Definition window_applies (k : nat) (left : nat) (h : nat) : Prop :=
+  m = 1 /\ by_deadline pol = false /\ 0 < left /\ (forall g w, g < K -> keeps (tau g) w = false) /\
+  counts_in_full K tau pol k h.
+
 Definition path_inequality (k : nat) (piece : nat -> bool) (r x : nat) : Prop :=
-  exists j f level0 level1 most,
+  exists j f level0 level1 most full,
+    let left := weight (graph (tau k)) (together (tau k)) (outside k j f) in
     j < m /\ disjoint_chains (graph (tau k)) j f /\ (forall v, v < size (graph (tau k)) -> f (head (tau k) v) = f v) /\
     no_path_longer (graph (tau k)) (fun v => if piece v then on_path k j f level0 level1 v else 0) most /\
-    weight (graph (tau k)) (together (tau k)) (outside k j f)
-    + (largest_blocking k m level0 - largest_blocking k (m - 1) level1)
-    + sum_over_others k (fun h => whole_work k j h r) + (m - j) * x + most <= (m - j) * r.
+    (forall h, h < K -> full h = true -> window_applies k left h) /\
+    left + (largest_blocking k m level0 - largest_blocking k (m - 1) level1)
+    + sum_over_others k (fun h => if full h then full_work tau h r else whole_work k j h r) + (m - j) * x + most
+    <= (m - j) * r.
 
 (** *** Widths that fit
 
@@ -677,6 +685,60 @@ Proof.
              (due h) (m - j) (width h) r); auto.
 Qed.
 
+(** *** On one core, with a window that begins earlier, by [d] *)
+Lemma window_before full j r x : m = 1 -> j < m -> by_deadline pol = false -> (forall g w, g < K -> keeps (tau g) w = false) ->
+  (forall h, h < K -> full h = true -> counts_in_full K tau pol k h) ->
+  release s k n + r <= now -> (forall a, count r (fun t => lost s (a + t)) <= x) ->
+  let most := sum_over_others K pol k (fun h => if full h then full_work tau h r else whole_work m tau pol R width k j h r)
+              + (m - j) * x in
+  exists d, Nat.min d r <= most /\ (d < r -> sum (r - d) (fun t => Nat.min (higher t) (m - j)) <= most - d).
+Proof.
+  intros M1 Hj Rank Keep Full Hr Lo most.
+  assert (rules1 : global_run K 1 tau pol s) by (rewrite <- M1; exact rules).
+  assert (J0 : j = 0) by lia. assert (One : m - j = 1) by lia.
+  assert (Regular : forall h, h < K -> full h = true -> counts_in_full K tau pol k h /\ regular (tau h) = true).
+  { intros h Hh Fh. pose proof (Full h Hh Fh) as C. split; [exact C|]. apply (facts h Hh (proj1 C)). }
+  destruct (last_quiet K tau pol s rules1 full (release s k n)) as (b & Hb & Q & On).
+  set (tick i := Nat.min (cores_above K tau pol s k i + Nat.b2n (lost s i)) 1).
+  assert (Total : sum r (fun i => tick (b + i)) <= most).
+  { apply Nat.le_trans with (sum r (fun i => sum_over_others K pol k (fun h => Nat.min (task_cores tau s (b + i) h) 1)
+      + Nat.b2n (lost s (b + i)))).
+    - apply sum_le. intros i _. unfold tick, cores_above, above, sum_over_others.
+      pose proof (min_sum K (fun h => if negb (h =? k) && outranks pol h k then task_cores tau s (b + i) h else 0) 1) as Mn.
+      assert (sum K (fun h => Nat.min (if negb (h =? k) && outranks pol h k then task_cores tau s (b + i) h else 0) 1)
+        = sum K (fun h => if negb (h =? k) && outranks pol h k then Nat.min (task_cores tau s (b + i) h) 1 else 0))
+        by (apply sum_ext; intros h _; destruct (negb (h =? k) && outranks pol h k); reflexivity).
+      lia.
+    - rewrite sum_plus. unfold most. rewrite One, Nat.mul_1_l. apply Nat.add_le_mono; [|apply (Lo b)].
+      unfold sum_over_others. rewrite sum_swap. apply sum_le. intros h Hh.
+      destruct (negb (h =? k) && outranks pol h k) eqn:O; [|rewrite sum_zero; auto].
+      destruct (facts h Hh O) as (Fk & Fr & Fh & Fo & F0 & F1 & F2 & _). destruct (full h) eqn:Fl.
+      + apply Nat.le_trans with (2 := window_of_full K tau pol s rules1 full b r h Hh Fl Q Fk Fh Fo).
+        apply sum_le. intros i _. lia.
+      + pose proof (kept_workload K m tau pol s rules now h (R h) Hh Fk Fr Fh Fo F0 F1 (fun _ => true) b None I
+          (m - j) (width h) r ltac:(lia) F2) as Wk.
+        unfold whole_work, work_of. rewrite Rank. rewrite One in Wk. unfold cores_used. rewrite One. exact Wk. }
+  assert (Before : forall i, b + i < release s k n -> tick (b + i) = 1).
+  { intros i Hi. destruct (On (b + i) ltac:(lia)) as (h & n' & w & Lf). unfold tick.
+    destruct (lost s (b + i)) eqn:L; [simpl; lia|].
+    pose proof (executes_above K tau pol s rules1 Keep k full Regular (b + i) h n' w Lf L). simpl. lia. }
+  exists (release s k n - b). split.
+  - apply Nat.le_trans with (2 := Total). rewrite <- (Nat.mul_1_r (Nat.min _ _)), <- sum_const.
+    apply Nat.le_trans with (sum (Nat.min (release s k n - b) r) (fun i => tick (b + i))); [|apply sum_more; lia].
+    apply sum_le. intros i Hi. rewrite Before; lia.
+  - intros Hd. set (d := release s k n - b) in *. replace r with (d + (r - d)) in Total at 1 by lia.
+    rewrite sum_shift in Total.
+    assert (Ed : sum d (fun i => tick (b + i)) = d).
+    { rewrite <- (Nat.mul_1_r d) at 2. rewrite <- sum_const. apply sum_ext. intros i Hi. apply Before. lia. }
+    apply Nat.le_trans with (sum (r - d) (fun i => tick (b + (d + i)))); [|lia]. apply sum_le. intros i _.
+    replace (b + (d + i)) with (release s k n + i) by lia. unfold tick, higher, cores_above, sum_over_others, above.
+    assert (sum K (fun h => if negb (h =? k) && outranks pol h k
+        then cores_of_jobs tau s (may_delay tau pol s k n h) (release s k n + i) h else 0)
+      <= sum K (fun h => if negb (h =? k) && outranks pol h k then task_cores tau s (release s k n + i) h else 0)).
+    { apply sum_le. intros h _. destruct (negb (h =? k) && outranks pol h k); [apply some_jobs|lia]. }
+    destruct (lost s (release s k n + i)); simpl Nat.b2n; lia.
+Qed.
+
 (** Where widths fit, an instance waits in no tick that is not lost. *)
 Lemma nobody_waits t : widths_fit K m tau pol bounded width k -> t < period (tau k) -> release s k n + t < now ->
   lost_tick t = false -> somebody_waits G run t = false.
@@ -717,14 +779,26 @@ Qed.
 (** *What is shown of a part of a job is true of it.* *)
 Lemma part_in_time q r x : known (tau k) = true -> heads_first G (head (tau k)) ->
   (forall v, v < size G -> on_core tau k (head (tau k) v) = on_core tau k v) -> unblocked K tau pol k \/ all_keep tau k ->
-  r <= period (tau k) -> release s k n + r <= now -> count r (fun t => lost s (release s k n + t)) <= x ->
+  r <= period (tau k) -> release s k n + r <= now -> (forall a, count r (fun t => lost s (a + t)) <= x) ->
   part_inequality K m tau pol bounded R width k q r x ->
   forall v, v < size G -> q v = true -> finished run r v.
 Proof.
-  intros Kn Heads On Own Hr Hn Lo (Closed & [(j & f & level0 & level1 & most & Hj & D & F & Most & H)|(F & len & Len & H)]).
-  - pose proof (higher_at_most j r x Hn Lo) as Higher.
-    apply (bounded_along_a_path q j f level0 level1 most
-      (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h r) + (m - j) * x) r); auto. lia.
+  intros Kn Heads On Own Hr Hn Lo
+    (Closed & [(j & f & level0 & level1 & most & full & Hj & D & F & Most & Full & H)|(F & len & Len & H)]).
+  - destruct (some_or_none K full) as [(h0 & Hh0 & F0)|None].
+    + destruct (Full h0 Hh0 F0) as (M1 & Rank & Pos & Keep & _).
+      destruct (window_before full j r x M1 Hj Rank Keep ltac:(intros h Hh Fh; apply (Full h Hh Fh)) Hn Lo) as (d & Hd & Early).
+      destruct (le_lt_dec r d) as [Ld|Ld]; [nia|]. intros v Hv Qv. apply finished_later with (r - d); [lia|].
+      apply (bounded_along_a_path q j f level0 level1 most
+        (sum_over_others K pol k (fun h => if full h then full_work tau h r else whole_work m tau pol R width k j h r)
+         + (m - j) * x - d) (r - d)); auto; [lia|]. nia.
+    + pose proof (higher_at_most j r x Hn (Lo _)) as Higher.
+      apply (bounded_along_a_path q j f level0 level1 most
+        (sum_over_others K pol k (fun h => whole_work m tau pol R width k j h r) + (m - j) * x) r); auto.
+      assert (E : sum_over_others K pol k (fun h => if full h then full_work tau h r else whole_work m tau pol R width k j h r)
+        = sum_over_others K pol k (fun h => whole_work m tau pol R width k j h r))
+        by (apply sum_ext; intros h Hh; rewrite (None h Hh); reflexivity).
+      lia.
   - assert (LenX : no_path_longer G (fun v => if q v then job_exec s k n v else 0) len).
     { apply (shared_length G (head (tau k)) Heads _ (fun v => if q v then together (tau k) v else 0)); [|exact Len].
       apply (sums_of_part G (head (tau k)) q).
@@ -736,7 +810,7 @@ Proof.
     + intros p d v _ _ _. rewrite sum_zero; [lia|]. intros i _. destruct (runs run (S p + i) v); auto.
     + intros t Ht Wt. destruct (lost_tick t) eqn:L; [simpl; lia|].
       rewrite (nobody_waits t F ltac:(lia) ltac:(lia) L) in Wt. discriminate.
-    + apply Nat.le_trans with (2 := Lo). apply sum_le. intros t _. unfold lost_tick.
+    + apply Nat.le_trans with (2 := Lo (release s k n)). apply sum_le. intros t _. unfold lost_tick.
       destruct (lost s (release s k n + t)); simpl; lia.
     + apply (no_path_longer_ext G _ _ len) with (2 := LenX). intros v. destruct (q v); lia.
     + unfold weight. rewrite sum_zero by auto. lia.

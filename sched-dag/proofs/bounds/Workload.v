@@ -254,3 +254,34 @@ Definition window_work (cut : option (nat * nat)) (V p R T r : nat) : nat :=
   | None => workload V p R T r
   | Some (Dk, D) => Nat.min (workload V p R T r) (workload_by_deadline V p R T Dk D)
   end.
+
+(** ** How many jobs are released in a window *)
+
+Lemma jobs_in_window M (rel : nat -> nat) P lo hi c (p : nat -> bool) :
+  (forall n, rel n + P <= rel (S n)) -> (forall n, p n = true -> lo <= rel n < hi) ->
+  hi <= lo + c * P -> count M p <= c.
+Proof.
+  intros Apart. revert hi c p. induction M as [|M IH]; intros hi c p H W; [unfold count; simpl; lia|].
+  change (count M p + Nat.b2n (p M) <= c). destruct (p M) eqn:E; simpl.
+  2:{ specialize (IH hi c p H W). lia. }
+  pose proof (H M E) as HM. destruct c as [|c]; [lia|].
+  assert (Grow : forall d n, rel n + d * P <= rel (n + d)).
+  { induction d; intros n; [replace (n + 0) with n by lia; simpl; lia|].
+    rewrite Nat.add_succ_r. specialize (IHd n). specialize (Apart (n + d)). simpl. lia. }
+  assert (C : count M p = count M (fun n => p n && (n <? M))).
+  { apply sum_ext. intros i Hi. apply Nat.ltb_lt in Hi. rewrite Hi, andb_true_r. reflexivity. }
+  rewrite C.
+  assert (count M (fun n => p n && (n <? M)) <= c); [|lia].
+  apply (IH (hi - P) c); [|simpl in W; lia].
+  intros n Hn. apply andb_true_iff in Hn. destruct Hn as (Pn & L). apply Nat.ltb_lt in L.
+  pose proof (H n Pn). specialize (Grow (M - n) n). replace (n + (M - n)) with M in Grow by lia. nia.
+Qed.
+
+(** Rounded up. *)
+Definition up (x y : nat) : nat := (x + (y - 1)) / y.
+
+Lemma up_enough x y : 0 < y -> x <= up x y * y.
+Proof.
+  intros H. unfold up. pose proof (Nat.div_mod (x + (y - 1)) y ltac:(lia)).
+  pose proof (Nat.mod_upper_bound (x + (y - 1)) y ltac:(lia)). nia.
+Qed.
