@@ -5,6 +5,7 @@
 //! files are read before the first run is judged, so that a damaged one does not hide behind the
 //! breaches of another.
 
+mod certified;
 mod drawn;
 mod perfetto;
 
@@ -56,6 +57,10 @@ rules:
   one life                an instance starts and finishes once, on one core at a time
   one core                a core runs one instance at a time
 
+A run with bounds is *certified* if it is recorded from begin to end, no rule is broken, no
+WCET is exceeded, and no more time is lost than WCETs and charges leave; so each bound held.
+Else the first condition that fails is told, which is no breach (docs/proving.md).
+
 chains: from a source to a sink, from DAG to DAG by samples of latest values
   age of an output        from the release that it goes back to, to its finish
   data age                the same, to the finish of the next output
@@ -81,6 +86,8 @@ options! {
     FROM: Takes::Text("DAG/SUBTASK");
     /// Only the chains that end with this subtask; with --from.
     TO: Takes::Text("DAG/SUBTASK");
+    /// Ask by which theorem each bound of a certified run holds; needs Coq.
+    PROVEN: Takes::Nothing;
     /// Only the machine lines on standard output, the rest on standard error.
     JSON: Takes::Nothing;
 }
@@ -151,9 +158,12 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
     let (mut table, lines, breaches) = match &run.machines[..] {
         [] => {
             let findings = check(run, bound_ns);
-            let table = table(file, run, &findings, bound_ns);
-            let line = machine_line(file, run, &findings);
-            (table, vec![line], findings.breaches.len())
+            let (words, failed) = certified::told(run, &findings, options.is_given(name::PROVEN));
+            let table = table(file, run, &findings, bound_ns) + &words;
+            let line = machine_line(file, run, &findings, failed);
+            // A bound that fails although all conditions hold is a breach, too.
+            let breaches = findings.breaches.len() + usize::from(failed == "bound");
+            (table, vec![line], breaches)
         }
         _ => {
             let (table, lines) = links::told(file, run);
@@ -232,7 +242,7 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64) -> Strin
 }
 
 /// Returns the machine line of kind `trace_check`.
-pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
+pub fn machine_line(file: &str, run: &Run, findings: &Findings, failed_condition: &str) -> String {
     let Findings { breaches, figures } = findings;
     Object::new()
         .text("kind", "trace_check")
@@ -250,6 +260,7 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
         .json("preemption_latency_ns", &object(&figures.preemption))
         .number("longest_inversion_ns", figures.longest_inversion_ns)
         .list("load_permille", &figures.load_permille)
+        .text("failed_condition", failed_condition)
         .into_text()
 }
 

@@ -51,6 +51,7 @@ fn a_set_is_bounded_run_judged_and_kept_as_by_the_machine() {
         .of_kind("trace_check")
         .map(|line| line.number_at("breaches"));
     assert_eq!(breaches.collect::<Vec<_>>(), [Some(0)], "{judged}");
+    assert!(judged.contains("  certified: "), "{judged}");
     succeed(&folder, "trace run.rec --svg -o run.svg");
     let svg = fs::read_to_string(folder.join("run.svg")).expect("it is drawn");
     assert!(svg.starts_with("<svg"), "{svg:.80}");

@@ -53,6 +53,7 @@ fn a_good_trace_is_0_and_said_in_a_table_and_a_machine_line() {
     assert!(said.contains("breaches                        0"), "{said}");
     let machine = machine_line(&said, "trace_check");
     assert_eq!(machine.number_at("events"), Some(5));
+    assert_eq!(machine.text_at("failed_condition"), Some("witness"));
     assert_eq!(machine.number_at("ready_to_start_ns.max"), Some(3));
     // With --json nothing else is on standard output.
     let said = succeed(&folder, "check-trace --json good.rec");

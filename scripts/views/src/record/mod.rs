@@ -8,9 +8,10 @@ mod hops;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use recording::{Chunk, Commit, CommittedDag, Events, MAGIC, Recording, Times};
-use sched_dag::analysis::{self, AnalysisSettings, Overheads};
+use sched_dag::analysis::{self, AnalysisResult, AnalysisSettings, Overheads};
 use sched_dag::chains::SampledEdge;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::JudgeOptions;
@@ -227,6 +228,7 @@ impl Record {
         let first = open.clusters.into_iter().reduce(merged);
         let run = Run {
             number,
+            commit: Arc::new(committed.clone()),
             options: committed.options(),
             usual_bound_ns: REAL_TOLERANCE_NS,
             task_set: committed.task_set.clone(),
@@ -255,7 +257,8 @@ impl Record {
     ///
     /// In words: the first bound that differs.
     pub fn proven(&self) -> Result<&[Committed], String> {
-        self.commits.iter().try_for_each(Committed::check_bounds)?;
+        let mut commits = self.commits.iter();
+        commits.try_for_each(|commit| commit.check_bounds().map(|_| ()))?;
         Ok(&self.commits)
     }
 
@@ -450,12 +453,12 @@ impl Committed {
         }
     }
 
-    /// Makes sure that the bounds are those that the analysis gives here.
+    /// Returns what the analysis answers here, after a check that the bounds are the same.
     ///
     /// # Errors
     ///
     /// In words: the first bound that differs.
-    pub fn check_bounds(&self) -> Result<(), String> {
+    pub fn check_bounds(&self) -> Result<AnalysisResult, String> {
         let answer = analysis::answer(&self.task_set, &self.settings());
         let here = answer.bounds.iter();
         let here = here.map(|bound| bound.map(|bound| bound.bound_ns));
@@ -469,7 +472,7 @@ impl Committed {
                 ));
             }
         }
-        Ok(())
+        Ok(answer)
     }
 
     /// Returns which subtask samples the topic of which other, as positions in the model.
@@ -586,6 +589,8 @@ fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
 pub struct Run {
     /// Its number within the boot, from 0.
     pub number: u64,
+    /// Its commit; of a run that joins several, that of the first machine.
+    pub commit: Arc<Committed>,
     /// How it was scheduled.
     pub options: SchedulerOptions,
     /// The tolerance for late decisions if none is given, in nanoseconds.

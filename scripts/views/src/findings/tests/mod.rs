@@ -57,7 +57,7 @@ fn assert_each(header: &str, good: &str, rows: &str) {
 }
 
 /// Replaces one line, which must occur once, or all from it on.
-fn change<'t>(lines: &mut Vec<&'t str>, from: &str, to: &'t str) {
+pub(crate) fn change<'t>(lines: &mut Vec<&'t str>, from: &str, to: &'t str) {
     let (from, is_all) = match from.strip_suffix("..") {
         Some(from) => (from, true),
         None => (from, false),

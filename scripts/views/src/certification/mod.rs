@@ -1,0 +1,221 @@
+//! Certification of a run: whether its record shows all that the proofs of its bounds assume.
+//!
+//! The theorems of `sched-dag/proofs` are about each run by the rules whose instances execute for
+//! their WCETs at most. A run is *certified* if it was such a run, so that each bound held by its
+//! theorem. These conditions are asked in this order, and the first that fails is told:
+//!
+//! 1. *record*: it has the whole run;
+//! 2. *witness*: the bounds are those that the analysis proves here, by a witness;
+//! 3. *rules*: the [findings](crate::findings) have no breach;
+//! 4. *WCET*: no segment executes for longer than its WCET and its charges;
+//! 5. *lost*: nor do execution and lost time together take longer;
+//! 6. *bound*: no response is above its bound. This follows from all others, so that a failure
+//!    is an error of ours.
+//!
+//! *Lost* are the time until an instance is ready, from the nominal release or the last finish
+//! that it waits for; the time for which a wait goes on beyond its limit; and for each segment the
+//! run's longest inversion, with preemption twice: before its own first instruction, and before the
+//! next one of the instance that it preempts. `docs/proving.md` argues why an instance
+//! pays for that, by hand. A charge that is too small does no harm where WCETs were not used up.
+//!
+//! By which theorem the bounds then hold, `./scripts/check-witness --proven` says.
+
+use std::collections::BTreeMap;
+
+use sched_dag::analysis::AnalysisResult;
+use sched_dag::{Dag, DagId, Instance, Preemption, Subtask};
+
+use crate::findings::Findings;
+use crate::record::Run;
+use crate::units::shown;
+use crate::view::{History, SliceEnd, View};
+
+/// Certifies a run that has bounds.
+///
+/// # Errors
+///
+/// The word and the words for the first condition that failed.
+pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, String)> {
+    match (run.lost, run.complete) {
+        _ if run.bounds_ns.iter().all(Option::is_none) => {
+            return Err(("witness", "no DAG has a bound".into()));
+        }
+        (0, true) => {}
+        (0, false) => return Err(("record", "it ends before the run".into())),
+        (lost, _) => return Err(("record", format!("{lost} events were lost"))),
+    }
+    let answer = run.commit.check_bounds().map_err(|why| ("witness", why))?;
+    if let Some(breach) = findings.breaches.first() {
+        return Err(("rules", breach.with_names(&run.task_set).to_string()));
+    }
+    let view = View::new(run);
+    let segments = segments(&view);
+    let owed_ns = findings.figures.longest_inversion_ns;
+    for (condition, owed_ns) in [("WCET", None), ("lost", Some(owed_ns))] {
+        if let Some(why) = segments.iter().find_map(|it| it.excess(run, owed_ns)) {
+            return Err((condition, why));
+        }
+    }
+    // A member of a table that moves to another core has nobody to pay for it but its own charge.
+    let (task_set, move_ns) = (&run.task_set, run.commit.told.move_ns);
+    let mut dags = (0..).map(DagId).take(task_set.dags().len());
+    let moves = |dag| {
+        let is_member = task_set.table_of(dag).is_none() && !task_set.tables().is_empty();
+        is_member && task_set.cores_of_dag(dag, run.options.cores).len() > 1
+    };
+    if owed_ns > move_ns && dags.any(moves) {
+        let [owed, charged] = [owed_ns, move_ns].map(shown);
+        let why = format!("an inversion of {owed}, and a move is charged {charged}");
+        return Err(("lost", why));
+    }
+    exceeded(&view, &answer).map_or(Ok(()), |why| Err(("bound", why)))
+}
+
+/// A segment, or all of an instance if the WCETs of its segments are not known.
+struct Segment {
+    instance: Instance,
+    /// How many segments these are.
+    count: u64,
+    from_ns: u64,
+    executed_ns: u64,
+    /// The time until it was ready, or beyond the limit of the wait before.
+    late_ns: u64,
+    /// Its WCET with charges.
+    charged_ns: u64,
+}
+
+impl Segment {
+    /// Says that execution was too long, or with an inversion execution and lost time.
+    fn excess(&self, run: &Run, owed_ns: Option<u64>) -> Option<String> {
+        let times = self.count * (1 + u64::from(run.options.preemption == Preemption::Enabled));
+        let lost_ns = |owed_ns: u64| owed_ns.saturating_mul(times).saturating_add(self.late_ns);
+        let all_ns = self.executed_ns.saturating_add(owed_ns.map_or(0, lost_ns));
+        (all_ns > self.charged_ns).then(|| {
+            let times_ns = [
+                self.executed_ns,
+                self.from_ns,
+                self.late_ns,
+                self.charged_ns,
+            ];
+            let [executed, from, late, charged] = times_ns.map(shown);
+            let lost = owed_ns.map_or(String::new(), |owed_ns| {
+                format!(
+                    "; with {late} late and {times} inversions of {}",
+                    shown(owed_ns)
+                )
+            });
+            let instance = named(run, self.instance);
+            let why = "more than its WCET and charges of";
+            format!("{instance} executed for {executed} from {from} on{lost}, {why} {charged}")
+        })
+    }
+}
+
+fn named(run: &Run, Instance { dag, job, subtask }: Instance) -> String {
+    let dag = run.task_set.dag(dag);
+    let (name, subtask) = (dag.name(), dag.subtask(subtask).name());
+    format!("subtask `{subtask}` of dag `{name}` job {job}")
+}
+
+/// Returns all segments with a WCET that began, by DAG, job and subtask.
+fn segments(view: &View<'_>) -> Vec<Segment> {
+    let Run {
+        task_set, options, ..
+    } = view.run;
+    let overheads = view.run.commit.settings().overheads;
+    let charges = task_set.dags().iter().map(|dag| {
+        let shares = |other: &&_| Dag::cluster(other) == dag.cluster();
+        let overheads = overheads.among(&mut task_set.dags().iter().filter(shares), options.cores);
+        overheads.of_an_instance_ns(options.preemption)
+    });
+    let charges: Vec<Option<u64>> = charges.collect();
+    let mut over_ns = BTreeMap::new();
+    let mut all = Vec::new();
+    // By job: the one before comes first.
+    for (&instance, history) in &view.histories {
+        let Instance { dag, job, subtask } = instance;
+        let model = task_set.dag(dag);
+        // A bound stands whenever DAGs without one release.
+        let release_ns = view.run.bounds_ns[dag.index()].map(|_| view.release_ns(dag, job));
+        let over = |of: &History| of.finish_ns.or(of.dropped_ns);
+        let before = |&subtask| over(view.histories.get(&Instance { dag, job, subtask })?);
+        let before = model.predecessors(subtask).iter().filter_map(before);
+        let precursor = over_ns.insert((dag, subtask), over(history)).flatten();
+        let due_ns = before.chain(release_ns).chain(precursor).max();
+        let ready_ns = history.ready_ns.unwrap_or(0);
+        let late_ns = ready_ns.saturating_sub(due_ns.unwrap_or(ready_ns));
+        let subtask = model.subtask(subtask);
+        // What has no WCET delays nothing that has a bound.
+        let Some(charged_ns) = charges[dag.index()].and_then(|ns| charged(subtask, ns)) else {
+            continue;
+        };
+        let times = executed(history, subtask, late_ns, view.end_ns);
+        let count = match charged_ns.len() {
+            1 => times.len().max(1),
+            _ => 1,
+        };
+        let parts = times.chunks(count).zip(charged_ns);
+        all.extend(parts.map(|(times, charged_ns)| Segment {
+            instance,
+            count: times.len() as u64,
+            from_ns: times[0].0,
+            executed_ns: times.iter().map(|(_, ns, _)| ns).sum(),
+            late_ns: times.iter().map(|(.., ns)| ns).sum(),
+            charged_ns,
+        }));
+    }
+    all
+}
+
+/// Returns the WCETs of a subtask's segments with charges, or of all together if they are unknown.
+fn charged(subtask: &Subtask, charge_ns: u64) -> Option<Vec<u64>> {
+    let whole_ns = subtask.charged_ns(charge_ns)?;
+    let Some(mut segments_ns) = subtask.segments_ns() else {
+        return Some(vec![whole_ns]);
+    };
+    // The first one has all waits for locks.
+    segments_ns[0] += subtask.charged_ns(0)? - subtask.wcet_ns()?;
+    let segments_ns = segments_ns.into_iter().map(|ns| ns.checked_add(charge_ns));
+    segments_ns.collect()
+}
+
+/// Returns of each segment its begin, its execution, and how late it was, the first one so late.
+fn executed(history: &History, of: &Subtask, late_ns: u64, end_ns: u64) -> Vec<(u64, u64, u64)> {
+    let mut found: Vec<(u64, u64, u64)> = Vec::new();
+    let mut next_late_ns = Some(late_ns);
+    for (number, slice) in history.slices.iter().enumerate() {
+        if let Some(late_ns) = next_late_ns.take() {
+            found.push((slice.from_ns, 0, late_ns));
+        }
+        let place = found.len() - 1;
+        found[place].1 += slice.to_ns.unwrap_or(end_ns).saturating_sub(slice.from_ns);
+        if history.end_of(number) == SliceEnd::Waits {
+            let (from_ns, to_ns) = history.wait_after(*slice).unwrap_or_default();
+            let limit_ns = of.waits().get(place).map_or(0, |wait| wait.limit_ns);
+            let waited_ns = to_ns.unwrap_or(end_ns).saturating_sub(from_ns);
+            next_late_ns = Some(waited_ns.saturating_sub(limit_ns));
+        }
+    }
+    found
+}
+
+/// Says which instance finished beyond the bound of its DAG, or of its sink.
+fn exceeded(view: &View<'_>, answer: &AnalysisResult) -> Option<String> {
+    view.histories.iter().find_map(|(&instance, history)| {
+        let Instance { dag, job, subtask } = instance;
+        let bound_ns = answer.bounds[dag.index()]?.bound_ns;
+        let sinks = view.run.task_set.dag(dag).sinks();
+        let sink = sinks.iter().position(|sink| *sink == subtask);
+        let of_sink = sink.and_then(|sink| answer.sinks_ns[dag.index()][sink]);
+        let bound_ns = of_sink.map_or(bound_ns, |ns| ns.min(bound_ns));
+        let response_ns = history.finish_ns?.saturating_sub(view.release_ns(dag, job));
+        (response_ns > bound_ns).then(|| {
+            let [response, bound] = [response_ns, bound_ns].map(shown);
+            let instance = named(view.run, instance);
+            format!("{instance} took {response}, beyond {bound}, and all else held; report this")
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,163 @@
+//! A run that is certified, and runs that are not: each differs in one event, or in what else is
+//! recorded.
+
+use std::sync::Arc;
+
+use recording::Commit;
+use sched_dag::analysis;
+
+use super::certify;
+use crate::findings::tests::change;
+use crate::findings::{Findings, check};
+use crate::made::{commit, event, lines_of, record_of};
+use crate::record::{Committed, Record, Run};
+
+/// The longest wait that breaks no rule.
+const BOUND_NS: u64 = 20;
+
+const DAGS: &str = "
+static 2
+fast T=100 D=60 O=0: x/0/20
+fork T=400 D=300 O=10: a/1/20 b/1/80 c/1/60 d/1/20; 0>1 0>2 1>3 2>3
+order sporadic T=400 D=400 O=0: y/2/15
+wait 1.2 30";
+
+/// `c` waits for 20 of 30, and loses its core to `fast`.
+const GOOD: &str = "
+0 released c0 0.0
+0 ready c0 0.0.0
+1 start c0 0.0.0
+11 released c1 1.0
+11 ready c1 1.0.0
+12 start c1 1.0.0
+19 finish c0 0.0.0
+19 completed c0 0.0
+30 finish c1 1.0.0
+30 ready c1 1.0.1
+30 ready c1 1.0.2
+31 start c1 1.0.1
+32 start c0 1.0.2
+50 wait c0 1.0.2
+70 wake c0 1.0.2
+72 resume c0 1.0.2
+100 released c0 0.1
+100 ready c0 0.1.0
+101 suspend c0 1.0.2
+101 start c0 0.1.0
+105 finish c1 1.0.1
+106 resume c1 1.0.2
+116 finish c1 1.0.2
+116 ready c1 1.0.3
+117 start c1 1.0.3
+118 finish c0 0.1.0
+118 completed c0 0.1
+130 finish c1 1.0.3
+130 completed c1 1.0
+150 signalled c0 2.0
+150 due c0 2.0
+150 released c0 2.0
+150 ready c0 2.0.0
+151 start c0 2.0.0
+165 finish c0 2.0.0
+180 completed c0 2.0";
+
+/// Returns a run whose segments are charged 10 each, and whose bounds are proven.
+fn run_of(events: &str) -> Run {
+    let mut commit = commit(DAGS);
+    commit.charge_ns = Some(10);
+    let committed = Committed::new(0, commit.clone()).expect("they can be committed");
+    let answer = analysis::answer(&committed.task_set, &committed.settings());
+    for (dag, bound) in commit.dags.iter_mut().zip(answer.bounds) {
+        dag.bound_ns = Some(bound.expect("it is proven").bound_ns);
+    }
+    let record = Record::read(&record_of("", &commit, "")).expect("it is well formed");
+    Run {
+        events: lines_of(events).into_iter().map(event).collect(),
+        ..record.runs[0].clone()
+    }
+}
+
+/// Certifies a run, and says which condition failed.
+fn told(run: &Run, findings: &Findings) -> String {
+    let failed = |(condition, why)| format!("{condition}: {why}");
+    certify(run, findings).map_or_else(failed, |()| "certified".into())
+}
+
+fn judged(run: &Run) -> String {
+    told(run, &check(run, BOUND_NS))
+}
+
+/// The rows are as in the tests of findings; behind `=` stands how the answer begins.
+#[test]
+fn a_run_is_certified_and_none_that_is_altered_in_one_event() {
+    assert_eq!(judged(&run_of(GOOD)), "certified");
+    let rows = "
+100 released -> 99 released c0 0.1 = rules: at 99 ns, R1 release: dag `fast` job 1
+150 released -> 152 released c0 2.0 = rules: at 150 ns, R1 release: subtask `y` of dag `order` job 0
+11 released -> = rules: at 11 ns, R1 release: subtask `a` of dag `fork` job 0
+100 released -> 100 released c0 0.1; 100 skipped c0 0.1 = rules: at 100 ns, R1 release
+150 due -> = rules: at 150 ns, R1 release: dag `order` job 0
+116 ready -> 110 ready c1 1.0.3 = rules: at 110 ns, R2 join: subtask `d` of dag `fork` job 0
+105 finish -> = rules: at 106 ns, one core: core 1 runs subtask `c` of dag `fork` job 0
+30 ready c1 1.0.2 -> 32 ready c0 1.0.2 = rules: at 32 ns, R3
+180 completed -> = rules: at 165 ns, R4 completion: dag `order` job 0
+180 completed -> 190 completed c0 2.0 = rules: at 190 ns, R4 completion: dag `order` job 0
+130 finish -> 135 finish c1 1.0.3 = rules: at 130 ns, R4 completion: dag `fork` job 0
+72 resume -> 95 resume c0 1.0.2 = rules: at 70 ns, R5 dispatch: subtask `c` of dag `fork` job 0
+50 wait -> = rules: at 70 ns, one life: subtask `c` of dag `fork` job 0
+70 wake -> = rules: at 72 ns, one life: subtask `c` of dag `fork` job 0
+101 suspend -> 101 suspend c1 1.0.2 = rules: at 101 ns, one life: subtask `c` of dag `fork` job 0
+117 start -> 117 start c0 1.0.3 = rules: at 117 ns, one core: core 0 runs subtask `d`
+31 start -> 31 start c1 1.0.1; 32 start c1 1.0.1 = rules: at 32 ns, one life: subtask `b`
+165 finish -> 177 finish c0 2.0.0 = WCET: subtask `y` of dag `order` job 0 executed for 26 ns from 151 ns on, more than its WCET and charges of 25 ns
+165 finish -> 174 finish c0 2.0.0 = lost: subtask `y` of dag `order` job 0 executed for 23 ns from 151 ns on; with 0 ns late and 2 inversions of 2 ns, more than its WCET and charges of 25 ns
+117 start -> 127 start c1 1.0.3 = lost: subtask `x` of dag `fast` job 0 executed for 18 ns from 1 ns on; with 0 ns late and 2 inversions of 11 ns, more
+72 resume -> 85 resume c0 1.0.2 = lost: subtask `x` of dag `fast` job 0 executed for 18 ns from 1 ns on; with 0 ns late and 2 inversions of 15 ns, more";
+    for row in lines_of(rows) {
+        let (alteration, answer) = row.split_once(" = ").expect(row);
+        let (from, to) = alteration.split_once(" ->").expect(row);
+        let mut lines = lines_of(GOOD);
+        change(&mut lines, from, to.trim());
+        let said = judged(&run_of(&lines.join("\n")));
+        assert!(said.starts_with(answer), "{row}\n{said}");
+    }
+}
+
+#[test]
+fn only_a_whole_record_with_its_bounds_is_certified() {
+    type Alteration = fn(&mut Run);
+    fn commit(run: &mut Run) -> &mut Commit {
+        &mut Arc::make_mut(&mut run.commit).told
+    }
+    let alterations: [(Alteration, &str); 5] = [
+        (|run| run.lost = 3, "record: 3 events"),
+        (|run| run.complete = false, "record: it ends"),
+        (|run| run.bounds_ns.fill(None), "witness: no DAG"),
+        (
+            |run| commit(run).dags[1].bound_ns = None,
+            "witness: the bound of dag `fork`",
+        ),
+        (
+            |run| commit(run).charge_ns = Some(9),
+            "witness: the bound of dag `fast`",
+        ),
+    ];
+    for (alter, answer) in alterations {
+        let mut run = run_of(GOOD);
+        alter(&mut run);
+        let said = judged(&run);
+        assert!(said.starts_with(answer), "{said}");
+    }
+}
+
+/// The bounds follow from all other conditions, and are asked, too: here the others are blind.
+#[test]
+fn a_bound_that_fails_is_told() {
+    let blind = check(&run_of(GOOD), BOUND_NS);
+    let mut lines = lines_of(GOOD);
+    change(&mut lines, "117 start", "317 start c1 1.0.3");
+    change(&mut lines, "130 finish", "330 finish c1 1.0.3");
+    let said = told(&run_of(&lines.join("\n")), &blind);
+    let begin = "bound: subtask `d` of dag `fork` job 0 took 320 ns, beyond ";
+    assert!(said.starts_with(begin), "{said}");
+}
