@@ -561,6 +561,8 @@ fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
         relative_deadline_ns: Some(dag.relative_deadline_ns),
         offset_ns: dag.offset_ns,
         in_flight: Some(dag.in_flight),
+        // A table passes entries of later jobs.
+        jobs: dag.jobs,
         overrun: match dag.overrun {
             0 => OverrunPolicy::Queue,
             1 => OverrunPolicy::Skip,

@@ -26,14 +26,17 @@ fn good() -> Vec<u8> {
 
 #[test]
 fn a_good_record_is_read_as_a_file_and_in_lines() {
-    let bytes = good();
+    let mut commit = commit(COMMIT);
+    commit.dags[0].jobs = Some(3);
+    let bytes = record_of("", &commit, EVENTS);
     let log = "hello\n".to_string() + &line_of(&bytes);
     for record in [Record::read(&bytes), Record::read(log.as_bytes())] {
         let record = record.unwrap();
         let [run] = &record.runs[..] else { panic!() };
         assert_eq!((run.number, run.options.cores, run.lost), (0, 2, 0));
         assert_eq!((run.events.len(), run.complete), (3, true));
-        assert_eq!(run.task_set.dags()[0].name(), "x");
+        let dag = &run.task_set.dags()[0];
+        assert_eq!((dag.name(), dag.jobs()), ("x", Some(3)));
     }
     assert_eq!(Record::read(b"hello\n").unwrap().runs.len(), 0);
 }
