@@ -3,12 +3,13 @@
     [sporadic_bounds_hold] counts all that is lost from the beginning on. Where a lap is over before the next one's release,
     whatever it lost, what was lost before a job's release is no matter to that job: if no window that is as long as its bound
     loses more than so much, it is late by so much. A platform may thus lose time for ever, as steps are long or a
-    device interrupts.
+    device interrupts. A window has one tick more than the bound: what is over by its bound is known to be only when its core
+    has looked, which may be lost time, too.
 
     The proof restates the table at each release: laps that have begun are moved by what was lost since their
     releases, later ones are not, and all is on time again. *)
 
-From Coq Require Import ZArith List Bool Lia.
+From Coq Require Import ZArith List Bool Lia Arith.
 From Table Require Import Model Sustainable Checker CheckerProof Sporadic.
 Import ListNotations.
 Open Scope Z_scope.
@@ -316,3 +317,44 @@ Proof.
 Qed.
 
 End Losing.
+
+(** ** A loss in each lap: laps of 2 that are 3 apart, and one of which is not finished before its bound of 3 *)
+
+Definition lone : witness := Witness 2 [Dag 2 0 [Subtask 2 2 false []]] [[Entry 0 0 0 0 2 0]].
+
+Example a_loss_is_attained :
+  let origin n := 3 * Z.of_nat n in
+  let tb := laps_at 1 lone origin origin in
+  let env := {| released := fun p t => release tb p <=? t; void := fun _ _ => false |} in
+  let before t := if t <=? 0 then 0 else 1 in
+  check_losing lone 3 1 = true /\ check_losing lone 2 1 = false /\
+  (forall x, before (x + 3 + 1) <= before x + 1) /\
+  exists s, losing_run tb env before s /\ now s = 3 /\ ~ finished s (O, O).
+Proof.
+  intros origin tb env before. split; [reflexivity|]. split; [reflexivity|]. split.
+  { intros x. unfold before. destruct (x + 3 + 1 <=? 0), (x <=? 0); lia. }
+  set (f0 := set (fun _ => []) O [(O, 2)]). set (f1 := fun k => spend (f0 k)). set (f2 := fun k => spend (f1 k)).
+  set (at_ t l f := {| now := t; lost := l; position := set (fun _ => O) O 1%nat; stack := f; ended := fun _ => 0 |}).
+  assert (Go : forall s t l f, losing_run tb env before s -> step tb env s (at_ t l f) ->
+    map (fun k => map fst (f k)) [O] = [[O]] -> (forall k, f (S k) = []) -> 0 <= t ->
+    before t <= l <= before (now s + 1) -> losing_run tb env before (at_ t l f)).
+  { intros s t l f R St S0 Sk Ht L. apply Goes_on with s; auto. intros [|k] x; simpl.
+    - injection S0 as ->. intros [<-|[]]. exact Ht.
+    - rewrite Sk. intros []. }
+  assert (R0 : losing_run tb env before (at_ 0 0 f0)).
+  { apply Go with initial; [constructor; reflexivity| |auto..|cbv; split; discriminate]; [|lia].
+    apply (Start tb env initial O); [simpl; lia|exact I]. }
+  assert (R1 : losing_run tb env before (at_ 1 1 f0)).
+  { apply Go with (at_ 0 0 f0); [exact R0| |auto..|cbv; split; discriminate]; [|lia].
+    apply (Stall tb env (at_ 0 0 f0)). auto. }
+  assert (Q : forall t f, t < 3 -> snd (hd (O, 0) (f O)) > 0 -> quiet tb env (at_ t 1 f)).
+  { intros t f Ht Hf [|k] Hk; [|simpl in Hk; lia]. split.
+    - intros (_ & [(_ & H)|(H & _)]); [discriminate|]. apply Z.leb_le in H. cbn in H. lia.
+    - simpl in *. destruct (f O) as [|[x l] st]; [exact I|simpl in Hf; lia]. }
+  assert (R2 : losing_run tb env before (at_ 2 1 f1)).
+  { apply Go with (at_ 1 1 f0); [exact R1| |auto..|cbv; split; discriminate]; [|lia].
+    apply (Tick tb env (at_ 1 1 f0)), Q; [lia|reflexivity]. }
+  exists (at_ 3 1 f2). split; [|split; [reflexivity|intros (_ & H); apply H; left; reflexivity]].
+  apply Go with (at_ 2 1 f1); [exact R2| |auto..|cbv; split; discriminate]; [|lia].
+  apply (Tick tb env (at_ 2 1 f1)), Q; [lia|reflexivity].
+Qed.

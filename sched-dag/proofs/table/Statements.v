@@ -21,6 +21,7 @@ Check losing_bounds_hold.
 Check accepted_bounds_hold_in_fractions.
 Check exact_run_is_run.
 Check accepted_never_blocks.
+Check a_loss_is_attained.
 Check replay_is_run.
 Check zero_is_stuck.
 Check on_time_by_the_clock_is_not_enough.
@@ -29,6 +30,6 @@ Check on_time_by_the_clock_is_not_enough.
 Definition all_of_them :=
   (@sustainable, @never_preempted, @theorem_t, @accepted_bounds_hold, @accepted_alone, @check_decides,
   @sporadic_bounds_hold, @losing_bounds_hold, @accepted_bounds_hold_in_fractions,
-  @exact_run_is_run, @accepted_never_blocks, @replay_is_run, @zero_is_stuck,
+  @exact_run_is_run, @accepted_never_blocks, @a_loss_is_attained, @replay_is_run, @zero_is_stuck,
   @on_time_by_the_clock_is_not_enough).
 Print Assumptions all_of_them.
