@@ -1,5 +1,5 @@
 (** What is proven, and what it says; statements.txt has the answers. *)
-From Bounds Require Import Sums Model Chains ResponseTime AlongAPath Blocking Workload TaskSet SetBounds Checker AnyResolution
+From Bounds Require Import Sums Model Chains ResponseTime AlongAPath Blocking Workload TaskSet Windows SetBounds Checker AnyResolution
   Laps Examples Commit SinkCommit OneCoreStretch OneCore OneCoreOrder OneCoreCheck OneCoreCommit OneCoreExamples.
 Set Printing Width 110.
 
@@ -11,7 +11,7 @@ Print alone.
 Print task. Print policy. Print set_run. Print job_done. Print job_finished. Print job_complete.
 Print instance_ready. Print earlier_complete. Print on_core. Print job_cores. Print task_cores. Print may_delay.
 Print has_begun. Print holds_core. Print cores_held. Print may_pass. Print global_run.
-Print workload. Print workload_by_deadline. Print clipped. Print blocking. Print first_inequality. Print second_inequality. Print rise. Print on_path. Print path_inequality. Print delays. Print widths_fit. Print part_inequality. Print shown.
+Print workload. Print workload_by_deadline. Print clipped. Print blocking. Print first_inequality. Print second_inequality. Print rise. Print on_path. Print full_work. Print Windows.above. Print counts_in_full. Print window_applies. Print path_inequality. Print delays. Print widths_fit. Print part_inequality. Print shown.
 Print subtask. Print dag_statement. Print commit. Print vertex. Print vertices_of. Print expand.
 Print may_outrank. Print stated. Print claim. Print claim_at. Print stated_task. Print committed. Print committed_by_rank. Print finer.
 Print keys. Print urgency. Print job_before. Print goes_before. Print any_order. Print asked. Print keyed_run.

@@ -122,9 +122,11 @@ fn no_witness_is_judged_differently() {
     fs::remove_dir_all(&folder).expect("it was made");
 }
 
-/// Sets of `drawn` with short witnesses that have bounds of sinks on several cores, the last ones
-/// as widths fit.
-const WITH_SINKS: [u64; 10] = [99, 309, 754, 784, 851, 1_091, 1_394, 788, 960, 1_232];
+/// Sets of `drawn` with short witnesses: bounds of sinks on several cores, the last three as widths
+/// fit; then windows.
+const SHORT: [u64; 12] = [
+    99, 309, 754, 784, 851, 1_091, 1_394, 788, 960, 1_232, 36, 881,
+];
 
 fn small(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
     let wanted = mask(&[("waits", number % 4 == 1), ("tables", number % 4 == 3)]);
@@ -144,16 +146,17 @@ fn what_it_proves_of_altered_witnesses_holds() {
     let (mut witnesses, mut on_core, mut blocked, mut losing) = (0, 0, 0, 0);
     let (mut fewer, mut sound) = (0, 0);
     let mut sinks = [0; 2];
-    let own_sinks = WITH_SINKS.iter().map(|&number| drawn(number));
+    let short = SHORT.iter().map(|&number| drawn(number));
     // Bounds along a path are rare.
     let numbers = (0..80).chain([269, 789, 1557, 2185]);
-    for (task_set, settings) in numbers.map(small).chain(own_sinks).flatten() {
+    for (task_set, settings) in numbers.map(small).chain(short).flatten() {
         let text = witness(&task_set, &settings);
         let forms = [
             " paths ",
             " waiting ",
             " sharp ",
             " widths\n",
+            " windows\n",
             " reserved ",
             " blocked ",
             " core ",
