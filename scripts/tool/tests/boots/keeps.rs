@@ -25,7 +25,8 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
     let replay = ", and `--replay run.kept` repeats it\n";
     assert!(said.contains("run.kept: all of the run, "), "{said}");
     assert!(said.contains(replay), "{said}");
-    succeed(&folder, "check-trace run.kept");
+    let judged = succeed(&folder, "check-trace run.kept");
+    assert!(judged.contains("  certified: "), "{judged}");
     succeed(&folder, "trace run.kept --out drawn.json");
     let shown = succeed(
         &folder,
@@ -65,6 +66,28 @@ fn of_a_file_that_is_kept_only_what_holds_is_said() {
         assert!(said.contains("check-trace a` judges it, "), "{said}");
         assert!(!said.contains("./scripts/"), "{said}");
         assert!(!said.contains("--replay"), "{line}: {said}");
+    }
+}
+
+/// Of the robot with the charges of docs/proving.md.
+#[test]
+fn runs_of_apps_and_of_a_table_are_certified() {
+    let folder = folder("certified");
+    let robot = workspace().join("apps/dag-file/examples/robot.dag");
+    let robot = format!(
+        "--dag {} --cores 8 --clusters auto --occupy hold --jobs 10 --append \
+         overheads_ns=0,24000,16000,0",
+        robot.display()
+    );
+    for run in [
+        "--app drone --append seconds=2",
+        "--app camera --cores 2",
+        &robot,
+    ] {
+        let line = format!("run {run} --mode deterministic --keep run.kept");
+        succeed(&folder, &line);
+        let judged = succeed(&folder, "check-trace run.kept");
+        assert!(judged.contains("  certified: "), "{judged}");
     }
 }
 
