@@ -30,7 +30,8 @@ Inductive precedes (G : dag) (u : nat) : nat -> Prop :=
 Fixpoint precedes_within (G : dag) (n u v : nat) : bool :=
   match n with
   | 0 => false
-  | S n => edge G u v || existsb (fun w => edge G w v && precedes_within G n u w) (seq 0 (size G))
+  | S n => if edge G u v then true
+           else existsb (fun w => if edge G w v then precedes_within G n u w else false) (seq 0 (size G))
   end.
 
 Definition precedes_bool (G : dag) (u v : nat) : bool := precedes_within G (size G) u v.
