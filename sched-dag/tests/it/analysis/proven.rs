@@ -122,6 +122,24 @@ fn no_witness_is_judged_differently() {
     fs::remove_dir_all(&folder).expect("it was made");
 }
 
+/// The words of forms with a theorem, of bounds of sinks, and of losses.
+const FORMS: [&str; 14] = [
+    " paths ",
+    " waiting ",
+    " sharp ",
+    " widths\n",
+    " windows\n",
+    " reserved ",
+    " blocked ",
+    " lent ",
+    " sequence ",
+    " core ",
+    " table\n",
+    "\nsink ",
+    "\nsooner ",
+    "\nbursts ",
+];
+
 /// Sets of `drawn` with short witnesses: bounds of sinks on several cores, the last three as widths
 /// fit; then windows.
 const SHORT: [u64; 12] = [
@@ -139,77 +157,81 @@ fn small(number: u64) -> Option<(TaskSet, AnalysisSettings)> {
     Some((sample.charged(&settings)?, settings))
 }
 
+/// Short witnesses of such sets, of which bounds along a path are rare.
+fn small_witnesses() -> impl Iterator<Item = String> {
+    let numbers = (0..80).chain([269, 789, 1557, 2185]);
+    let sets = numbers
+        .map(small)
+        .chain(SHORT.into_iter().map(drawn))
+        .flatten();
+    let texts = sets.map(|(set, settings)| witness(&set, &settings));
+    texts.filter(|text| {
+        let most = if text.contains(" core ") { 60 } else { 40 };
+        text.lines().count() <= most && text.matches("machine ").count() == 1
+    })
+}
+
+/// Short witnesses of further forms, each part as of a machine of its own.
+fn more_witnesses() -> impl Iterator<Item = String> {
+    let sets = (0..3_000).filter_map(drawn);
+    let texts = sets.map(|(set, settings)| witness(&set, &settings));
+    let parts = texts.flat_map(|text| {
+        let parts = text.replace("\nmachine ", "\n\0machine ");
+        let parts = parts.split('\0').map(|part| {
+            let lines = part.lines().filter(|line| !line.starts_with("cluster "));
+            hashed(&lines.map(|line| line.to_owned() + "\n").collect::<String>())
+        });
+        parts.collect::<Vec<String>>()
+    });
+    let more = [" waiting ", " sharp ", " lent ", " sequence "];
+    more.into_iter().flat_map(move |form| {
+        let of_form = parts.clone().filter(move |text| text.contains(form));
+        of_form.filter(|text| text.lines().count() <= 35).take(3)
+    })
+}
+
+/// The text, and what it becomes by another number or without a line, such as one of another DAG
+/// that delays.
+fn alterations(text: &str) -> Vec<String> {
+    let mut others = altered(text);
+    let inner = text
+        .lines()
+        .filter(|line| !line.starts_with(['m', 'h']) && !line.starts_with("se"));
+    others.extend(inner.map(|line| text.replacen(&format!("{line}\n"), "", 1)));
+    let is_sane = |text: &String| !text.split("hash ").next().unwrap_or("").contains(" -");
+    let others = others.iter().map(|text| hashed(text)).filter(is_sane);
+    [text.to_owned()].into_iter().chain(others).collect()
+}
+
 #[test]
 fn what_it_proves_of_altered_witnesses_holds() {
     let folder = std::env::temp_dir().join(format!("proven-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder");
-    let (mut witnesses, mut on_core, mut blocked, mut losing) = (0, 0, 0, 0);
-    let (mut fewer, mut sound) = (0, 0);
-    let mut sinks = [0; 2];
-    let short = SHORT.iter().map(|&number| drawn(number));
-    // Bounds along a path are rare.
-    let numbers = (0..80).chain([269, 789, 1557, 2185]);
-    for (task_set, settings) in numbers.map(small).chain(short).flatten() {
-        let text = witness(&task_set, &settings);
-        let forms = [
-            " paths ",
-            " waiting ",
-            " sharp ",
-            " widths\n",
-            " windows\n",
-            " reserved ",
-            " blocked ",
-            " core ",
-            " table\n",
-        ];
-        let is_asked = forms.iter().any(|form| text.contains(form));
-        let most = if text.contains(" core ") { 60 } else { 40 };
-        if !is_asked || text.lines().count() > most || text.matches("machine ").count() > 1 {
+    let (mut of_form, mut fewer, mut sound) = ([0; FORMS.len()], 0, 0);
+    for text in small_witnesses().chain(more_witnesses()) {
+        if !FORMS.iter().any(|form| text.contains(form)) {
             continue;
         }
-        let mut others = altered(&text);
-        // A line left out, such as one of another DAG that delays.
-        let inner = text
-            .lines()
-            .filter(|line| !line.starts_with(['m', 'h']) && !line.starts_with("se"));
-        others.extend(inner.map(|line| text.replacen(&format!("{line}\n"), "", 1)));
-        let others = others.iter().map(|text| hashed(text));
-        let is_sane = |text: &String| !text.split("hash ").next().unwrap_or("").contains(" -");
-        let all = [text.clone()].into_iter().chain(others);
-        let texts: Vec<String> = all.filter(is_sane).collect();
+        let texts = alterations(&text);
         let found = proven(&folder, &texts);
-        witnesses += usize::from(!found[0].is_empty());
-        on_core += usize::from(text.contains(" core ") && !found[0].is_empty());
-        sinks[usize::from(text.contains("\nsooner "))] += found[0]
-            .iter()
-            .filter(|line| line.contains("sink "))
-            .count();
-        blocked += usize::from(text.contains(" blocked ") && !found[0].is_empty());
-        let tables = text.lines().filter(|line| line.ends_with(" table")).count();
-        losing += usize::from(text.contains("bursts ") && found[0].len() == tables && tables > 0);
+        for (form, count) in FORMS.iter().zip(&mut of_form) {
+            *count += usize::from(text.contains(form) && !found[0].is_empty());
+        }
         for (lines, altered) in found.iter().zip(&texts) {
-            let flaw = if lines.is_empty() {
-                None
-            } else {
-                unsound(altered, lines)
-            };
+            let flaw = (!lines.is_empty())
+                .then(|| unsound(altered, lines))
+                .flatten();
             assert_eq!(flaw, None, "{text}\naltered:\n{altered}{lines:?}");
-            *if lines.len() < found[0].len() {
+            let count = if lines.len() < found[0].len() {
                 &mut fewer
             } else {
                 &mut sound
-            } += 1;
+            };
+            *count += 1;
         }
     }
-    println!(
-        "{witnesses} witnesses, {on_core} of one core, {losing} of tables with losses: \
-         of altered ones {fewer} prove less, {sound} hold"
-    );
-    println!("sinks on several cores and on one: {sinks:?}");
-    assert!(sinks.iter().all(|&count| count >= 5), "{sinks:?}");
-    assert!(
-        on_core > 0 && blocked == 2 && losing > 0 && witnesses > on_core + 5 && fewer > 700,
-        "{witnesses}, {losing}, {fewer}"
-    );
+    println!("altered: {fewer} prove less, {sound} hold; of {FORMS:?} {of_form:?}");
+    assert!(of_form.iter().all(|&count| count > 0), "{of_form:?}");
+    assert!(fewer > 1_000, "{fewer}");
     fs::remove_dir_all(&folder).expect("it was made");
 }
