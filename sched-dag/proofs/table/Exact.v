@@ -198,7 +198,7 @@ End Exact.
 (** ** An accepted table never blocks *)
 
 (** What the entry at [y] waits for. What starts before it is in the first laps. *)
-Definition waits_for_dec (w : witness) (p y : place) : {waits_for w p y} + {~ waits_for w p y}.
+Lemma waits_for_dec (w : witness) (p y : place) : {waits_for w p y} + {~ waits_for w p y}.
 Proof.
   unfold waits_for.
   destruct (lt_dec (fst p) (length (w_lists w))); [|right; tauto].
