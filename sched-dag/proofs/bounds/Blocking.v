@@ -1,6 +1,6 @@
 (** * Subtasks that keep their cores: blocking by lower-ranked work
 
-    MULTI_PATH.md, section 6, for one job among others.  All its vertices [on] a core keep it until they end, and
+    docs/bounds.md, "Subtasks that are never preempted", for one job among others.  All its vertices [on] a core keep it until they end, and
     the others, its waits, need nobody.  In each tick others are higher-ranked work, [high t] cores, and lower-ranked
     subtasks [0 .. L - 1], of which [low_holds t l] says whether l has a core; a run of it takes [longest l] at most.
     In the ticks [skip] what has a core may be interrupted; then what executes is [high].

@@ -48,8 +48,7 @@ Ltac by_keys :=
 (** Nothing is said by the policy of TaskSet.v: all may delay all, by keys. *)
 Definition any_order : policy := {| by_deadline := false; outranks := fun _ _ => true |}.
 
-(** Of a DAG that waits for devices the rules ask nothing while an earlier job of it is in flight, as W3 may hold the
-  job
+(** Of a DAG that waits for devices R5 is not asked while an earlier job of it is in flight, as W3 may hold the job
     back. *)
 Definition asked (tau : nat -> task) (s : set_run) (t k n : nat) : Prop :=
   (forall v, v < size (graph (tau k)) -> waits (tau k) v = false) \/ earlier_complete tau s t k n.

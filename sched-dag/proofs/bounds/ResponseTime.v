@@ -134,7 +134,7 @@ Proof.
   apply (first_form G m s c len j f r (I r)); auto. apply (HI 0 r).
 Qed.
 
-(** ** 4. Among others: the second form, (C)
+(** ** 4. Among others: the second form
 
     Others are K tasks; [other k t] is how many cores execute task k in tick t.  [phi k n] bounds what task k
     executes in any n of the first r ticks, on at most m - j cores at a time.  [phi k] must not grow faster
@@ -185,7 +185,7 @@ Qed.
 
 (** The published form, which does not look one tick further.  [second_form_sharp] gives more where nothing is
     left over: if left + sum of phi k x is at most (m - j) x, it is enough that from x to x + 1 the sum of the
-    phi grows by less than m - j.  That is CLIP.md's (C* ), with the growth in a tick for the slope. *)
+    phi grows by less than m - j: in fractions, by their slope there ([second_inequality]). *)
 Lemma one_tick_further K (phi : nat -> nat -> nat) left p x :
   (forall k a b, k < K -> a <= b -> a * phi k b <= b * phi k a) ->
   Nat.max 1 left + sum K (fun k => phi k x) <= p * x ->

@@ -1,15 +1,17 @@
-(** * TABLE.md's conditions C1 to C4, word for word, are enough
+(** * Conditions C1 to C4 are enough
 
-    [right] of Sustainable.v is what the theorem needs. Here are the conditions of TABLE.md, section 2, for an endless table
-    (all laps), with WCETs of 1 or more, and the proof that they imply [right]. C2 is with the waits of section 9.3. *)
+    [right] of Sustainable.v is what the theorem needs. Here are simpler conditions on an endless table (all laps), with
+    WCETs of 1 or more, and the proof that they imply [right]. C1: an entry starts no earlier than its release. C2: it
+    starts when what it waits for has finished, with a pause, if there is one. C3: what starts before another finishes
+    has a greater depth. C4: an entry and its family take just the time from its start to its finish. *)
 
 From Coq Require Import ZArith List Bool Lia.
 From Table Require Import Model Sustainable.
 Import ListNotations.
 Open Scope Z_scope.
 
-(** Left out of C1: [f <= r + lf] (a deadline). Left out of C3: that of the [d] open entries each depth 0..d-1 occurs once,
-    that they finish at [f] or later, and that none is np. The theorem does not need them. *)
+(** Not needed: a deadline; that of [d] open entries each depth 0..d-1 occurs once, that they finish no earlier than what
+    is nested in them, and that none keeps its core. *)
 Record conditions (tb : table) : Prop := {
   positive : forall p, (fst p < cores tb)%nat -> 1 <= wcet tb p;
   from_0 : forall k, (k < cores tb)%nat -> 0 <= start tb (k, O);
@@ -43,7 +45,7 @@ Proof.
     specialize (W n (S x)). lia.
 Qed.
 
-(** **Theorem T as TABLE.md states it.** *)
+(** **Theorem T by these conditions.** *)
 Corollary theorem_t : forall tb env late s, conditions tb -> punctual tb env late -> 0 <= late ->
   run tb env initial s -> forall p, (fst p < cores tb)%nat ->
   (~ started s p -> now s <= start tb p + late + lost s) /\

@@ -1,6 +1,6 @@
-(** * Where TABLE.md says too much: two counterexamples
+(** * Where less does not suffice: two counterexamples
 
-    1. With WCETs of 0, C1 to C4 do not suffice: the lists can wait for each other for ever.
+    1. With WCETs of 0, C1 to C4 (Conditions.v) do not suffice: the lists can wait for each other for ever.
     2. "All lists are on time" cannot be read off from what should have started and finished by now: nothing need be late, and
        an entry is late after all, without any overrun since. *)
 

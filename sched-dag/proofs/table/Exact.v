@@ -1,4 +1,4 @@
-(** * The rules as narrow as TABLE.md states them, and that they never block
+(** * The rules as narrow as sched-dag/src/table.rs states them, and that they never block
 
     Model.v leaves much open, so that Theorem T covers many platforms. Here an entry starts only if it is released, not void,
     and all that it waits for has ended, was passed, or is void; it takes its WCET at most. Each such run is a run of

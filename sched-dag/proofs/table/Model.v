@@ -2,7 +2,7 @@
 
     Words. A _place_ is a core and an index in that core's endless list. A _table_ gives each place a WCET,
     a start, a finish, a nominal release and a depth, and says which places it waits for. A _run_ is a
-    sequence of steps by the rules of TABLE.md, section 4. Time is discrete (a nanosecond, say).
+    sequence of steps by the rules T1 to T4 of sched-dag/src/table.rs. Time is discrete (a nanosecond, say).
 
     What the rules leave open is open here: any order of what happens at one instant; any entry may end at any
     time after its start; a place may be void from any time on. What is against the rules is counted, in [lost]: by how
@@ -87,8 +87,8 @@ Definition quiet (s : state) : Prop :=
   forall k, (k < cores tb)%nat ->
     ~ due s k /\ match stack s k with [] => True | (_, w) :: _ => 0 < w end.
 
-(** - [Start]: an entry starts at its place, on top of the stack. (Section 4 lets it start only if it is released and what
-      it waits for has ended, or is void. The theorem does not need that: every run of section 4 is a run here, whether
+(** - [Start]: an entry starts at its place, on top of the stack. (The rules let it start only if it is released and what
+      it waits for has ended, or is void. The theorem does not need that: every run by T1 to T4 is a run here, whether
       what is void counts as ended at once or when it is passed.)
     - [Pass]: a void entry is passed, only where it might start; in a plain list, at any time.
     - [End]: an entry that has begun ends, or is cut; whether it runs or is preempted.

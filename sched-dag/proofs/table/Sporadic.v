@@ -1,7 +1,7 @@
 (** * A lap at each release: a sporadic DAG (an owner), or several that are released together
 
-    TABLE.md, section 6: for one DAG the origin of the lap is each release, not a grid, so it may be sporadic. Here each lap has
-    its own origin; two origins are at least a lap apart. All DAGs of the table have the lap as their period, no offset, and
+    For one DAG the origin of the lap is each release, not a grid, so it may be sporadic (docs/bounds.md, "Tables").
+    Here each lap has its own origin; two origins are at least a lap apart. All DAGs of the table have the lap as their period, no offset, and
     one job a lap. As in AnyResolution.v a tick is 1/N of a nanosecond; laps begin at any tick. *)
 
 From Coq Require Import ZArith List Bool Lia.

@@ -20,7 +20,7 @@ Definition encloses (k x i n : nat) : Prop :=
   finish tb (k, x) <= start tb (k, (i + n)%nat).
 
 (** The conditions on a table, as far as the theorem needs them.
-    - [sorted], [family] are C3 and C4 of TABLE.md, but weaker: a finish may be later than start + WCETs of the family;
+    - [sorted], [family] are C3 and C4 of Conditions.v, but weaker: a finish may be later than start + WCETs of the family;
       nothing is said of the number of entries that are open.
     - [precedence] is C2. Its last part follows from a WCET of 1 or more; with WCETs of 0 it is a condition of its own.
     - [ready] is C1 without the deadline. *)
