@@ -38,39 +38,19 @@ Print least_dues. Print subtask_of. Print more_of. Print keys_by_vertex. Print n
 Print stated_keys. Print committed_by_rank.
 
 (** The theorems. *)
-Check graham.
-Check multi_path_alone.
-Check first_form_in_ticks.
-Check first_form_in_fractions.
-Check multi_path_alone_in_fractions.
-Check response_time_equation.
-Check second_form.
-Check second_form_sharp.
-Check first_form_blocked.
-Check along_a_path.
-Check set_bounds.
-Check set_bounds_in_fractions.
-Check part_bounds.
-Check part_bounds_in_fractions.
-Check check_sound_in_fractions.
-Check judge_sound.
-Check judge_sinks_sound.
-Check one_core.
-Check one_core_by_start.
-Check order_tells_last.
-Check one_core_check_sound.
-Check sink_check_sound.
-Check judge_core_sound.
+Check graham. Check multi_path_alone. Check first_form_in_ticks. Check first_form_in_fractions.
+Check multi_path_alone_in_fractions. Check response_time_equation. Check second_form. Check second_form_sharp.
+Check first_form_blocked. Check along_a_path. Check set_bounds. Check set_bounds_in_fractions.
+Check part_bounds. Check part_bounds_in_fractions. Check check_sound_in_fractions. Check judge_sound.
+Check judge_sinks_sound. Check one_core. Check one_core_by_start. Check order_tells_last.
+Check one_core_check_sound. Check sink_check_sound. Check judge_core_sound.
 
 (** Examples, and their runs. *)
 Print lap_table. Print lap. Print on. Print lost_in. Print lap_run. Print table_run. Print independent.
 Print Examples.dag_of. Print simple_task. Print three_dags. Print three_at_work. Print two_wait.
 Print two_subtasks. Print both_cores_lost. Print by_deadlines. Print three_on_one. Print one_is_preempted.
 Print vs.
-Check preempted_run_obeys.
-Check three_obey_the_rules.
-Check two_wait_together.
-Check losses_of_any_core.
+Check preempted_run_obeys. Check three_obey_the_rules. Check two_wait_together. Check losses_of_any_core.
 Check sharp_form_fails_in_fractions.
 
 (** The programs that judge. Theorems say of a "yes" what it means, whatever is in here. *)

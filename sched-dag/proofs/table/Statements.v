@@ -15,25 +15,14 @@ Print wait_of. Print table_of. Print well_formed. Print laps_at. Print losing_ru
 Print exactly_due. Print exactly_quiet. Print exact. Print exact_run.
 
 (** The theorems. *)
-Check sustainable.
-Check never_preempted.
-Check theorem_t.
-Check accepted_bounds_hold.
-Check accepted_alone.
-Check check_decides.
-Check sporadic_bounds_hold.
-Check losing_bounds_hold.
-Check accepted_bounds_hold_in_fractions.
-Check exact_run_is_run.
-Check accepted_never_blocks.
+Check sustainable. Check never_preempted. Check theorem_t. Check accepted_bounds_hold. Check accepted_alone.
+Check check_decides. Check sporadic_bounds_hold. Check losing_bounds_hold.
+Check accepted_bounds_hold_in_fractions. Check exact_run_is_run. Check accepted_never_blocks.
 
 (** Examples, and their runs. *)
 Print lone. Print always. Print zero. Print nest. Print nominal. Print no_pause. Print waits_of.
 Print settled_b. Print finished_b. Print room_b. Print act. Print begin. Print first. Print go. Print replay.
-Check a_loss_is_attained.
-Check replay_is_run.
-Check zero_is_stuck.
-Check on_time_by_the_clock_is_not_enough.
+Check a_loss_is_attained. Check replay_is_run. Check zero_is_stuck. Check on_time_by_the_clock_is_not_enough.
 
 (** The programs that judge. Theorems say of a "yes" what it means, whatever is in here. *)
 Print later. Print nested. Print core_ok. Print list_ok. Print most_subtasks. Print row. Print rows_of.
