@@ -7,9 +7,11 @@
 //! 1. *record*: it has the whole run;
 //! 2. *witness*: the bounds are those that the analysis proves here, by a witness;
 //! 3. *rules*: the [findings](crate::findings) have no breach;
-//! 4. *WCET*: no segment executes for longer than its WCET and its charges;
-//! 5. *lost*: nor do execution and lost time together take longer;
-//! 6. *bound*: no response is above its bound. This follows from all others, so that a failure
+//! 4. *cut*: each released job of a DAG with a bound has executed to its end, and on one core, where
+//!    a bound may rest on the demand of all, each of any DAG;
+//! 5. *WCET*: no segment executes for longer than its WCET and its charges;
+//! 6. *lost*: nor do execution and lost time together take longer;
+//! 7. *bound*: no response is above its bound. This follows from all others, so that a failure
 //!    is an error of ours.
 //!
 //! *Lost* are the time until an instance is ready, from the nominal release or the last finish
@@ -49,6 +51,9 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
         return Err(("rules", breach.with_names(&run.task_set).to_string()));
     }
     let view = View::new(run);
+    if let Some(why) = cut(&view) {
+        return Err(("cut", why));
+    }
     let segments = segments(&view);
     let owed_ns = findings.figures.longest_inversion_ns;
     for (condition, owed_ns) in [("WCET", None), ("lost", Some(owed_ns))] {
@@ -69,6 +74,24 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
         return Err(("lost", why));
     }
     exceeded(&view, &answer).map_or(Ok(()), |why| Err(("bound", why)))
+}
+
+/// Says which instance of a released job never finished, where theorems ask each to.
+fn cut(view: &View<'_>) -> Option<String> {
+    let Run {
+        task_set, options, ..
+    } = view.run;
+    view.jobs.iter().find_map(|(&(dag, job), of)| {
+        let model = task_set.dag(dag);
+        let has_one_core = || task_set.cores_of(model.cluster(), options.cores).len() == 1;
+        let is_asked = view.run.bounds_ns[dag.index()].is_some() || has_one_core();
+        let subtasks = model.topological_order().iter();
+        let mut instances = subtasks.map(|&subtask| Instance { dag, job, subtask });
+        let finish_ns = |of: &Instance| view.histories.get(of)?.finish_ns;
+        let unfinished = instances.find(|of| finish_ns(of).is_none());
+        let instance = unfinished.filter(|_| is_asked && of.released_ns.is_some())?;
+        Some(format!("{} never finished", named(view.run, instance)))
+    })
 }
 
 /// A segment, or all of an instance if the WCETs of its segments are not known.

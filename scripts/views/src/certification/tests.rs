@@ -61,14 +61,18 @@ const GOOD: &str = "
 165 finish c0 2.0.0
 180 completed c0 2.0";
 
-/// Returns a run whose segments are charged 10 each, and whose bounds are proven.
+/// Returns a run of the DAGs above.
 fn run_of(events: &str) -> Run {
-    let mut commit = commit(DAGS);
+    of_commit(commit(DAGS), events)
+}
+
+/// Returns a run whose segments are charged 10 each, and whose bounds are proven.
+fn of_commit(mut commit: Commit, events: &str) -> Run {
     commit.charge_ns = Some(10);
     let committed = Committed::new(0, commit.clone()).expect("they can be committed");
     let answer = analysis::answer(&committed.task_set, &committed.settings());
     for (dag, bound) in commit.dags.iter_mut().zip(answer.bounds) {
-        dag.bound_ns = Some(bound.expect("it is proven").bound_ns);
+        dag.bound_ns = bound.map(|bound| bound.bound_ns);
     }
     let record = Record::read(&record_of("", &commit, "")).expect("it is well formed");
     Run {
@@ -103,6 +107,7 @@ fn a_run_is_certified_and_none_that_is_altered_in_one_event() {
 180 completed -> = rules: at 165 ns, R4 completion: dag `order` job 0
 180 completed -> 190 completed c0 2.0 = rules: at 190 ns, R4 completion: dag `order` job 0
 130 finish -> 135 finish c1 1.0.3 = rules: at 130 ns, R4 completion: dag `fork` job 0
+118 finish -> 118 ended c0 0.1.0; 118 dag_ended c0 0.0 = cut: subtask `x` of dag `fast` job 1 never finished
 72 resume -> 95 resume c0 1.0.2 = rules: at 70 ns, R5 dispatch: subtask `c` of dag `fork` job 0
 50 wait -> = rules: at 70 ns, one life: subtask `c` of dag `fork` job 0
 70 wake -> = rules: at 72 ns, one life: subtask `c` of dag `fork` job 0
@@ -121,6 +126,43 @@ fn a_run_is_certified_and_none_that_is_altered_in_one_event() {
         let said = judged(&run_of(&lines.join("\n")));
         assert!(said.starts_with(answer), "{row}\n{said}");
     }
+}
+
+#[test]
+fn on_one_core_no_job_of_any_dag_is_cut() {
+    let dags = "
+static 1
+high T=200 D=150 O=0: h/0/30
+low T=400 D=400 O=10: l/2 k/2; 0>1";
+    let events = "
+0 released c0 0.0
+0 ready c0 0.0.0
+1 start c0 0.0.0
+10 released c0 1.0
+10 ready c0 1.0.0
+30 finish c0 0.0.0
+30 completed c0 0.0
+31 start c0 1.0.0
+50 ended c0 1.0.0
+50 dag_ended c0 1.0
+50 cancelled c0 1.0.1
+50 completed c0 1.0";
+    let run = of_commit(commit(dags), events);
+    let bounds = run.bounds_ns.iter().map(Option::is_some);
+    assert_eq!(bounds.collect::<Vec<_>>(), [true, false]);
+    let cut = "cut: subtask `l` of dag `low` job 0 never finished";
+    assert_eq!(judged(&run), cut);
+    let mut lines = lines_of(events);
+    change(&mut lines, "31 start", "");
+    change(
+        &mut lines,
+        "30 finish",
+        "11 start c1 1.0.0; 30 finish c0 0.0.0",
+    );
+    change(&mut lines, "50 ended", "50 ended c1 1.0.0");
+    let on_two_cores = commit(&dags.replace("static 1", "static 2"));
+    let run = of_commit(on_two_cores, &lines.join("\n"));
+    assert_eq!(judged(&run), "certified");
 }
 
 #[test]
