@@ -7,11 +7,13 @@
 //! 1. *record*: it has the whole run;
 //! 2. *witness*: the bounds are those that the analysis proves here, by a witness;
 //! 3. *rules*: the [findings](crate::findings) have no breach;
-//! 4. *cut*: each released job of a DAG with a bound has executed to its end, and on one core, where
-//!    a bound may rest on the demand of all, each of any DAG;
-//! 5. *WCET*: no segment executes for longer than its WCET and its charges;
-//! 6. *lost*: nor do execution and lost time together take longer;
-//! 7. *bound*: no response is above its bound. This follows from all others, so that a failure
+//! 4. *order*: nothing that keeps its core [began](order) while another one, ready before that core
+//!    was given, goes first;
+//! 5. *cut*: each released job of a DAG with a bound has executed to its end, and on one core,
+//!    where a bound may rest on the demand of all, each of any DAG;
+//! 6. *WCET*: no segment executes for longer than its WCET and its charges;
+//! 7. *lost*: nor do execution and lost time together take longer;
+//! 8. *bound*: no response is above its bound. This follows from all others, so that a failure
 //!    is an error of ours.
 //!
 //! *Lost* are the time until an instance is ready, from the nominal release or the last finish
@@ -51,8 +53,10 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
         return Err(("rules", breach.with_names(&run.task_set).to_string()));
     }
     let view = View::new(run);
-    if let Some(why) = cut(&view) {
-        return Err(("cut", why));
+    for (condition, why) in [("order", order::broken(&view)), ("cut", cut(&view))] {
+        if let Some(why) = why {
+            return Err((condition, why));
+        }
     }
     let segments = segments(&view);
     let owed_ns = findings.figures.longest_inversion_ns;
@@ -240,5 +244,6 @@ fn exceeded(view: &View<'_>, answer: &AnalysisResult) -> Option<String> {
     })
 }
 
+mod order;
 #[cfg(test)]
 mod tests;

@@ -165,6 +165,57 @@ low T=400 D=400 O=10: l/2 k/2; 0>1";
     assert_eq!(judged(&run), "certified");
 }
 
+/// Nothing is preempted. Rows have the number of cores, the events, and the begin of the answer.
+#[test]
+fn what_keeps_its_core_begins_in_order() {
+    let dags = "
+high T=400 D=400 O=90: h/0/10
+one T=400 D=400 O=71: l/1/30
+two T=400 D=400 O=90: m/2/30";
+    let shorts = [
+        ("HIGH", "90 released c0 0.0; 90 ready c0 0.0.0"),
+        ("TWO", "90 released c0 2.0; 90 ready c0 2.0.0"),
+        (
+            "BEGIN",
+            "71 released c0 1.0; 71 ready c0 1.0.0; 72 start c0 1.0.0",
+        ),
+        ("ONE", "109 finish c0 1.0.0; 109 completed c0 1.0"),
+        (
+            "RIGHT",
+            "110 start c0 0.0.0; 120 finish c0 0.0.0; 120 completed c0 0.0; 121 start c0 2.0.0; END",
+        ),
+        (
+            "WRONG",
+            "110 start c0 2.0.0; 138 finish c0 2.0.0; 138 completed c0 2.0; LAST",
+        ),
+        (
+            "LAST",
+            "139 start c0 0.0.0; 149 finish c0 0.0.0; 149 completed c0 0.0",
+        ),
+        ("END", "150 finish c0 2.0.0; 150 completed c0 2.0"),
+    ];
+    let rows = "
+1: BEGIN; HIGH; TWO; ONE; RIGHT = certified
+1: BEGIN; HIGH; TWO; ONE; WRONG = order: subtask `m` of dag `two` job 0 began on core 0 at 110 ns and keeps it, although subtask `h` of dag `high` job 0 was ready
+1: BEGIN; TWO; ONE; 109 released c0 0.0; 109 ready c0 0.0.0; WRONG = order: subtask `m` of dag `two` job 0 began on core 0 at 110 ns
+1: BEGIN; TWO; ONE; 110 released c0 0.0; 110 ready c0 0.0.0; WRONG = lost: subtask `h` of dag `high` job 0 executed for 10 ns from 139 ns on; with 20 ns late
+2: HIGH; TWO; 91 start c1 2.0.0; 92 start c0 0.0.0; 102 finish c0 0.0.0; 102 completed c0 0.0; 121 finish c1 2.0.0; 121 completed c1 2.0 = certified
+2: BEGIN; TWO; HIGH; 91 start c1 2.0.0; ONE; 110 start c0 0.0.0; 120 finish c0 0.0.0; 120 completed c0 0.0; 121 finish c1 2.0.0; 121 completed c1 2.0 = order: subtask `m` of dag `two` job 0 began on core 1 at 91 ns";
+    for row in lines_of(rows) {
+        let (run, answer) = row.split_once(" = ").expect(row);
+        let (cores, events) = run.split_once(": ").expect(row);
+        let long = |text: String, (short, long): &(&str, &str)| text.replace(short, long);
+        let events = shorts
+            .iter()
+            .fold(events.to_string(), long)
+            .replace("; ", "\n");
+        let mut commit = commit(&format!("static {cores}{dags}"));
+        commit.is_preemptive = false;
+        let said = judged(&of_commit(commit, &events));
+        assert!(said.starts_with(answer), "{row}\n{said}");
+    }
+}
+
 #[test]
 fn only_a_whole_record_with_its_bounds_is_certified() {
     type Alteration = fn(&mut Run);

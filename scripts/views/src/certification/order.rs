@@ -1,0 +1,198 @@
+//! Whether all that keeps its core began in the order of the policy.
+//!
+//! A decision takes effect late, so the law lets an instance wait for what it is owed for a while.
+//! What keeps its core ends that by its start, so there a wrong choice would look like a dispatch
+//! that takes its time. Here no time counts: the events stand in the order in which the scheduler
+//! learnt of them. It gave the core at its request, or else when the instance was ready and the
+//! core free. Whatever was ready by that step and goes first needs another core: at some moment
+//! from then until the start an idle one, or one with less urgent work that can be preempted.
+//!
+//! What can be preempted is not judged: if chosen wrongly it goes on for no longer than the
+//! inversion that is measured. Of entries of tables the law judges the order without time, too;
+//! that another one takes the core of a due entry and keeps it, it judges within its tolerance.
+
+use std::collections::BTreeMap;
+
+use sched_dag::journal::{Event, EventKind};
+use sched_dag::{ClusterId, CoreId, Instance, Preemption};
+
+use super::named;
+use crate::record::Run;
+use crate::units::shown;
+use crate::view::View;
+
+/// The smaller one goes first.
+type Key = (u64, Instance);
+
+/// Who waits and runs between two events.
+struct Dispatch<'v> {
+    view: &'v View<'v>,
+    /// By DAG the policy's numbers.
+    numbers: Vec<Vec<u64>>,
+    /// Since which event.
+    waiting: BTreeMap<Key, usize>,
+    running: BTreeMap<CoreId, Key>,
+    /// The event that freed a core last.
+    freed: BTreeMap<CoreId, usize>,
+    /// The latest request for a core.
+    requests: BTreeMap<CoreId, (Instance, usize)>,
+}
+
+/// A start, or an end of a wait, from which on an instance keeps a core.
+struct Begin {
+    key: Key,
+    core: CoreId,
+    /// The last event of the step from which on it may have been given the core.
+    chosen: usize,
+    /// The event by which it begins.
+    at: usize,
+}
+
+/// Says which instance that keeps its core began although another one goes first.
+pub(super) fn broken(view: &View<'_>) -> Option<String> {
+    let events: Vec<Event> = view.in_the_order_of_the_log().collect();
+    let mut dispatch = Dispatch::new(view);
+    let mut begins = Vec::new();
+    for (at, event) in events.iter().enumerate() {
+        begins.extend(dispatch.begin(&events, at));
+        dispatch.take(at, event);
+    }
+    begins.sort_by_key(|begin| begin.chosen);
+    let (mut dispatch, mut begins) = (Dispatch::new(view), begins.iter().peekable());
+    let mut undecided: Vec<&Begin> = Vec::new();
+    for (at, event) in events.iter().enumerate() {
+        dispatch.take(at, event);
+        while let Some(begin) = begins.next_if(|begin| begin.chosen == at) {
+            undecided.push(begin);
+        }
+        undecided.retain(|begin| dispatch.first(begin).is_some());
+        if let Some(begin) = undecided.iter().find(|begin| begin.at == at + 1) {
+            let [began, first] =
+                [begin.key, dispatch.first(begin)?].map(|it| named(view.run, it.1));
+            let (core, when) = (begin.core.0, shown(events[begin.at].time_ns));
+            return Some(format!(
+                "{began} began on core {core} at {when} and keeps it, although {first} was ready \
+                 when it was given the core, and goes first"
+            ));
+        }
+    }
+    None
+}
+
+impl<'v> Dispatch<'v> {
+    fn new(view: &'v View<'v>) -> Self {
+        let dags = view.run.task_set.dags().iter();
+        Self {
+            view,
+            numbers: dags
+                .map(|dag| view.run.options.policy.numbers(dag))
+                .collect(),
+            waiting: BTreeMap::new(),
+            running: BTreeMap::new(),
+            freed: BTreeMap::new(),
+            requests: BTreeMap::new(),
+        }
+    }
+
+    fn key(&self, instance: Instance) -> Key {
+        let Instance { dag, job, subtask } = instance;
+        let number = self.numbers[dag.index()][subtask.index()];
+        let release_ns = match self.view.run.options.policy.adds_release() {
+            true => self.view.release_ns(dag, job),
+            false => 0,
+        };
+        (release_ns.saturating_add(number), instance)
+    }
+
+    fn keeps(&self, Instance { dag, subtask, .. }: Instance) -> bool {
+        let Run {
+            task_set, options, ..
+        } = self.view.run;
+        let subtask = task_set.dag(dag).subtask(subtask);
+        options.preemption == Preemption::Disabled || subtask.is_non_preemptive()
+    }
+
+    /// Returns the cores on which what is in no table is in order with others.
+    fn group(&self, of: Instance) -> Option<(ClusterId, &'v [u32])> {
+        let dag = self.view.run.task_set.dag(of.dag);
+        let is_free = self.view.run.task_set.table_of(of.dag).is_none();
+        is_free.then_some((dag.cluster(), dag.affinity()))
+    }
+
+    /// Returns what the event of a number begins, before it is taken.
+    fn begin(&self, events: &[Event], at: usize) -> Option<Begin> {
+        let Event { what, core, .. } = events[at];
+        let instance = events[at].instance()?;
+        let begins = matches!(what, EventKind::Start | EventKind::Resume);
+        let is_judged = begins && self.keeps(instance) && self.group(instance).is_some();
+        let key = self.key(instance);
+        let ready = *self.waiting.get(&key).filter(|_| is_judged)?;
+        let request = self
+            .requests
+            .get(&core)
+            .filter(|(of, at)| *of == instance && *at > ready);
+        let free = self.freed.get(&core).copied().unwrap_or(0);
+        let since = request.map_or(ready.max(free), |(_, at)| *at);
+        // What else the same step of the scheduler made ready stands behind.
+        let in_step = |event: &&Event| {
+            let of = (event.core, event.time_ns) == (events[since].core, events[since].time_ns);
+            of && !event.what.is_of_machine()
+        };
+        let chosen = since + events[since + 1..at].iter().take_while(in_step).count();
+        Some(Begin {
+            key,
+            core,
+            chosen,
+            at,
+        })
+    }
+
+    /// Takes the event of a number.
+    fn take(&mut self, at: usize, event: &Event) {
+        if event.what == EventKind::DagEnded {
+            // What has not started never will; what has may go on, with nothing owed.
+            self.waiting.retain(|(_, of), _| of.dag != event.dag);
+        }
+        let Some(instance) = event.instance() else {
+            return;
+        };
+        if event.what == EventKind::Request {
+            self.requests.insert(event.core, (instance, at));
+            return;
+        }
+        let key = self.key(instance);
+        self.waiting.remove(&key);
+        let ran = self.running.iter().find(|(_, it)| **it == key);
+        if let Some(core) = ran.map(|(core, _)| *core) {
+            self.running.remove(&core);
+            self.freed.insert(core, at);
+        }
+        match event.what {
+            EventKind::Ready | EventKind::Suspend | EventKind::Wake => {
+                self.waiting.insert(key, at);
+            }
+            EventKind::Start | EventKind::Resume => {
+                self.running.insert(event.core, key);
+            }
+            _ => {}
+        }
+    }
+
+    /// Returns the first instance that goes before one that is to begin, and for which there is no
+    /// other core.
+    fn first(&self, begin: &Begin) -> Option<Key> {
+        let Run {
+            task_set, options, ..
+        } = self.view.run;
+        let is_of_it = |key: &Key| self.group(key.1) == self.group(begin.key.1);
+        let cores = task_set
+            .cores_of_dag(begin.key.1.dag, options.cores)
+            .into_iter();
+        let others = cores.map(CoreId).filter(|core| *core != begin.core);
+        let gives_way = |key: &Key| *key > begin.key && is_of_it(key) && !self.keeps(key.1);
+        let left = others.filter(|core| self.running.get(core).is_none_or(gives_way));
+        let before = self.waiting.range(..begin.key);
+        let mut before = before.filter(|(key, since)| **since <= begin.chosen && is_of_it(key));
+        before.nth(left.count()).map(|(key, _)| *key)
+    }
+}
