@@ -119,7 +119,7 @@ fn alter_parts(files: &[String]) -> (BTreeMap<String, u32>, [usize; 3]) {
 }
 
 #[test]
-fn a_witness_that_lacks_a_cluster_is_refused() {
+fn a_witness_that_lacks_a_cluster_or_is_torn_is_refused() {
     let mut sample = full_core();
     for (spec, cluster) in sample.specs.iter_mut().zip(0..) {
         spec.cluster = Some(ClusterId(cluster));
@@ -135,7 +135,17 @@ fn a_witness_that_lacks_a_cluster_is_refused() {
         output(&[file]).status.success()
     };
     assert!(is_accepted(&[first, second]));
-    let wrong: [&[&str]; 4] = [&[first], &[second], &[second, first], &[first, first]];
+    let lines = second.replace('\n', "\r\n");
+    let long = second.replacen(' ', &format!(" {}", "2".repeat(5_000)), 1);
+    let wrong: [&[&str]; 7] = [
+        &[first],
+        &[second],
+        &[second, first],
+        &[first, first],
+        &[first, second, "more"],
+        &[first, &lines],
+        &[first, &long],
+    ];
     for parts in wrong {
         assert!(!is_accepted(parts), "{parts:?}");
     }
