@@ -6,20 +6,20 @@ use std::process::{Command, Stdio};
 use sched_dag::analysis;
 use views::certification::certify;
 use views::findings::Findings;
-use views::record::{Committed, Run};
+use views::record::Run;
 
 use crate::{files, system};
 
 /// Returns the answer in words, and the word of the condition that failed, empty if none did.
 pub(super) fn told(run: &Run, findings: &Findings, asks_theorems: bool) -> (String, &'static str) {
     let theorems = certify(run, findings).and_then(|()| match asks_theorems {
-        true => theorems(&run.commit).map_err(|why| ("witness", why)),
-        false => Ok("by its witness; --proven asks for theorems".into()),
+        true => theorems(run).map_err(|why| ("witness", why)),
+        false => Ok("by the analysis; --proven has its witness checked".into()),
     });
     let count = run.bounds_ns.iter().flatten().count();
     match theorems {
         Ok(theorems) => {
-            let held = "no rule broken, no WCET exceeded, no more lost than charged";
+            let held = "no rule broken, no job cut, no WCET exceeded, no more lost than charged";
             let so = format!("so each of {count} bounds held, {theorems}");
             (format!("  certified: {held}; {so}\n"), "")
         }
@@ -27,10 +27,10 @@ pub(super) fn told(run: &Run, findings: &Findings, asks_theorems: bool) -> (Stri
     }
 }
 
-/// Asks the proven checker by which theorems the bounds of a commit hold.
-fn theorems(commit: &Committed) -> Result<String, String> {
+/// Asks the proven checker by which theorems the bounds of a run hold.
+fn theorems(run: &Run) -> Result<String, String> {
     let path = system::new_log("witness")?;
-    let witness = analysis::witness(&commit.task_set, &commit.settings());
+    let witness = analysis::witness(&run.commit.task_set, &run.commit.settings());
     files::write_named("witness", &path, witness)?;
     let mut command = Command::new(system::workspace().join("scripts/check-witness"));
     command.arg("--proven").arg(&path).stderr(Stdio::inherit());
@@ -38,6 +38,15 @@ fn theorems(commit: &Committed) -> Result<String, String> {
         .output()
         .map_err(|error| format!("check-witness: {error}"))?;
     let said = String::from_utf8_lossy(&said.stdout);
+    named(&said, run.bounds_ns.iter().flatten().count())
+}
+
+/// Returns how many bounds hold by which theorem, by what check-witness says of so many.
+fn named(said: &str, bounds: usize) -> Result<String, String> {
+    // One of several clusters, too.
+    if let Some(refused) = said.lines().find(|line| line.contains(": refused: ")) {
+        return Err(refused.into());
+    }
     let answers = said
         .lines()
         .filter_map(|line| match line.split_once(" proven by machine") {
@@ -50,9 +59,27 @@ fn theorems(commit: &Committed) -> Result<String, String> {
     let by = by_theorem
         .iter()
         .map(|(name, count)| format!("{count} by {name}"));
-    match by.collect::<Vec<_>>().join(", ") {
-        none if none.is_empty() && said.contains(": refused: ") => Err(said.trim().into()),
-        none if none.is_empty() => Ok("by its witness; the proven checker says nothing".into()),
-        by => Ok(by),
+    match by_theorem.values().sum::<usize>() {
+        0 => Ok("by the analysis; the proven checker says nothing".into()),
+        answers if answers != bounds => Err(format!("{answers} of {bounds} bounds have proofs")),
+        _ => Ok(by.collect::<Vec<_>>().join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::named;
+
+    #[test]
+    fn the_witness_of_each_cluster_counts() {
+        let of = |cluster, says| format!("w: cluster {cluster}{says}\n");
+        let proven = of(1, ": dag 0 a: proven by machine, by sustainable");
+        let by_hand = of(1, ": dag 1 b: not proven by machine: no theorem");
+        let both = named(&format!("{proven}{by_hand}"), 2);
+        assert_eq!(both, Ok("1 by hand, 1 by sustainable".into()));
+        let refused = of(0, ": refused: the seal is broken");
+        let told = named(&format!("{refused}{proven}"), 2);
+        assert_eq!(told, Err(refused.trim().into()));
+        assert_eq!(named(&proven, 2), Err("1 of 2 bounds have proofs".into()));
     }
 }

@@ -86,7 +86,7 @@ options! {
     FROM: Takes::Text("DAG/SUBTASK");
     /// Only the chains that end with this subtask; with --from.
     TO: Takes::Text("DAG/SUBTASK");
-    /// Ask by which theorem each bound of a certified run holds; needs Coq.
+    /// Check the witness of a certified run, and name the theorems of its bounds; needs Coq.
     PROVEN: Takes::Nothing;
     /// Only the machine lines on standard output, the rest on standard error.
     JSON: Takes::Nothing;

@@ -5,7 +5,7 @@
 //! theorem. These conditions are asked in this order, and the first that fails is told:
 //!
 //! 1. *record*: it has the whole run;
-//! 2. *witness*: the bounds are those that the analysis proves here, by a witness;
+//! 2. *witness*: the bounds are those that the same analysis answers here;
 //! 3. *rules*: the [findings](crate::findings) have no breach;
 //! 4. *order*: nothing that keeps its core [began](order) while another one, ready before that core
 //!    was given, goes first;
@@ -22,7 +22,7 @@
 //! next one of the instance that it preempts. `docs/proving.md` argues why an instance
 //! pays for that, by hand. A charge that is too small does no harm where WCETs were not used up.
 //!
-//! By which theorem the bounds then hold, `./scripts/check-witness --proven` says.
+//! No witness is checked here: `./scripts/check-witness --proven` does, and names the theorems.
 
 use std::collections::BTreeMap;
 
