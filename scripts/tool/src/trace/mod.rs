@@ -58,7 +58,8 @@ rules:
   one core                a core runs one instance at a time
 
 A run with bounds is *certified* if it is recorded from begin to end, no rule is broken, no
-WCET is exceeded, and no more time is lost than WCETs and charges leave; so each bound held.
+subtask that keeps its core began out of order, no job with a bound was cut, no WCET is
+exceeded, and no more time is lost than WCETs and charges leave; so each bound held.
 Else the first condition that fails is told, which is no breach (docs/proving.md).
 
 chains: from a source to a sink, from DAG to DAG by samples of latest values

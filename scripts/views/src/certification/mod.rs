@@ -7,14 +7,14 @@
 //! 1. *record*: it has the whole run;
 //! 2. *witness*: the bounds are those that the same analysis answers here;
 //! 3. *rules*: the [findings](crate::findings) have no breach;
-//! 4. *order*: nothing that keeps its core [began](order) while another one, ready before that core
-//!    was given, goes first;
+//! 4. *order*: no instance with a core to keep [began](order) before a more urgent instance, ready
+//!    by the step in which the core was given;
 //! 5. *cut*: each released job of a DAG with a bound has executed to its end, and on one core,
 //!    where a bound may rest on the demand of all, each of any DAG;
 //! 6. *WCET*: no segment executes for longer than its WCET and its charges;
 //! 7. *lost*: nor do execution and lost time together take longer;
-//! 8. *bound*: no response is above its bound. This follows from all others, so that a failure
-//!    is an error of ours.
+//! 8. *bound*: no response is above its bound. By hand this follows from all others, so that
+//!    a failure is an error of ours.
 //!
 //! *Lost* are the time until an instance is ready, from the nominal release or the last finish
 //! that it waits for; the time for which a wait goes on beyond its limit; and for each segment the

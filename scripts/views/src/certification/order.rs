@@ -1,15 +1,15 @@
 //! Whether all that keeps its core began in the order of the policy.
 //!
-//! A decision takes effect late, so the law lets an instance wait for what it is owed for a while.
-//! What keeps its core ends that by its start, so there a wrong choice would look like a dispatch
-//! that takes its time. Here no time counts: the events stand in the order in which the scheduler
-//! learnt of them. It gave the core at its request, or else when the instance was ready and the
-//! core free. Whatever was ready by that step and goes first needs another core: at some moment
-//! from then until the start an idle one, or one with less urgent work that can be preempted.
+//! A decision takes effect late, so the law lets an instance wait for a while for the core of its
+//! turn. An instance with a core to keep ends such a wait by its start, so there a wrong choice
+//! would look like a slow dispatch. Here no time counts: events stand in the order in which the
+//! scheduler learnt of them. The core was given at the request, or else when the instance was
+//! ready and the core free. More urgent instances, ready by that step, need other cores: at some
+//! moment from then until the start, idle cores, or cores with less urgent, preemptible work.
 //!
-//! What can be preempted is not judged: if chosen wrongly it goes on for no longer than the
-//! inversion that is measured. Of entries of tables the law judges the order without time, too;
-//! that another one takes the core of a due entry and keeps it, it judges within its tolerance.
+//! Preemptible instances are not judged: if chosen wrongly, they go on for no longer than the
+//! inversion, and this is measured. Of entries of tables the law judges the order without time,
+//! too; but the start of a member of the group on the core of a due entry within its tolerance.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ use crate::view::View;
 /// The smaller one goes first.
 type Key = (u64, Instance);
 
-/// Who waits and runs between two events.
+/// The instances at hand between two events.
 struct Dispatch<'v> {
     view: &'v View<'v>,
     /// By DAG the policy's numbers.
@@ -38,7 +38,7 @@ struct Dispatch<'v> {
     requests: BTreeMap<CoreId, (Instance, usize)>,
 }
 
-/// A start, or an end of a wait, from which on an instance keeps a core.
+/// A start, or an end of a wait, of an instance with a core to keep.
 struct Begin {
     key: Key,
     core: CoreId,
@@ -48,7 +48,7 @@ struct Begin {
     at: usize,
 }
 
-/// Says which instance that keeps its core began although another one goes first.
+/// Says which instance began out of order.
 pub(super) fn broken(view: &View<'_>) -> Option<String> {
     let events: Vec<Event> = view.in_the_order_of_the_log().collect();
     let mut dispatch = Dispatch::new(view);
@@ -112,7 +112,7 @@ impl<'v> Dispatch<'v> {
         options.preemption == Preemption::Disabled || subtask.is_non_preemptive()
     }
 
-    /// Returns the cores on which what is in no table is in order with others.
+    /// Returns the cluster and the affinity of an instance, unless a table has its DAG.
     fn group(&self, of: Instance) -> Option<(ClusterId, &'v [u32])> {
         let dag = self.view.run.task_set.dag(of.dag);
         let is_free = self.view.run.task_set.table_of(of.dag).is_none();
@@ -133,7 +133,7 @@ impl<'v> Dispatch<'v> {
             .filter(|(of, at)| *of == instance && *at > ready);
         let free = self.freed.get(&core).copied().unwrap_or(0);
         let since = request.map_or(ready.max(free), |(_, at)| *at);
-        // What else the same step of the scheduler made ready stands behind.
+        // Behind stands all else that the same step of the scheduler made ready.
         let in_step = |event: &&Event| {
             let of = (event.core, event.time_ns) == (events[since].core, events[since].time_ns);
             of && !event.what.is_of_machine()
