@@ -48,8 +48,8 @@ impl Backlog {
         if first < job {
             self.0.insert(first, WaitingRun { end: job, ..run });
         }
-        if job + 1 < run.end {
-            self.0.insert(job + 1, run);
+        if job.saturating_add(1) < run.end {
+            self.0.insert(job.saturating_add(1), run);
         }
         Some(JobState {
             queued: run.queued,
@@ -64,7 +64,7 @@ impl Backlog {
         let (mut first, mut run) = (
             job,
             WaitingRun {
-                end: job + 1,
+                end: job.saturating_add(1),
                 queued: state.queued,
                 skipped: state.skipped,
                 missed: state.missed,

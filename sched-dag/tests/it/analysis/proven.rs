@@ -112,12 +112,11 @@ fn no_witness_is_judged_differently() {
             .map(|(set, settings)| witness(&set, &settings))
             .collect();
         for why in asked(REASONS, &folder, &texts).lines() {
+            assert!(!why.contains("does not accept"), "{why}: {some:?}");
             *reasons.entry(why.to_owned()).or_default() += 1;
         }
     }
     println!("{reasons:#?}");
-    let differing = reasons.keys().find(|why| why.contains("does not accept"));
-    assert_eq!(differing, None);
     assert!(reasons[""] > 300, "too few are proven");
     fs::remove_dir_all(&folder).expect("it was made");
 }

@@ -49,9 +49,10 @@ fn named(said: &str, bounds: usize) -> Result<String, String> {
     }
     let answers = said
         .lines()
-        .filter_map(|line| match line.split_once(" proven by machine") {
-            Some((dag, _)) if dag.ends_with(" not") => Some("hand"),
-            Some((_, by)) => by.strip_prefix(", by "),
+        // A name may have such words, too, but not at the end of the line.
+        .filter_map(|line| match line.rsplit_once("proven by machine") {
+            Some((dag, why)) if dag.ends_with(": not ") && why.starts_with(": ") => Some("hand"),
+            Some((_, by)) => by.strip_prefix(", by ").filter(|by| !by.contains(' ')),
             None => None,
         });
     let mut by_theorem: BTreeMap<&str, usize> = BTreeMap::new();

@@ -4,11 +4,11 @@
 //! their WCETs at most. A run is *certified* if it was such a run, so that each bound held by its
 //! theorem. These conditions are asked in this order, and the first that fails is told:
 //!
-//! 1. *record*: it has the whole run;
+//! 1. *record*: it has the whole run, no job that is due twice, and none of those due is missing;
 //! 2. *witness*: the bounds are those that the same analysis answers here;
 //! 3. *rules*: the [findings](crate::findings) have no breach;
-//! 4. *order*: no instance with a core to keep [began](order) before a more urgent instance, ready
-//!    by the step in which the core was given;
+//! 4. *order* (`order.rs`): no instance with a core to keep began before a more urgent instance,
+//!    ready by the step in which the core was given;
 //! 5. *cut*: each released job of a DAG with a bound has executed to its end, and on one core,
 //!    where a bound may rest on the demand of all, each of any DAG;
 //! 6. *WCET*: no segment executes for longer than its WCET and its charges;
@@ -24,9 +24,10 @@
 //!
 //! No witness is checked here: `./scripts/check-witness --proven` does, and names the theorems.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use sched_dag::analysis::AnalysisResult;
+use sched_dag::journal::EventKind;
 use sched_dag::{Dag, DagId, Instance, Preemption, Subtask};
 
 use crate::findings::Findings;
@@ -53,7 +54,8 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
         return Err(("rules", breach.with_names(&run.task_set).to_string()));
     }
     let view = View::new(run);
-    for (condition, why) in [("order", order::broken(&view)), ("cut", cut(&view))] {
+    let due = ("record", due_again(&view).or_else(|| missing(&view)));
+    for (condition, why) in [due, ("order", order::broken(&view)), ("cut", cut(&view))] {
         if let Some(why) = why {
             return Err((condition, why));
         }
@@ -80,23 +82,80 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
     exceeded(&view, &answer).map_or(Ok(()), |why| Err(("bound", why)))
 }
 
-/// Says which instance of a released job never finished, where theorems ask each to.
+/// Says which job is due twice: responses would count from the last time.
+fn due_again(view: &View<'_>) -> Option<String> {
+    let mut due = BTreeSet::new();
+    let mut jobs = view.events.iter().filter(|it| it.what == EventKind::Due);
+    let again = jobs.find(|it| !due.insert((it.dag, it.job)))?;
+    let name = view.run.task_set.dag(again.dag).name();
+    Some(format!("dag `{name}` job {} is due twice", again.job))
+}
+
+/// Says which job of a periodic DAG with a bound is one of a stated number, or should have been
+/// complete, and was not released.
+/// Nothing is asked of a DAG that was paused or closed, or that modes leave out.
+fn missing(view: &View<'_>) -> Option<String> {
+    let run = view.run;
+    let modes = view.events.iter().any(|it| it.what == EventKind::Entered);
+    let stops = [EventKind::Off, EventKind::On, EventKind::Closed];
+    let stopped = |dag| {
+        view.events
+            .iter()
+            .any(|it| it.dag == dag && stops.contains(&it.what))
+    };
+    let bounded = (0..).map(DagId).zip(&run.bounds_ns);
+    let bounded = bounded.filter_map(|(dag, bound_ns)| Some((dag, (*bound_ns)?)));
+    let mut asked = bounded.filter(|&(dag, _)| !modes && !stopped(dag));
+    asked.find_map(|(dag, bound_ns)| {
+        let model = run.task_set.dag(dag);
+        let by_now = |&job: &u64| model.grid_ns(job).saturating_add(bound_ns) < view.end_ns;
+        let is_due = |job: &u64| model.jobs().is_some() || by_now(job);
+        let jobs = (0..model.jobs().unwrap_or(u64::MAX)).take_while(is_due);
+        let is_released = |job| {
+            view.jobs
+                .get(&(dag, job))
+                .is_some_and(|of| of.released_ns.is_some())
+        };
+        let mut jobs = jobs.take_while(|_| !model.is_sporadic());
+        let job = jobs.find(|&job| !is_released(job))?;
+        Some(format!("dag `{}` job {job} was not released", model.name()))
+    })
+}
+
+/// Says what cut a job short, or which instance of a released job never finished, where theorems
+/// ask each to.
 fn cut(view: &View<'_>) -> Option<String> {
     let Run {
         task_set, options, ..
     } = view.run;
+    let is_asked = |dag: DagId| {
+        let cores = task_set.cores_of(task_set.dag(dag).cluster(), options.cores);
+        view.run.bounds_ns[dag.index()].is_some() || cores.len() == 1
+    };
+    let mut cuts = view.events.iter().filter(|it| CUTS.contains(&it.what));
+    if let Some(event) = cuts.find(|it| is_asked(it.dag)) {
+        let name = task_set.dag(event.dag).name();
+        let word = event.what.word();
+        return Some(format!("`{word}` of dag `{name}` job {}", event.job));
+    }
     view.jobs.iter().find_map(|(&(dag, job), of)| {
-        let model = task_set.dag(dag);
-        let has_one_core = || task_set.cores_of(model.cluster(), options.cores).len() == 1;
-        let is_asked = view.run.bounds_ns[dag.index()].is_some() || has_one_core();
-        let subtasks = model.topological_order().iter();
+        let subtasks = task_set.dag(dag).topological_order().iter();
         let mut instances = subtasks.map(|&subtask| Instance { dag, job, subtask });
         let finish_ns = |of: &Instance| view.histories.get(of)?.finish_ns;
         let unfinished = instances.find(|of| finish_ns(of).is_none());
-        let instance = unfinished.filter(|_| is_asked && of.released_ns.is_some())?;
+        let instance = unfinished.filter(|_| is_asked(dag) && of.released_ns.is_some())?;
         Some(format!("{} never finished", named(view.run, instance)))
     })
 }
+
+/// The events by which a job ends before its instances do.
+const CUTS: [EventKind; 5] = [
+    EventKind::Aborted,
+    EventKind::Cancelled,
+    EventKind::Ended,
+    EventKind::DagEnded,
+    EventKind::Restarted,
+];
 
 /// A segment, or all of an instance if the WCETs of its segments are not known.
 struct Segment {

@@ -107,7 +107,10 @@ fn a_run_is_certified_and_none_that_is_altered_in_one_event() {
 180 completed -> = rules: at 165 ns, R4 completion: dag `order` job 0
 180 completed -> 190 completed c0 2.0 = rules: at 190 ns, R4 completion: dag `order` job 0
 130 finish -> 135 finish c1 1.0.3 = rules: at 130 ns, R4 completion: dag `fork` job 0
-118 finish -> 118 ended c0 0.1.0; 118 dag_ended c0 0.0 = cut: subtask `x` of dag `fast` job 1 never finished
+118 finish -> 118 ended c0 0.1.0; 118 dag_ended c0 0.0 = cut: `ended` of dag `fast` job 1
+118 finish -> 118 finish c0 0.1.0; 118 aborted c0 0.1 = cut: `aborted` of dag `fast` job 1
+180 completed -> 180 completed c0 2.0; 181 due c0 2.0 = record: dag `order` job 0 is due twice
+180 completed -> 180 completed c0 2.0; 300 signalled c0 2.1 = record: dag `fast` job 2 was not released
 72 resume -> 95 resume c0 1.0.2 = rules: at 70 ns, R5 dispatch: subtask `c` of dag `fork` job 0
 50 wait -> = rules: at 70 ns, one life: subtask `c` of dag `fork` job 0
 70 wake -> = rules: at 72 ns, one life: subtask `c` of dag `fork` job 0
@@ -150,8 +153,7 @@ low T=400 D=400 O=10: l/2 k/2; 0>1";
     let run = of_commit(commit(dags), events);
     let bounds = run.bounds_ns.iter().map(Option::is_some);
     assert_eq!(bounds.collect::<Vec<_>>(), [true, false]);
-    let cut = "cut: subtask `l` of dag `low` job 0 never finished";
-    assert_eq!(judged(&run), cut);
+    assert_eq!(judged(&run), "cut: `ended` of dag `low` job 0");
     let mut lines = lines_of(events);
     change(&mut lines, "31 start", "");
     change(
@@ -250,6 +252,11 @@ fn a_bound_that_fails_is_told() {
     let mut lines = lines_of(GOOD);
     change(&mut lines, "117 start", "317 start c1 1.0.3");
     change(&mut lines, "130 finish", "330 finish c1 1.0.3");
+    change(
+        &mut lines,
+        "150 signalled",
+        "150 closed c0 0.0; 150 signalled c0 2.0",
+    );
     let said = told(&run_of(&lines.join("\n")), &blind);
     let begin = "bound: subtask `d` of dag `fork` job 0 took 320 ns, beyond ";
     assert!(said.starts_with(begin), "{said}");

@@ -179,6 +179,9 @@ impl Record {
             match chunk {
                 Chunk::Header(_) | Chunk::Entry(_) => {}
                 Chunk::Text(text) => record.lines += text,
+                Chunk::Commit(_) if !open.taken.is_empty() => {
+                    return Err(format!("a commit within run {}", record.runs.len()));
+                }
                 Chunk::Commit(commit) => {
                     let committed = Committed::new(record.commits.len(), commit)?;
                     record.commits.push(committed);
