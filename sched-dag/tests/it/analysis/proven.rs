@@ -98,8 +98,8 @@ fn proven(folder: &Path, texts: &[String]) -> Vec<Vec<String>> {
     said.lines().map(of_text).collect()
 }
 
-/// Wherever a bound's form has a theorem, and all that the bound rests on, the proven checker says
-/// so, too.
+/// The proven checker accepts each bound whose form has a theorem, if all that the bound rests on
+/// has one.
 #[test]
 fn no_witness_is_judged_differently() {
     let folder = std::env::temp_dir().join(format!("judged-{}", std::process::id()));

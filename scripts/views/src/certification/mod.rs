@@ -160,7 +160,7 @@ const CUTS: [EventKind; 5] = [
 /// A segment, or all of an instance if the WCETs of its segments are not known.
 struct Segment {
     instance: Instance,
-    /// How many segments these are.
+    /// The number of segments.
     count: u64,
     from_ns: u64,
     executed_ns: u64,
