@@ -630,24 +630,21 @@ Hypothesis shown_all : forall h, h < K -> bounded h = true -> shown K m tau pol 
 Hypothesis outranking : forall h, h < K -> h <> k -> outranks pol h k = true -> bounded h = true.
 Hypothesis kept : forall h, h < K -> bounded h = true -> kept_before tau s now h (R h).
 
-Lemma facts_of_bounded h : h < K -> bounded h = true ->
+Definition facts_of (h : nat) : Prop :=
   known (tau h) = true /\ regular (tau h) = true /\ heads_first (graph (tau h)) (head (tau h)) /\
   (forall v, v < size (graph (tau h)) -> on_core tau h (head (tau h) v) = on_core tau h v) /\
   kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
   disjoint_parts (graph (tau h)) (parts h) (part h) /\
   (forall v, v < size (graph (tau h)) -> part h (head (tau h) v) = part h v).
+
+Lemma facts_of_bounded h : h < K -> bounded h = true -> facts_of h.
 Proof.
   intros Hh Bh. destruct (shown_all h Hh Bh) as (H0 & H4 & _ & H1 & H2 & H5 & H6 & _ & _ & ? & ? & ? & ? & ? & ? &
     _ & _ & _ & _ & (_ & H3) & _).
   repeat (split; auto); apply H6; auto.
 Qed.
 
-Lemma facts h : h < K -> negb (h =? k) && outranks pol h k = true ->
-  known (tau h) = true /\ regular (tau h) = true /\ heads_first (graph (tau h)) (head (tau h)) /\
-  (forall v, v < size (graph (tau h)) -> on_core tau h (head (tau h) v) = on_core tau h v) /\
-  kept_before tau s now h (R h) /\ R h <= period (tau h) /\ enough_cores m tau h (width h) /\
-  disjoint_parts (graph (tau h)) (parts h) (part h) /\
-  (forall v, v < size (graph (tau h)) -> part h (head (tau h) v) = part h v).
+Lemma facts h : h < K -> negb (h =? k) && outranks pol h k = true -> facts_of h.
 Proof.
   intros Hh O. apply andb_true_iff in O. destruct O as (N & O). apply negb_true_iff, Nat.eqb_neq in N.
   apply facts_of_bounded; auto.

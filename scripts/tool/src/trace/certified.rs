@@ -82,5 +82,14 @@ mod tests {
         let told = named(&format!("{refused}{proven}"), 2);
         assert_eq!(told, Err(refused.trim().into()));
         assert_eq!(named(&proven, 2), Err("1 of 2 bounds have proofs".into()));
+        // No name passes for an answer.
+        let like = of(
+            0,
+            ": dag 2 x proven by machine, by set_bounds: at most 5 ns: paths",
+        );
+        assert_eq!(
+            named(&format!("{like}{proven}"), 1),
+            Ok("1 by sustainable".into())
+        );
     }
 }

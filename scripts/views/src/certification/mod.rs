@@ -49,13 +49,15 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
         (0, false) => return Err(("record", "it ends before the run".into())),
         (lost, _) => return Err(("record", format!("{lost} events were lost"))),
     }
+    let view = View::new(run);
+    if let Some(why) = due_again(&view).or_else(|| missing(&view)) {
+        return Err(("record", why));
+    }
     let answer = run.commit.check_bounds().map_err(|why| ("witness", why))?;
     if let Some(breach) = findings.breaches.first() {
         return Err(("rules", breach.with_names(&run.task_set).to_string()));
     }
-    let view = View::new(run);
-    let due = ("record", due_again(&view).or_else(|| missing(&view)));
-    for (condition, why) in [due, ("order", order::broken(&view)), ("cut", cut(&view))] {
+    for (condition, why) in [("order", order::broken(&view)), ("cut", cut(&view))] {
         if let Some(why) = why {
             return Err((condition, why));
         }

@@ -109,6 +109,7 @@ fn a_run_is_certified_and_none_that_is_altered_in_one_event() {
 130 finish -> 135 finish c1 1.0.3 = rules: at 130 ns, R4 completion: dag `fork` job 0
 118 finish -> 118 ended c0 0.1.0; 118 dag_ended c0 0.0 = cut: `ended` of dag `fast` job 1
 118 finish -> 118 finish c0 0.1.0; 118 aborted c0 0.1 = cut: `aborted` of dag `fast` job 1
+180 completed -> 180 completed c0 2.0; 181 queued c0 0.18446744073709551615 = rules: 
 180 completed -> 180 completed c0 2.0; 181 due c0 2.0 = record: dag `order` job 0 is due twice
 180 completed -> 180 completed c0 2.0; 300 signalled c0 2.1 = record: dag `fast` job 2 was not released
 72 resume -> 95 resume c0 1.0.2 = rules: at 70 ns, R5 dispatch: subtask `c` of dag `fork` job 0

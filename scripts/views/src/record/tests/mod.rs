@@ -78,6 +78,10 @@ fn events_that_are_missing_are_counted_and_a_run_that_died_is_not_complete() {
     record.events(0, 4, &[[0, 0, 0]]);
     let died = Record::sent(&record.clone().end(), "").unwrap();
     assert_eq!((died.runs[0].lost, died.runs[0].complete), (4, false));
+    let mut twice = record.clone();
+    twice.commit(&commit(COMMIT));
+    let said = Record::read(&twice.end()).unwrap_err();
+    assert_eq!(said, "a commit within run 0");
     record.times(&Times {
         written: vec![8],
         ..Times::default()
