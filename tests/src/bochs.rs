@@ -12,9 +12,9 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use tool::child::{Child, Waited, bound_to_us};
+use tool::child::{Child, WaitEnd, bound_to_us};
 use tool::install;
-use tool::medium::Medium;
+use tool::medium::StickImage;
 use tool::outcome::judge_lines;
 use tool::system::{find_program, host_load, new_log};
 use views::protocol::Transcript;
@@ -41,7 +41,7 @@ pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u6
         install::ensure(&install::BOCHS)?;
         let program = find_program("bochs").ok_or("there is no program `bochs`")?;
         let words = format!("{words} end=off");
-        let iso = Medium::new(&built(package)?, &words, None)?;
+        let iso = StickImage::new(&built(package)?, &words, None)?;
         if !command.is_empty() {
             put_before(command, iso.path())?;
         }
@@ -111,7 +111,7 @@ fn boot(program: &Path, folder: &Path) -> Result<String, String> {
     let words = [SAID, "errors"].map(|file| last_words(&folder.join(file)));
     let words = words.concat();
     match waited {
-        Waited::Ended(status) => Ok(format!("Bochs ended with {status} and said:\n{words}")),
+        WaitEnd::Ended(status) => Ok(format!("Bochs ended with {status} and said:\n{words}")),
         _ => Err(format!("it was not powered off; {}\n{words}", host_load())),
     }
 }

@@ -27,7 +27,7 @@ use std::time::Duration;
 use tool::image;
 use tool::install;
 use tool::outcome::{Outcome, boot_with_input};
-use tool::qemu::{Loader, Machine, Mode, Network, Qemu, Second};
+use tool::qemu::{Loader, Machine, Mode, Network, Qemu, SecondPort};
 use tool::{system, wire_script};
 use views::protocol::Status;
 
@@ -174,7 +174,7 @@ impl Guest {
     #[must_use]
     pub fn succeed_sending(mut self) -> (Outcome, Vec<u8>) {
         let file = system::new_log("output").expect("a folder for logs");
-        self.qemu.second = Some(Second {
+        self.qemu.second = Some(SecondPort {
             is_live: false,
             output: Some(file.clone()),
         });
@@ -315,7 +315,7 @@ impl Guest {
         let outcome = self.boot();
         let verdict = outcome.transcript.verdict().map(|verdict| verdict.status);
         let exit = &outcome.ending;
-        if *exit != tool::qemu::Ending::Guest(status) || verdict != Ok(status) {
+        if *exit != tool::qemu::QemuEnd::Guest(status) || verdict != Ok(status) {
             let tail = outcome.tail();
             panic!("wanted the end {status:?}, got: {exit}; verdict {verdict:?}\n{tail}");
         }

@@ -14,7 +14,7 @@
 use std::num::NonZeroUsize;
 
 use fork_join::PERIOD;
-use join_latency::{Joined, Samples, Span};
+use join_latency::{CompletedJoin, ExecutionSpan, RunSamples};
 use pub_sub::{ApproximateTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 
 /// Runs jobs through a synchronizer that joins close stamps, as the paper does: each parallel subtask
@@ -26,20 +26,20 @@ use pub_sub::{ApproximateTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 /// # Panics
 ///
 /// If there is no topic.
-pub fn run(max_interval_ms: u64, times_ns: &[Vec<u64>]) -> Samples {
+pub fn run(max_interval_ms: u64, times_ns: &[Vec<u64>]) -> RunSamples {
     let queue_size = NonZeroUsize::new(1000).expect("not 0");
     let mut parameters = Parameters::new(times_ns.len(), queue_size);
     parameters.max_interval_ns = Some(max_interval_ms * 1_000_000);
     let mut synchronizer = ApproximateTime::new(parameters);
-    let mut samples = Samples {
+    let mut samples = RunSamples {
         parallel: times_ns
             .iter()
             .map(|times_ns| executions(times_ns))
             .collect(),
-        ..Samples::default()
+        ..RunSamples::default()
     };
     let topics = samples.parallel.iter().enumerate();
-    let of_topic = |(topic, spans): (usize, &Vec<Span>)| {
+    let of_topic = |(topic, spans): (usize, &Vec<ExecutionSpan>)| {
         let jobs = (0..).zip(spans.clone());
         jobs.map(move |(message, span)| (span.finish_ns, topic, message))
     };
@@ -54,14 +54,14 @@ pub fn run(max_interval_ms: u64, times_ns: &[Vec<u64>]) -> Samples {
 }
 
 /// Returns the executions of a parallel subtask.
-fn executions(times_ns: &[u64]) -> Vec<Span> {
+fn executions(times_ns: &[u64]) -> Vec<ExecutionSpan> {
     let period_ns = u64::try_from(PERIOD.as_nanos()).expect("25 ms");
     let mut finish_ns: u64 = 0;
     let jobs = (0..).zip(times_ns);
     let execution = jobs.map(|(job, time_ns): (u64, &u64)| {
         let start_ns = (job * period_ns).max(finish_ns);
         finish_ns = start_ns + time_ns;
-        Span {
+        ExecutionSpan {
             start_ns,
             finish_ns,
         }
@@ -72,15 +72,15 @@ fn executions(times_ns: &[u64]) -> Vec<Span> {
 /// Writes down what comes out while one publication is handled.
 struct Ready<'a> {
     ready_ns: u64,
-    samples: &'a mut Samples,
+    samples: &'a mut RunSamples,
 }
 
 impl Outlet<u64> for Ready<'_> {
     fn emitted(&mut self, set: Set<'_, u64>) {
         let ready_ns = self.ready_ns;
-        self.samples.joins.push(Joined {
+        self.samples.joins.push(CompletedJoin {
             ready_ns,
-            span: Span {
+            span: ExecutionSpan {
                 start_ns: ready_ns,
                 finish_ns: ready_ns,
             },

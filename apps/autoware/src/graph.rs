@@ -26,7 +26,7 @@ const SETTINGS: Duration = Duration::from_millis(25);
 const VISUALIZER: Duration = Duration::from_millis(60);
 
 /// The system, built and not committed.
-pub struct System {
+pub struct AutowareSystem {
     /// The DAGs: `lidar`, `map`, `settings`, `visualizer`, `route`, `behaviour`.
     pub dags: Vec<Dag>,
     /// For each job of `behaviour` the lidar job whose obstacles it has acted on;
@@ -57,7 +57,7 @@ const RECORDED: [&[&str]; 6] = [
     &["BehaviorPlanner", "VehicleInterface"],
 ];
 
-impl System {
+impl AutowareSystem {
     /// Records what a replay needs, and what it compares. All that records and replays is a
     /// quarter of the image.
     pub fn record(&self) {
@@ -79,15 +79,15 @@ impl System {
 }
 
 /// Builds subtasks one after the other, each with its own execution times.
-struct Builder<'w> {
+struct GraphBuilder<'w> {
     workload: &'w Workload,
     subtasks: Cell<u64>,
 }
 
 impl Workload {
     /// Builds the six DAGs.
-    pub fn build(&self) -> System {
-        let build = Builder {
+    pub fn build(&self) -> AutowareSystem {
+        let build = GraphBuilder {
             workload: self,
             subtasks: Cell::new(0),
         };
@@ -98,7 +98,7 @@ impl Workload {
         let (lidar, obstacles, pose) = build.lidar(&point_cloud_map, &cluster_settings);
         let (route, routes) = build.route(&goal, &pose);
         let (behaviour, acted_on) = build.behaviour(&obstacles, &pose, &routes);
-        System {
+        AutowareSystem {
             dags: vec![lidar, map, settings, visualizer, route, behaviour],
             acted_on,
         }
@@ -106,7 +106,7 @@ impl Workload {
 }
 
 /// A part's topic has its writer's name, as in the original.
-impl Builder<'_> {
+impl GraphBuilder<'_> {
     fn dag(&self, name: &str, period: Duration) -> Dag {
         let dag = create_dag();
         dag.name(name)
@@ -123,8 +123,8 @@ impl Builder<'_> {
     }
 
     /// Returns the attributes and the work of a subtask with `pieces` of work.
-    fn worker(&self, name: &str, pieces: u32) -> (SubtaskAttributes, Crunch) {
-        let crunch = Crunch::new(
+    fn worker(&self, name: &str, pieces: u32) -> (SubtaskAttributes, SubtaskWork) {
+        let crunch = SubtaskWork::new(
             self.workload,
             self.subtasks.replace(self.subtasks.get() + 1),
         );
@@ -328,12 +328,12 @@ impl Builder<'_> {
 
 /// The work of one subtask, job by job.
 #[derive(Clone, Debug)]
-struct Crunch {
+struct SubtaskWork {
     workload: Workload,
     random: Random,
 }
 
-impl Crunch {
+impl SubtaskWork {
     /// Makes the work of subtask number `number` of the system.
     fn new(workload: &Workload, number: u64) -> Self {
         let seed = workload.seed.wrapping_mul(0xd134_2543_de82_ef95);

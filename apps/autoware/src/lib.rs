@@ -57,7 +57,7 @@ use core::time::Duration;
 
 use fass::Occupation;
 
-pub use graph::{Origin, System};
+pub use graph::{AutowareSystem, Origin};
 pub use latency::Latencies;
 
 /// The WCET of a driver and of a sink.

@@ -56,7 +56,7 @@ pub enum Detection {
 
 /// How often each thing has happened.
 #[derive(Debug, Default)]
-pub struct Counts {
+pub struct WaitCounts {
     /// Frames of which the answer came in time.
     pub answered: AtomicU64,
     /// Frames whose wait ended by its limit.
@@ -79,8 +79,8 @@ pub fn build(
     seed: u64,
     conduct: Conduct,
     detection: Detection,
-) -> ([Dag; 3], Arc<Counts>) {
-    let counts = Arc::new(Counts::default());
+) -> ([Dag; 3], Arc<WaitCounts>) {
+    let counts = Arc::new(WaitCounts::default());
     let (device, driver) = create_device::<u64, u64>("accelerator");
     device.record();
     let camera = build_camera(&device, detection, &counts);
@@ -101,7 +101,7 @@ pub fn build(
     ([camera, control, accelerator], counts)
 }
 
-fn build_camera(device: &Device<u64, u64>, detection: Detection, counts: &Arc<Counts>) -> Dag {
+fn build_camera(device: &Device<u64, u64>, detection: Detection, counts: &Arc<WaitCounts>) -> Dag {
     let camera = create_dag();
     (camera.name("camera").record::<u64>("frame")).record::<Option<u64>>("objects");
     let mut frame = 0_u64;
@@ -179,7 +179,7 @@ struct Accelerator {
     random: Random,
     /// The question that it is at, and how many jobs of its own it still takes.
     asked: Option<(Ticket, u64, u64)>,
-    counts: Arc<Counts>,
+    counts: Arc<WaitCounts>,
 }
 
 impl Accelerator {

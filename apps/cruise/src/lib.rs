@@ -36,7 +36,7 @@ const FASTEST_CM_S: i32 = 3_000;
 
 /// The source of `cruise`'s releases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Releases {
+pub enum ReleaseSource {
     /// The time.
     Period,
     /// A packet.
@@ -50,7 +50,7 @@ fn decode(line: &[u8]) -> Option<i32> {
 }
 
 /// Builds the DAGs. The run ends after `jobs` periods.
-pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 3] {
+pub fn build(wire: &Wire, releases: ReleaseSource, jobs: u64) -> [Dag; 3] {
     let (cruise, brake) = (build_cruise(wire, releases, jobs), build_brake(jobs));
     let watch = build_watch(wire, &cruise, &brake, jobs);
     // Next to each other in a cluster are the two of the modes, where there are two clusters.
@@ -61,7 +61,7 @@ fn taking(name: &str, us: u64) -> SubtaskAttributes {
     SubtaskAttributes::named(name).wcet(Duration::from_micros(us))
 }
 
-fn build_cruise(wire: &Wire, releases: Releases, jobs: u64) -> Dag {
+fn build_cruise(wire: &Wire, releases: ReleaseSource, jobs: u64) -> Dag {
     let cruise = create_dag();
     (cruise.name("cruise").record::<Option<i32>>("gap")).record::<i32>("speed");
     let mut newest = None;
@@ -72,8 +72,8 @@ fn build_cruise(wire: &Wire, releases: Releases, jobs: u64) -> Dag {
         (fresh.map(|packet| packet.value),)
     };
     match releases {
-        Releases::Period => _ = cruise.jobs(jobs).period(PERIOD),
-        Releases::Packets => _ = cruise.sporadic(PERIOD), // the wire raises the signal
+        ReleaseSource::Period => _ = cruise.jobs(jobs).period(PERIOD),
+        ReleaseSource::Packets => _ = cruise.sporadic(PERIOD), // the wire raises the signal
     }
     cruise
         .using(wire.receiving(decode))

@@ -3,7 +3,7 @@
 #![no_std]
 #![no_main]
 
-use cruise::{Releases, build};
+use cruise::{ReleaseSource, build};
 use fass::finish_create_dags;
 use fass::shared::Wire;
 use kernel::{AppError, Machine, println};
@@ -13,7 +13,10 @@ kernel::entry!(main);
 fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let jobs = options.number("jobs", 1..=100_000, 50)?;
-    let releases = [("period", Releases::Period), ("packets", Releases::Packets)];
+    let releases = [
+        ("period", ReleaseSource::Period),
+        ("packets", ReleaseSource::Packets),
+    ];
     let releases = options.choice("releases", &releases)?;
     let wire = Wire::new("radar");
     machine.connect(&wire)?;

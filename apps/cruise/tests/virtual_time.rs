@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cruise::{Releases, build};
+use cruise::{ReleaseSource, build};
 use fass::commit::Overheads;
 use fass::finish_create_dags;
 use fass::shared::Wire;
@@ -22,7 +22,7 @@ fn the_car_follows_fresh_gaps_and_stops_without() {
         device_distance_ns: 100_000,
         ..Overheads::NONE
     });
-    let dags = build(&wire, Releases::Period, 10);
+    let dags = build(&wire, ReleaseSource::Period, 10);
     let commit = finish_create_dags(&dags).expect("it is sound");
     assert!(
         commit
@@ -48,7 +48,7 @@ fn the_car_follows_fresh_gaps_and_stops_without() {
 fn released_by_packets_it_answers_each_but_not_too_often() {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    finish_create_dags(&build(&wire, Releases::Packets, 10)).expect("it is sound");
+    finish_create_dags(&build(&wire, ReleaseSource::Packets, 10)).expect("it is sound");
     for at in [5, 6, 7, 40] {
         machine.arrive_at(&wire, ms(at), b"gap 2100\n");
     }
@@ -65,7 +65,7 @@ fn released_by_packets_it_answers_each_but_not_too_often() {
 fn without_a_link_the_car_brakes_until_there_is_one() {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    finish_create_dags(&build(&wire, Releases::Period, 12)).expect("it is sound");
+    finish_create_dags(&build(&wire, ReleaseSource::Period, 12)).expect("it is sound");
     let run_to = |to| machine.run_for(ms(to));
     run_to(25);
     wire.link().set(false).unwrap();

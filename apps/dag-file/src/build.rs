@@ -12,11 +12,11 @@ use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fass_dag_file::{Execution, FileDag, Length, Set};
 use random::nth;
 
-use crate::times::Times;
+use crate::times::ExecutionTimes;
 
 /// How a set is run.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct RunSettings {
     /// How long instances execute.
     pub execution: Execution,
     /// The seed of what they draw.
@@ -30,7 +30,7 @@ pub struct Settings {
     pub grid_ns: u64,
 }
 
-impl Settings {
+impl RunSettings {
     fn execute(&self, ns: u64) {
         let early_ns = self.grid_ns / 4;
         let late_ns = match self.grid_ns {
@@ -43,10 +43,10 @@ impl Settings {
 }
 
 /// Builds the DAGs of a set, to be committed with any shape of graph allowed.
-pub fn build(set: &Set, settings: &Settings) -> Vec<Dag> {
+pub fn build(set: &Set, settings: &RunSettings) -> Vec<Dag> {
     let mut seeds = (0..).map(|n| nth(settings.seed, n));
     let length = settings.length.of(set);
-    let settings = Settings {
+    let settings = RunSettings {
         length,
         ..*settings
     };
@@ -60,14 +60,14 @@ pub fn build(set: &Set, settings: &Settings) -> Vec<Dag> {
 /// # Errors
 ///
 /// The faults of the commit.
-pub fn commit(set: &Set, settings: &Settings) -> Result<Commit, CommitError> {
+pub fn commit(set: &Set, settings: &RunSettings) -> Result<Commit, CommitError> {
     let dags = build(set, settings);
     finish_create_dags_in_order(&dags, ConstructionPolicy::any_graph(), &set.core_lists())
 }
 
 fn build_dag(
     described: &FileDag,
-    settings: &Settings,
+    settings: &RunSettings,
     seeds: &mut impl Iterator<Item = u64>,
 ) -> Dag {
     let spec = &described.spec;
@@ -106,7 +106,7 @@ fn build_dag(
             if subtask.non_preemptive {
                 attributes = attributes.non_preemptive();
             }
-            let times = Times {
+            let times = ExecutionTimes {
                 execution: settings.execution,
                 wcet_ns: described.most_ns(number),
                 samples_ns: described.subtasks[number].samples_ns.clone(),
@@ -129,8 +129,8 @@ fn build_dag(
 
 fn register(
     dag: &Dag,
-    times: Times,
-    settings: Settings,
+    times: ExecutionTimes,
+    settings: RunSettings,
     attributes: SubtaskAttributes,
 ) -> UntypedSubtask {
     if times.waits.is_empty() {
@@ -179,7 +179,7 @@ mod tests {
     fn a_set_runs_as_its_file_says() {
         // On a grid, what has begun late ends in time.
         for grid_ns in [0, 1_000_000] {
-            let settings = Settings {
+            let settings = RunSettings {
                 execution: Execution::Wcet,
                 seed: 1,
                 occupation: Occupation::Hold,

@@ -16,4 +16,4 @@ extern crate alloc;
 mod build;
 mod times;
 
-pub use build::{Settings, build, commit};
+pub use build::{RunSettings, build, commit};

@@ -12,7 +12,7 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use dag_file::{Settings, commit};
+use dag_file::{RunSettings, commit};
 use fass::Occupation;
 use fass::commit::DagAnswer;
 use fass_dag_file::{DagFile, Execution, Length, check, parse};
@@ -20,7 +20,7 @@ use kernel::options::UsageError;
 use kernel::{AppError, Machine, println};
 use sched_dag::{CommitOptions, Policy};
 
-use report::Report;
+use report::SetReport;
 
 kernel::entry!(main);
 
@@ -40,8 +40,8 @@ const WORDS: [&str; 11] = [
 ];
 
 /// Options of the command line besides how a set is run.
-struct Wishes {
-    settings: Settings,
+struct CommandOptions {
+    settings: RunSettings,
     /// Whether a deadline miss makes the run a failure.
     is_strict: bool,
 }
@@ -77,13 +77,13 @@ fn main(machine: &Machine) -> Result<(), AppError> {
             0 => machine.run()?,
             grid_ns => machine.run_from((fass::now_ns() / grid_ns + 2) * grid_ns)?,
         };
-        let report = Report::new(set, commit.answers(), &run);
+        let report = SetReport::new(set, commit.answers(), &run);
         report.emit();
         reports.push(report);
     }
-    reports.iter().for_each(Report::print_table);
+    reports.iter().for_each(SetReport::print_table);
     machine.report_memory();
-    let complaint = |report: &Report| report.complaint(wishes.is_strict);
+    let complaint = |report: &SetReport| report.complaint(wishes.is_strict);
     let complaint = reports.iter().find_map(complaint);
     complaint.map_or(Ok(()), |text| Err(AppError::Failure(text)))
 }
@@ -118,7 +118,7 @@ fn newlines(bytes: &[u8]) -> usize {
     bytes.iter().filter(|byte| **byte == b'\n').count()
 }
 
-fn wishes(machine: &Machine) -> Result<Wishes, AppError> {
+fn wishes(machine: &Machine) -> Result<CommandOptions, AppError> {
     let options = machine.options();
     let execution = options
         .text("execution")
@@ -137,8 +137,8 @@ fn wishes(machine: &Machine) -> Result<Wishes, AppError> {
         (None, None) => Length::Periods(50),
     };
     let occupations = [("hold", Occupation::Hold), ("spin", Occupation::Spin)];
-    let wishes = Wishes {
-        settings: Settings {
+    let wishes = CommandOptions {
+        settings: RunSettings {
             execution,
             seed: options.number("seed", 0..=u64::MAX, 1)?,
             occupation: options.choice("occupy", &occupations)?,

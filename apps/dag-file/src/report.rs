@@ -13,7 +13,7 @@ use sched_dag::law::Violation;
 use sched_dag::{DagId, DagStatistics, Instance, SubtaskId};
 
 /// The figures of one set.
-pub(crate) struct Report {
+pub(crate) struct SetReport {
     set: String,
     dags: Vec<DagReport>,
     violations: usize,
@@ -36,7 +36,7 @@ struct SinkReport {
     responses: Distribution,
 }
 
-impl Report {
+impl SetReport {
     /// Takes the figures from a run; prints each violation.
     pub(crate) fn new(set: &Set, answers: &[DagAnswer], run: &Run) -> Self {
         let dags = set.dags.iter().zip(answers);

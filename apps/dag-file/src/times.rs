@@ -18,7 +18,7 @@ use sched_dag::Wait;
 
 /// The execution times of one subtask.
 #[derive(Clone, Debug)]
-pub(crate) struct Times {
+pub(crate) struct ExecutionTimes {
     pub(crate) execution: Execution,
     pub(crate) wcet_ns: u64,
     pub(crate) samples_ns: Arc<[u64]>,
@@ -26,7 +26,7 @@ pub(crate) struct Times {
     pub(crate) waits: Vec<Wait>,
 }
 
-impl Times {
+impl ExecutionTimes {
     /// Returns how long a segment of a job's instance executes, in nanoseconds.
     pub(crate) fn of_segment(&self, job: u64, number: usize) -> u64 {
         if let Some(sample) = self.sample(job) {
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn times_stay_within_what_was_asked_and_depend_on_the_seed_alone() {
-        let times = |execution, seed| Times {
+        let times = |execution, seed| ExecutionTimes {
             execution,
             wcet_ns: 1_000_000,
             samples_ns: [10, 20, 30].into(),
@@ -121,7 +121,7 @@ mod tests {
         drawn.sort_unstable();
         drawn.dedup();
         assert_eq!(drawn, [10, 20, 30]);
-        let none = Times {
+        let none = ExecutionTimes {
             samples_ns: Arc::default(),
             ..samples
         };
@@ -140,14 +140,15 @@ mod tests {
             limit_ns,
             segment_ns: Some(segment_ns),
         };
-        let times = |execution| Times {
+        let times = |execution| ExecutionTimes {
             execution: Execution::parse(execution).unwrap(),
             wcet_ns: 1_000,
             samples_ns: [10, 300, 20, 0, 30, 600, 401, 301, 9, 99].into(),
             seed: 3,
             waits: [wait(400, 301), wait(0, 99)].into(),
         };
-        let of = |times: &Times, job| [0, 1, 2].map(|number| times.of_segment(job, number));
+        let of =
+            |times: &ExecutionTimes, job| [0, 1, 2].map(|number| times.of_segment(job, number));
         let wcet = times("wcet");
         assert_eq!(of(&wcet, 5), [600, 301, 99]);
         assert_eq!(

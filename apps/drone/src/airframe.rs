@@ -24,16 +24,16 @@ const DRAG: f64 = 0.25;
 
 /// The force of the rotors.
 #[derive(Clone, Copy, Debug)]
-pub struct Force {
+pub struct RotorForce {
     /// Along the body's upward axis, in N.
     pub thrust: f64,
     /// About the body's axes, in N m.
     pub torque: Vector,
 }
 
-impl Force {
+impl RotorForce {
     /// The force that holds the airframe up.
-    pub const HOVER: Force = Force {
+    pub const HOVER: RotorForce = RotorForce {
         thrust: MASS * GRAVITY,
         torque: [0.0; 3],
     };
@@ -54,7 +54,7 @@ pub struct Pose {
 
 /// Measurements of the sensors on board, with noise.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured {
+pub struct SensorReadings {
     /// The gyroscopes, in rad/s.
     pub rates: Vector,
     /// The direction upwards, in the body's axes.
@@ -84,7 +84,7 @@ impl Airframe {
     }
 
     /// Moves on by `seconds`.
-    pub fn step(&mut self, force: Force, seconds: f64) {
+    pub fn step(&mut self, force: RotorForce, seconds: f64) {
         let Pose {
             position,
             velocity,
@@ -103,10 +103,10 @@ impl Airframe {
     }
 
     /// Measures.
-    pub fn measure(&self, noise: &mut Random) -> Measured {
+    pub fn measure(&self, noise: &mut Random) -> SensorReadings {
         let mut noisy = |value: f64, size: f64| value + size * draw(noise);
         let rotation = rotation(self.pose.angles);
-        Measured {
+        SensorReadings {
             rates: self.pose.rates.map(|rate| noisy(rate, 0.01)),
             up: rotation[2].map(|part| noisy(part, 0.02)),
             north: rotation[0].map(|part| noisy(part, 0.02)),
@@ -160,8 +160,8 @@ mod tests {
         let mut tilted = level.clone();
         tilted.pose.angles[1] = 0.1;
         for _ in 0..100 {
-            level.step(Force::HOVER, 0.001);
-            tilted.step(Force::HOVER, 0.001);
+            level.step(RotorForce::HOVER, 0.001);
+            tilted.step(RotorForce::HOVER, 0.001);
         }
         assert_eq!(level.pose.position, [0.0; 3]);
         // g sin(0.1) t^2 / 2, of which drag takes a little.
@@ -174,9 +174,9 @@ mod tests {
         let mut airframe = Airframe {
             pose: Pose::default(),
         };
-        let force = Force {
+        let force = RotorForce {
             torque: [0.0, 0.0, INERTIA[2]],
-            ..Force::HOVER
+            ..RotorForce::HOVER
         };
         (0..1000).for_each(|_| airframe.step(force, 0.001));
         let yaw = airframe.pose.angles[2];

@@ -6,13 +6,13 @@
 
 use maths::{atan2, sin_cos, sqrt};
 
-use crate::airframe::{Force, INERTIA, MASS, Measured, Vector, turned};
-use crate::camera::Fix;
+use crate::airframe::{INERTIA, MASS, RotorForce, SensorReadings, Vector, turned};
+use crate::camera::PositionFix;
 use crate::{GRAVITY, SECONDS};
 
 /// The state that the loop estimates.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Estimate {
+pub struct AttitudeEstimate {
     /// Roll, pitch and yaw.
     pub angles: Vector,
     /// About the body's axes, in rad/s.
@@ -23,9 +23,9 @@ pub struct Estimate {
     pub climb: f64,
 }
 
-impl Estimate {
+impl AttitudeEstimate {
     /// Begins with measurements, of an airframe that does not climb.
-    pub fn new(measured: &Measured) -> Self {
+    pub fn new(measured: &SensorReadings) -> Self {
         Self {
             angles: angles_of(measured),
             rates: measured.rates,
@@ -35,7 +35,7 @@ impl Estimate {
     }
 
     /// Takes measurements in.
-    pub fn update(self, measured: &Measured) -> Self {
+    pub fn update(self, measured: &SensorReadings) -> Self {
         const TRUST: f64 = 0.02;
         let mut angles = turned(self.angles, measured.rates, SECONDS);
         for (angle, seen) in angles.iter_mut().zip(angles_of(measured)) {
@@ -53,7 +53,7 @@ impl Estimate {
 }
 
 /// The angles of the directions upwards and to the north.
-fn angles_of(measured: &Measured) -> Vector {
+fn angles_of(measured: &SensorReadings) -> Vector {
     let [x, y, z] = measured.up;
     let roll = atan2(y, z);
     let pitch = atan2(-x, sqrt(y * y + z * z));
@@ -71,7 +71,11 @@ fn difference(to: f64, from: f64) -> f64 {
 }
 
 /// Decides what the rotors do to reach a goal. Without a fix the airframe stays level.
-pub fn control(estimate: &Estimate, fix: Option<(Fix, f64)>, goal: Vector) -> Force {
+pub fn control(
+    estimate: &AttitudeEstimate,
+    fix: Option<(PositionFix, f64)>,
+    goal: Vector,
+) -> RotorForce {
     const MOST: f64 = 2.5; // m/s^2, which is a tilt of 14 degrees
     let mut wanted = [0.0; 2];
     if let Some((fix, age)) = fix {
@@ -99,7 +103,7 @@ pub fn control(estimate: &Estimate, fix: Option<(Fix, f64)>, goal: Vector) -> Fo
         torque[axis] = INERTIA[axis] * (90.0 * turn - 17.0 * estimate.rates[axis]);
     }
     let upright = (sin_cos(roll).1 * sin_cos(pitch).1).max(0.5);
-    Force {
+    RotorForce {
         thrust: (MASS * lift / upright).clamp(0.0, 2.0 * MASS * GRAVITY),
         torque,
     }
@@ -114,7 +118,7 @@ mod tests {
     fn the_angles_of_exact_directions_are_exact() {
         let angles = [0.2, -0.3, 2.5];
         let rotation = rotation(angles);
-        let measured = Measured {
+        let measured = SensorReadings {
             rates: [0.0; 3],
             up: rotation[2],
             north: rotation[0],

@@ -5,7 +5,7 @@
 //! as the believed height says, is the place.
 
 use crate::airframe::{Pose, Vector, rotation};
-use crate::attitude::Estimate;
+use crate::attitude::AttitudeEstimate;
 
 /// Columns and rows of an image.
 pub const SIZE: (u16, u16) = (32, 24);
@@ -26,7 +26,7 @@ const THRESHOLD: u8 = 40;
 
 /// Where the camera believes the airframe to be, over the ground.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Fix {
+pub struct PositionFix {
     /// North and west of the beacon.
     pub position: [f64; 2],
     /// In m/s.
@@ -82,7 +82,7 @@ fn column_and_row(index: u16) -> (f32, f32) {
 }
 
 /// Returns where the airframe is if the beacon is seen there.
-pub fn locate((column, row): (f32, f32), estimate: &Estimate) -> [f64; 2] {
+pub fn locate((column, row): (f32, f32), estimate: &AttitudeEstimate) -> [f64; 2] {
     let ray: Vector = [f64::from(column / FOCAL), f64::from(row / FOCAL), -1.0];
     let [x, y, z] = rotation(estimate.angles)
         .map(|axis| axis[0] * ray[0] + axis[1] * ray[1] + axis[2] * ray[2]);
@@ -90,7 +90,7 @@ pub fn locate((column, row): (f32, f32), estimate: &Estimate) -> [f64; 2] {
     [-x * length, -y * length]
 }
 
-impl Fix {
+impl PositionFix {
     /// Takes a place in that was seen `seconds` after the one before (an alpha-beta filter).
     pub fn update(self, seen: [f64; 2], seconds: f64) -> Self {
         let mut fix = self;

@@ -9,9 +9,9 @@ use fass::{SubtaskAttributes, create_dag, execute_for};
 use maths::{acos, sqrt};
 use random::Random;
 
-use crate::airframe::{Airframe, Force, Measured, Pose, Vector, rotation};
-use crate::attitude::{Estimate, control};
-use crate::camera::{Fix, Image, capture, detect, locate};
+use crate::airframe::{Airframe, Pose, RotorForce, SensorReadings, Vector, rotation};
+use crate::attitude::{AttitudeEstimate, control};
+use crate::camera::{Image, PositionFix, capture, detect, locate};
 use crate::{FRAME, Flight, PERIOD, SECONDS, Workload};
 
 /// The WCETs in microseconds: three times and more what was observed on four cores in mode
@@ -53,7 +53,7 @@ const STEP: f64 = 0.075;
 const CHARGE: f64 = 130.0;
 
 /// The drone's DAGs, and what is known of the flight when they have ended.
-pub struct System {
+pub struct DroneSystem {
     /// In the order of the table above.
     pub dags: [Dag; 7],
     /// With fewer percent of the charge left, the drone comes down.
@@ -64,7 +64,7 @@ pub struct System {
 
 impl Workload {
     /// Builds the DAGs.
-    pub fn build(self) -> System {
+    pub fn build(self) -> DroneSystem {
         let flight = Flight::default();
         let [attitude, camera, battery, mission, command, descent, safety] = [
             ("attitude", PERIOD),
@@ -109,7 +109,7 @@ impl Workload {
         for dag in [&camera, &battery, &mission, &command] {
             dag.on_fault(&alarm);
         }
-        System {
+        DroneSystem {
             dags: [attitude, camera, battery, mission, command, descent, safety],
             reserve,
             flight,
@@ -129,20 +129,20 @@ impl Workload {
             .writes(&["measured"])
             .register(taking("measure"));
 
-        let mut believed: Option<Estimate> = None;
-        let estimate = move |(measured,): (Measured,)| {
+        let mut believed: Option<AttitudeEstimate> = None;
+        let estimate = move |(measured,): (SensorReadings,)| {
             self.spend("estimate");
             let estimate = match believed {
                 Some(estimate) => estimate.update(&measured),
-                None => Estimate::new(&measured),
+                None => AttitudeEstimate::new(&measured),
             };
             believed = Some(estimate);
             (estimate,)
         };
         dag.register_subtask(estimate, ["measured"], ["estimate"], taking("estimate"));
 
-        type Ahead<'a> = (Seen<'a, Fix>, Seen<'a, Vector>, Seen<'a, f64>);
-        let control = move |(fix, goal, height): Ahead<'_>, (estimate,): (Estimate,)| {
+        type Ahead<'a> = (Seen<'a, PositionFix>, Seen<'a, Vector>, Seen<'a, f64>);
+        let control = move |(fix, goal, height): Ahead<'_>, (estimate,): (AttitudeEstimate,)| {
             self.spend("control");
             // The landing: without the camera, which rests.
             if let Some(height) = height {
@@ -164,7 +164,7 @@ impl Workload {
             .register(taking("control"));
 
         let flight = flight.clone();
-        let proceed = move |airframe: &mut Airframe, (force,): (Force,)| {
+        let proceed = move |airframe: &mut Airframe, (force,): (RotorForce,)| {
             self.spend("move");
             airframe.step(force, SECONDS);
             let upright = rotation(airframe.pose.angles)[2][2].min(1.0);
@@ -179,7 +179,7 @@ impl Workload {
     }
 
     fn register_camera(self, dag: &Dag, views: &Views, flight: &Flight) {
-        let take = move |(pose, estimate): (Seen<'_, Pose>, Seen<'_, Estimate>)| {
+        let take = move |(pose, estimate): (Seen<'_, Pose>, Seen<'_, AttitudeEstimate>)| {
             self.spend("capture");
             let pose = pose.map_or(Airframe::new().pose, |pose| *pose.value);
             let estimate = estimate.map(|estimate| *estimate.value);
@@ -220,7 +220,7 @@ impl Workload {
         }
 
         let flight = flight.clone();
-        let mut fix: Option<Fix> = None;
+        let mut fix: Option<PositionFix> = None;
         let locate = move |(beacon, (truth, estimate)): (Option<(f32, f32)>, Taken)| {
             self.spend("locate");
             let seen = beacon
@@ -228,9 +228,9 @@ impl Workload {
                 .map(|(beacon, estimate)| locate(beacon, &estimate));
             flight.located(seen, &truth);
             if let Some(position) = seen {
-                let begun = Fix {
+                let begun = PositionFix {
                     position,
-                    ..Fix::default()
+                    ..PositionFix::default()
                 };
                 fix = Some(fix.map_or(begun, |fix| fix.update(position, FRAME.as_secs_f64())));
             }
@@ -264,7 +264,7 @@ impl Workload {
 
     fn register_descent(self, dag: &Dag, views: &Views) {
         let mut ahead = None;
-        let descend = move |estimate: Seen<'_, Estimate>| {
+        let descend = move |estimate: Seen<'_, AttitudeEstimate>| {
             self.spend("descend");
             let height = ahead.or(estimate.map(|estimate| estimate.value.height));
             let height = (height.unwrap_or(START[2]) - STEP).max(GROUND);
@@ -299,7 +299,7 @@ impl Workload {
         reserve: &Parameter<u32>,
     ) {
         let (mut left, mut was_low) = (CHARGE, false);
-        type Around<'a> = (Seen<'a, Force>, Raiser<'a>, u32);
+        type Around<'a> = (Seen<'a, RotorForce>, Raiser<'a>, u32);
         let drain = move |(force, mut changed, reserve): Around<'_>| {
             self.spend("drain");
             left = (left - force.map_or(0.0, |force| force.value.thrust) * 0.1).max(0.0);
@@ -320,16 +320,19 @@ impl Workload {
     }
 
     fn register_mission(self, dag: &Dag, views: &Views, changed: &Signal) {
-        let watch =
-            move |(fix, goal, mut changed): (Seen<'_, Fix>, Seen<'_, Vector>, Raiser<'_>)| {
-                self.spend("watch");
-                let Some(fix) = fix else { return };
-                let [x, y, _] = goal.map_or(START, |goal| *goal.value);
-                let (x, y) = (x - fix.value.position[0], y - fix.value.position[1]);
-                if sqrt(x * x + y * y) < 0.15 {
-                    changed.raise();
-                }
-            };
+        let watch = move |(fix, goal, mut changed): (
+            Seen<'_, PositionFix>,
+            Seen<'_, Vector>,
+            Raiser<'_>,
+        )| {
+            self.spend("watch");
+            let Some(fix) = fix else { return };
+            let [x, y, _] = goal.map_or(START, |goal| *goal.value);
+            let (x, y) = (x - fix.value.position[0], y - fix.value.position[1]);
+            if sqrt(x * x + y * y) < 0.15 {
+                changed.raise();
+            }
+        };
         let uses = (views.fix.sample(), views.goal.sample(), changed.raising());
         dag.period(Duration::from_millis(50))
             .using(uses)
@@ -347,17 +350,17 @@ impl Workload {
 
 /// The values that DAGs sample of one another.
 struct Views {
-    estimate: Latest<Estimate>,
+    estimate: Latest<AttitudeEstimate>,
     pose: Latest<Pose>,
-    force: Latest<Force>,
-    fix: Latest<Fix>,
+    force: Latest<RotorForce>,
+    fix: Latest<PositionFix>,
     is_low: Latest<bool>,
     goal: Latest<Vector>,
     height: Latest<f64>,
 }
 
 /// The pose that an image was taken from, and the estimate at that time.
-type Taken = (Pose, Option<Estimate>);
+type Taken = (Pose, Option<AttitudeEstimate>);
 
 /// The latest value, if there has been one.
 type Seen<'a, T> = Option<Sample<'a, T>>;

@@ -10,10 +10,10 @@ use crate::airframe::Pose;
 
 /// The figures of a flight. The DAGs only write them, so that they order nothing.
 #[derive(Clone, Debug, Default)]
-pub struct Flight(Arc<Figures>);
+pub struct Flight(Arc<FlightFigures>);
 
 #[derive(Debug, Default)]
-struct Figures {
+struct FlightFigures {
     waypoints: AtomicU64,
     has_landed: AtomicU64,
     frames: AtomicU64,

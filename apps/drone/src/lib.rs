@@ -37,7 +37,7 @@ mod flight;
 
 use core::time::Duration;
 
-pub use dags::{System, WCETS};
+pub use dags::{DroneSystem, WCETS};
 pub use flight::Flight;
 
 /// In m/s^2.

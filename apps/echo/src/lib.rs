@@ -28,7 +28,7 @@ const MOST: usize = 16;
 const LONGEST: usize = 1472;
 
 /// The packets of a job.
-struct Batch {
+struct PacketBatch {
     packets: Box<[Packet]>,
     count: usize,
 }
@@ -39,7 +39,7 @@ struct Packet {
     length: usize,
 }
 
-impl Batch {
+impl PacketBatch {
     fn new() -> Self {
         let packet = || Packet {
             from: None,
@@ -73,8 +73,8 @@ pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
     let taking = |name, share| SubtaskAttributes::named(name).wcet(distance / share);
     let echo = create_dag();
     echo.name("echo").in_flight(1).sporadic(distance);
-    let batch = echo.state("batch", Batch::new());
-    let hear = |(mut packets, batch): (Received<'_, ()>, &mut Batch)| {
+    let batch = echo.state("batch", PacketBatch::new());
+    let hear = |(mut packets, batch): (Received<'_, ()>, &mut PacketBatch)| {
         batch.count = 0;
         for packet in &mut batch.packets {
             let taken = packets.look(|bytes, _, from| {
@@ -94,7 +94,7 @@ pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
         .source(hear)
         .writes(&["count"])
         .register(taking("hear", 3));
-    let sum = |batch: &Batch, (_count,): (usize,)| {
+    let sum = |batch: &PacketBatch, (_count,): (usize,)| {
         let lengths = batch.packets().iter().map(|packet| packet.length);
         (lengths.sum::<usize>(),)
     };
@@ -103,7 +103,7 @@ pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
         .reads(&["count"])
         .writes(&["bytes"])
         .register(taking("sum", 12));
-    let tell = |(mut wire, batch): (Sender<'_>, &Batch), (_bytes,): (usize,)| {
+    let tell = |(mut wire, batch): (Sender<'_>, &PacketBatch), (_bytes,): (usize,)| {
         for packet in batch.packets() {
             wire.to(packet.from);
             wire.send(&packet.bytes[..packet.length]);

@@ -4,7 +4,7 @@
 //! ease. The *doomed* one does the same work until its job [`FATAL_JOB`], in
 //! which its middle subtask commits a crime. It shows how many jobs of
 //! the healthy DAG met their deadlines before, while and after that happened, and what
-//! it cost the doomed DAG, under each [`Policy`].
+//! it cost the doomed DAG, under each [`FaultPolicy`].
 //!
 //! The crime may be a [driver's](served), whose DAG the questions of a third one release.
 //!
@@ -46,7 +46,7 @@ pub const JOBS: u64 = 30;
 
 /// The fate of the doomed DAG after its crime.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Policy {
+pub enum FaultPolicy {
     /// The DAG is ended.
     End,
     /// It goes on with the next job, and the middle subtask is made anew.
@@ -57,15 +57,15 @@ pub enum Policy {
 }
 
 /// Every policy, by name.
-pub const POLICIES: [(&str, Policy); 3] = [
-    ("end", Policy::End),
-    ("restart", Policy::Restart),
-    ("fall_back", Policy::FallBack),
+pub const POLICIES: [(&str, FaultPolicy); 3] = [
+    ("end", FaultPolicy::End),
+    ("restart", FaultPolicy::Restart),
+    ("fall_back", FaultPolicy::FallBack),
 ];
 
 /// Builds the DAG that must not notice anything.
 pub fn healthy() -> Dag {
-    pipeline("healthy", 0, None, Some(BUDGET), Policy::End)
+    pipeline("healthy", 0, None, Some(BUDGET), FaultPolicy::End)
 }
 
 /// The time between two jobs where faults come thick and fast.
@@ -106,13 +106,13 @@ pub fn restless(faults: u32) -> [Dag; 2] {
 }
 
 /// Builds the DAG that commits `crime` in its job [`FATAL_JOB`].
-pub fn doomed(crime: Crime, policy: Policy) -> Dag {
+pub fn doomed(crime: Crime, policy: FaultPolicy) -> Dag {
     pipeline("doomed", 1, Some(crime), Some(BUDGET), policy)
 }
 
 /// Builds the DAG that is ended by its crime, with all the time it wants for that.
 pub fn doomed_at_leisure(crime: Crime) -> Dag {
-    pipeline("doomed", 1, Some(crime), None, Policy::End)
+    pipeline("doomed", 1, Some(crime), None, FaultPolicy::End)
 }
 
 /// Builds a DAG that asks a device once a job, and the doomed one, which the questions release and
@@ -170,7 +170,7 @@ fn pipeline(
     priority: u32,
     crime: Option<Crime>,
     budget: Option<Duration>,
-    policy: Policy,
+    policy: FaultPolicy,
 ) -> Dag {
     let dag = create_dag();
     dag.name(name).jobs(JOBS);
@@ -199,13 +199,13 @@ fn pipeline(
     let locks = locks();
     let topics = (vec![&*input], vec![&*output]);
     match policy {
-        Policy::End => {
+        FaultPolicy::End => {
             (dag.using(locks).subtask(process))
                 .reads(&topics.0)
                 .writes(&topics.1)
                 .register(middle);
         }
-        Policy::Restart => {
+        FaultPolicy::Restart => {
             dag.survive_faults(FAULT_LIMIT);
             dag.using(locks)
                 .restarting(move || process)
@@ -213,7 +213,7 @@ fn pipeline(
                 .writes(&topics.1)
                 .register(middle);
         }
-        Policy::FallBack => {
+        FaultPolicy::FallBack => {
             dag.survive_faults(FAULT_LIMIT);
             let innocent = |_: Locked, (job,): (u64,)| {
                 fass::execute_for(EXECUTION, Occupation::Hold);

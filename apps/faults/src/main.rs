@@ -11,7 +11,7 @@ use alloc::vec;
 
 use fass::finish_create_dags;
 use faults::crimes::{CRIMES, Crime};
-use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy, restless, served};
+use faults::{FATAL_JOB, FaultPolicy, JOBS, PERIOD, POLICIES, doomed, healthy, restless, served};
 use kernel::{AppError, Machine, Run, json, println};
 use sched_dag::DagStatistics;
 
@@ -108,7 +108,7 @@ fn endure(machine: &Machine, times: u32) -> Result<(), AppError> {
 
 /// The effect of a fault beyond its own DAG.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Verdict {
+enum FaultVerdict {
     /// Nothing.
     Contained,
     /// The healthy DAG was late before the fault: the host is too busy to judge.
@@ -122,9 +122,9 @@ enum Verdict {
 fn commit_crime(
     machine: &Machine,
     (name, crime): (&str, Crime),
-    (on_fault, policy): (&str, Policy),
+    (on_fault, policy): (&str, FaultPolicy),
     by_driver: bool,
-) -> Result<Verdict, AppError> {
+) -> Result<FaultVerdict, AppError> {
     let mut dags = vec![healthy()];
     match by_driver {
         true => dags.extend(served(crime)),
@@ -145,19 +145,19 @@ fn commit_crime(
     let doomed_jobs = run.statistics("doomed").completed;
     let lost_jobs = run.statistics("doomed").failed;
     let expected = match policy {
-        Policy::End => (FATAL_JOB, 0),
-        Policy::Restart | Policy::FallBack => (JOBS - 1, 1),
+        FaultPolicy::End => (FATAL_JOB, 0),
+        FaultPolicy::Restart | FaultPolicy::FallBack => (JOBS - 1, 1),
     };
     let in_time = |asks: DagStatistics| (asks.completed, asks.misses) == (JOBS, 0);
     let asks_fail = by_driver && !in_time(*run.statistics("asks"));
     let verdict = if asks_fail || healthy_jobs < JOBS || (doomed_jobs, lost_jobs) != expected {
-        Verdict::Harmful
+        FaultVerdict::Harmful
     } else if [before, during, after] == totals {
-        Verdict::Contained
+        FaultVerdict::Contained
     } else if before < totals[0] {
-        Verdict::Unclear
+        FaultVerdict::Unclear
     } else {
-        Verdict::Harmful
+        FaultVerdict::Harmful
     };
     let word = ["contained", "unclear", "harmful"][verdict as usize];
     println!(

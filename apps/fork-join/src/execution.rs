@@ -13,14 +13,14 @@ use crate::compute;
 
 /// How a parallel subtask spends its execution time.
 #[derive(Clone, Copy, Debug)]
-pub enum Work {
+pub enum ExecutionWork {
     /// It occupies its core, and its execution is simulated.
     Simulate(Occupation),
     /// It computes.
-    Compute(Pace),
+    Compute(CorePace),
 }
 
-impl Work {
+impl ExecutionWork {
     /// Executes for a time.
     pub(crate) fn execute_for(self, time: Duration) {
         match self {
@@ -32,12 +32,12 @@ impl Work {
 
 /// How much a core that is alone computes in a time, and what comes out of it.
 #[derive(Clone, Copy, Debug)]
-pub struct Pace {
+pub struct CorePace {
     round_ns: u64,
     result: u64,
 }
 
-impl Pace {
+impl CorePace {
     /// Of every round.
     const SEED: u64 = 1;
 
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "what was computed is wrong")]
     fn a_wrong_result_is_found() {
-        let pace = Pace {
+        let pace = CorePace {
             round_ns: 1000,
             result: 7,
         };

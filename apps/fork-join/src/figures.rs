@@ -4,7 +4,7 @@ use alloc::format;
 use alloc::string::String;
 
 use fass::Dag;
-use fork_join::Joins;
+use fork_join::JoinCount;
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::Instance;
@@ -18,7 +18,7 @@ const LATENCIES: [(&str, &str); 4] = [
 ];
 
 /// The figures of one run.
-pub(crate) struct Figures {
+pub(crate) struct RunFigures {
     parallel: usize,
     jobs: u64,
     joins: u64,
@@ -32,8 +32,8 @@ pub(crate) struct Figures {
     latencies: [Distribution; 4],
 }
 
-impl Figures {
-    pub(crate) fn new(parallel: usize, run: &Run, dag: &Dag, joins: &Joins) -> Self {
+impl RunFigures {
+    pub(crate) fn new(parallel: usize, run: &Run, dag: &Dag, joins: &JoinCount) -> Self {
         let (record, dag) = (run.record(), run.task_set().find(dag));
         let jobs = record.numbered(dag);
         let subtask = run.task_set().dag(dag).sinks()[0];

@@ -5,7 +5,7 @@
 //! subtask's mean load is 25.5 / 25, backlogs grow slowly however many cores there
 //! are, and deadlines come to be missed: that is the workload's nature, not an
 //! error. An error is a *mixed join*: a sink that receives values of different
-//! jobs, which [`Joins`] counts and which must not happen.
+//! jobs, which [`JoinCount`] counts and which must not happen.
 //!
 //! The code here knows no kernel: the tests run it in virtual time.
 
@@ -25,8 +25,8 @@ use core::time::Duration;
 use fass::{Dag, SubtaskAttributes, create_dag};
 
 pub use draw::ExecutionTimes;
-pub use execution::{Pace, Work};
-pub use sink::Joins;
+pub use execution::{CorePace, ExecutionWork};
+pub use sink::JoinCount;
 pub use work::compute;
 
 /// The time between two jobs.
@@ -65,7 +65,7 @@ pub struct Workload {
     /// The seed of the execution times.
     pub seed: u64,
     /// How execution times are spent.
-    pub work: Work,
+    pub work: ExecutionWork,
 }
 
 impl Workload {
@@ -78,7 +78,7 @@ impl Workload {
     /// # Panics
     ///
     /// If `parallel` is 0 or more than [`MOST_PARALLEL`].
-    pub fn build(&self) -> (Dag, Joins) {
+    pub fn build(&self) -> (Dag, JoinCount) {
         let dag = create_dag();
         dag.name("fork-join").in_flight(match self.jobs {
             0 => MOST_IN_FLIGHT,
@@ -112,7 +112,7 @@ impl Workload {
             dag.register_subtask(execute, ["job"], [output.as_str()], attributes);
         }
 
-        let joins = Joins::default();
+        let joins = JoinCount::default();
         sink::register(&dag, self.parallel, &joins);
         (dag, joins)
     }
@@ -130,7 +130,7 @@ mod tests {
             longest: WCET,
             jobs: 100,
             seed: 1,
-            work: Work::Simulate(Occupation::Hold),
+            work: ExecutionWork::Simulate(Occupation::Hold),
         }
     }
 

@@ -12,11 +12,11 @@ use core::slice;
 use core::time::Duration;
 
 use fass::{Occupation, finish_create_dags};
-use fork_join::{MOST_PARALLEL, Pace, WCET, Work, Workload};
+use fork_join::{CorePace, ExecutionWork, MOST_PARALLEL, WCET, Workload};
 use kernel::options::{CommandLine, UsageError};
 use kernel::{AppError, Machine, println};
 
-use figures::Figures;
+use figures::RunFigures;
 
 kernel::entry!(main);
 
@@ -30,10 +30,10 @@ fn main(machine: &Machine) -> Result<(), AppError> {
         "each parallel subtask executes 1 to {} ms, {}.",
         workloads[0].longest.as_millis(),
         match workloads[0].work {
-            Work::Simulate(Occupation::Hold) =>
+            ExecutionWork::Simulate(Occupation::Hold) =>
                 "simulated: it holds its core, which halts meanwhile",
-            Work::Simulate(Occupation::Spin) => "simulated: it watches the clock",
-            Work::Compute(_) => "computing: so long with a processor for itself",
+            ExecutionWork::Simulate(Occupation::Spin) => "simulated: it watches the clock",
+            ExecutionWork::Compute(_) => "computing: so long with a processor for itself",
         }
     );
     if workloads[0].longest == WCET {
@@ -50,7 +50,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
             println!("  {answer}");
         }
         let run = machine.run()?;
-        let figures = Figures::new(workload.parallel, &run, &dag, &joins);
+        let figures = RunFigures::new(workload.parallel, &run, &dag, &joins);
         figures.emit();
         all.push(figures);
     }
@@ -60,7 +60,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     }
     machine.report_memory();
     all.iter()
-        .find_map(Figures::complaint)
+        .find_map(RunFigures::complaint)
         .map_or(Ok(()), |text| Err(AppError::Failure(text)))
 }
 
@@ -91,14 +91,16 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, AppError> {
 }
 
 /// Reads how the parallel subtasks spend their execution times.
-fn work(options: &CommandLine<'_>) -> Result<Work, UsageError> {
+fn work(options: &CommandLine<'_>) -> Result<ExecutionWork, UsageError> {
     let computes = options.choice("work", &[("simulate", false), ("compute", true)])?;
     let occupations = [("hold", Occupation::Hold), ("spin", Occupation::Spin)];
     if !computes {
-        return options.choice("occupy", &occupations).map(Work::Simulate);
+        return options
+            .choice("occupy", &occupations)
+            .map(ExecutionWork::Simulate);
     }
     match options.text("occupy") {
-        None => Ok(Work::Compute(Pace::measure())),
+        None => Ok(ExecutionWork::Compute(CorePace::measure())),
         Some(_) => Err(UsageError::new(
             "`occupy` says how execution is simulated, and `work=compute` simulates none; leave \
              one of them out",

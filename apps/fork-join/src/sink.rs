@@ -40,15 +40,15 @@ macro_rules! each_arity {
 
 /// How many joins the sink has seen.
 #[derive(Clone, Debug, Default)]
-pub struct Joins(Arc<Counts>);
+pub struct JoinCount(Arc<SinkCounts>);
 
 #[derive(Debug, Default)]
-struct Counts {
+struct SinkCounts {
     total: AtomicU64,
     mixed: AtomicU64,
 }
 
-impl Joins {
+impl JoinCount {
     /// Returns the number of joins.
     pub fn total(&self) -> u64 {
         self.0.total.load(Ordering::Relaxed)
@@ -68,7 +68,7 @@ impl Joins {
     }
 }
 
-pub(crate) fn register(dag: &Dag, parallel: usize, joins: &Joins) {
+pub(crate) fn register(dag: &Dag, parallel: usize, joins: &JoinCount) {
     let names: Vec<String> = (0..parallel)
         .map(|branch| format!("part-{branch}"))
         .collect();

@@ -24,11 +24,11 @@ type Take = fn(&Sample) -> &Sensor;
 /// # Errors
 ///
 /// The recording has no samples of ours.
-pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
+pub fn build(recording: &Recording<'static>) -> Result<(Dag, WalkOrientations), Mismatch> {
     let mut samples = recording.values::<Sample>(DAG, TOPIC)?;
     let jobs = samples.clone().last().map_or(0, |(job, _)| job + 1);
     let count = samples.clone().count();
-    let walk = Walk::new(count);
+    let walk = WalkOrientations::new(count);
     let dag = create_dag();
     dag.name(DAG).jobs(jobs).demand_proof();
     (dag.record::<Sample>(TOPIC))
@@ -73,9 +73,9 @@ const OF_A_ROW: usize = 12;
 
 /// The orientations after each sample. The DAG only writes them, so that they order nothing.
 #[derive(Clone, Debug)]
-pub struct Walk(Arc<[AtomicU64]>);
+pub struct WalkOrientations(Arc<[AtomicU64]>);
 
-impl Walk {
+impl WalkOrientations {
     /// Makes room for the rows of so many samples.
     pub fn new(samples: usize) -> Self {
         Self((0..samples * OF_A_ROW).map(|_| AtomicU64::new(0)).collect())

@@ -22,7 +22,7 @@ pub mod filter;
 
 use core::time::Duration;
 
-pub use dag::{Walk, build};
+pub use dag::{WalkOrientations, build};
 
 /// The time between two samples: 120 in a second.
 pub const PERIOD: Duration = Duration::from_nanos(8_333_333);

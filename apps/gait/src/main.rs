@@ -10,7 +10,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use fass::finish_create_dags;
-use gait::{DAG, Walk, build};
+use gait::{DAG, WalkOrientations, build};
 use kernel::options::UsageError;
 use kernel::report::Ns;
 use kernel::{AppError, Machine, Run, json, println};
@@ -41,7 +41,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     report(&run, &walk)
 }
 
-fn report(run: &Run, walk: &Walk) -> Result<(), AppError> {
+fn report(run: &Run, walk: &WalkOrientations) -> Result<(), AppError> {
     let counts = run.statistics(DAG);
     println!();
     println!(

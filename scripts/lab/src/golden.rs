@@ -20,7 +20,7 @@ pub const BLESSED: &str = "TOOL_BLESSED";
 
 /// A text that is kept in a file.
 #[derive(Clone, Copy, Debug)]
-pub struct Golden<'t> {
+pub struct GoldenText<'t> {
     /// The file, from the workspace's root.
     pub file: &'t str,
     /// The nearest text above the golden that occurs once in the file, such as a heading.
@@ -37,13 +37,13 @@ pub struct Golden<'t> {
 #[track_caller]
 pub fn assert_is(file: &str, below: &str, text: &str, said: &str) {
     let list = env::var_os(BLESSED);
-    let golden = Golden { file, below, text };
+    let golden = GoldenText { file, below, text };
     if let Err(why) = golden.compare(said, list.as_deref().map(Path::new)) {
         panic!("{why}");
     }
 }
 
-impl Golden<'_> {
+impl GoldenText<'_> {
     /// Compares the golden with the present output of a program; rewrites it if there is a `list`
     /// of rewritten files.
     ///
@@ -51,7 +51,7 @@ impl Golden<'_> {
     ///
     /// In words: they differ, and the golden was not rewritten.
     pub fn compare(&self, said: &str, list: Option<&Path>) -> Result<(), String> {
-        let Golden { file, below, text } = self;
+        let GoldenText { file, below, text } = self;
         if *text == said {
             return Ok(());
         }
@@ -100,7 +100,7 @@ mod tests {
         fs::write(&page, before).unwrap();
         let is_now = |text: &str| assert_eq!(fs::read_to_string(&page).unwrap(), text);
         let file = page.to_str().unwrap();
-        let golden = |below, text| Golden { file, below, text };
+        let golden = |below, text| GoldenText { file, below, text };
         let of_b = golden("# b", "said\n");
 
         assert_eq!(of_b.compare("said\n", None), Ok(()));

@@ -21,10 +21,10 @@ pub mod oracle;
 pub mod soak;
 pub mod test;
 
-use tool::options::{Menu, choices};
+use tool::options::{WordMenu, choices};
 
 /// The subcommands.
-pub static LAB: Menu = Menu {
+pub static LAB: WordMenu = WordMenu {
     invocation: "fass-lab",
     word: "SUBCOMMAND",
     about: "Measures, judges and tests the project itself.",

@@ -34,7 +34,7 @@ pub struct Child {
 
 /// The reason why the wait for a child ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Waited {
+pub enum WaitEnd {
     /// It ended by itself.
     Ended(ExitStatus),
     /// Its time was over, and it was killed.
@@ -46,11 +46,11 @@ pub enum Waited {
 }
 
 /// The end of a child that was followed.
-pub struct Followed {
+pub struct ChildEnd {
     /// Why the wait ended.
-    pub waited: Waited,
+    pub waited: WaitEnd,
     /// The reason why it was asked to end early, if it was.
-    pub asked: Option<Asked>,
+    pub asked: Option<EndReason>,
     /// Its whole output; bytes that are no UTF-8 are replaced.
     pub text: String,
 }
@@ -69,21 +69,21 @@ impl Child {
 
     /// Waits for the end, for at most `limit` since the start. `watch` is called at each look; when
     /// it returns `false`, the child is killed.
-    pub fn wait(&mut self, limit: Duration, mut watch: impl FnMut() -> bool) -> Waited {
+    pub fn wait(&mut self, limit: Duration, mut watch: impl FnMut() -> bool) -> WaitEnd {
         loop {
             match self.process.try_wait() {
-                Ok(Some(status)) => return Waited::Ended(status),
+                Ok(Some(status)) => return WaitEnd::Ended(status),
                 Ok(None) => {}
                 // It is no longer a child of ours, so there is nothing left to kill.
-                Err(_) => return Waited::GivenUp,
+                Err(_) => return WaitEnd::GivenUp,
             }
             if self.started.elapsed() >= limit {
                 self.kill();
-                return Waited::TimedOut;
+                return WaitEnd::TimedOut;
             }
             if !watch() {
                 self.kill();
-                return Waited::GivenUp;
+                return WaitEnd::GivenUp;
             }
             thread::sleep(PAUSE);
         }
@@ -102,13 +102,13 @@ impl Child {
         limit: Duration,
         log: &Path,
         show: &mut dyn FnMut(&str),
-        mut stop: Option<&mut dyn FnMut(Asked)>,
+        mut stop: Option<&mut dyn FnMut(EndReason)>,
         mut sent: impl FnMut(u64) -> Option<u64>,
-    ) -> Result<Followed, String> {
-        let (mut tail, mut asking) = (Tail::new(log), Asking::new(limit));
+    ) -> Result<ChildEnd, String> {
+        let (mut tail, mut asking) = (FollowedFile::new(log), ChildWatch::new(limit));
         let signals = stop.as_ref().map(|_| EndSignals::catch());
-        let (started, mut killed) = (self.started, Waited::GivenUp);
-        // A child that can be asked to end outlives its limit; `Asking` decides when it is killed.
+        let (started, mut killed) = (self.started, WaitEnd::GivenUp);
+        // A child that can be asked to end outlives its limit; `ChildWatch` decides when it is killed.
         let of_wait = signals.as_ref().map_or(limit, |_| Duration::MAX);
         let waited = self.wait(of_wait, || {
             // The log may not exist yet, and an error that lasts shows in `finish` below.
@@ -127,21 +127,21 @@ impl Child {
             ) {
                 Step::Wait => return true,
                 Step::Ask(why) => {
-                    if why == Asked::ByPerson {
+                    if why == EndReason::ByPerson {
                         eprintln!("ending in order; ctrl-C again ends it at once");
                     }
                     ask(why);
                     return true;
                 }
-                Step::Kill => killed = Waited::Killed,
-                Step::TimeOut => killed = Waited::TimedOut,
+                Step::Kill => killed = WaitEnd::Killed,
+                Step::TimeOut => killed = WaitEnd::TimedOut,
             }
             false
         });
         let text = tail.finish(show);
-        Ok(Followed {
+        Ok(ChildEnd {
             // `wait` knows only that the watcher gave up; `killed` says why it did.
-            waited: if waited == Waited::GivenUp {
+            waited: if waited == WaitEnd::GivenUp {
                 killed
             } else {
                 waited
@@ -209,7 +209,7 @@ const GRACE: Duration = Duration::from_secs(10);
 
 /// The reason why a child was asked to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Asked {
+pub enum EndReason {
     /// A person pressed ctrl-C, or this program was asked to end.
     ByPerson,
     /// It took longer than this limit.
@@ -222,7 +222,7 @@ enum Step {
     /// Look again.
     Wait,
     /// Ask the child to end.
-    Ask(Asked),
+    Ask(EndReason),
     /// Kill it, as a person wants.
     Kill,
     /// Kill it, since its time is over.
@@ -231,26 +231,26 @@ enum Step {
 
 /// The state of a child as seen so far.
 #[derive(Default)]
-struct Asking {
+struct ChildWatch {
     limit: Duration,
     /// The reason, and the number of signals at that time.
-    why: Option<(Asked, u32)>,
+    why: Option<(EndReason, u32)>,
     is_asked: bool,
     printed_bytes: u64,
     quiet_since: Duration,
 }
 
-impl Asking {
+impl ChildWatch {
     /// Makes the state at the child's start.
-    fn new(limit: Duration) -> Asking {
-        Asking {
+    fn new(limit: Duration) -> ChildWatch {
+        ChildWatch {
             limit,
-            ..Asking::default()
+            ..ChildWatch::default()
         }
     }
 
     /// Returns the reason why the child was asked to end, if it was.
-    fn why(&self) -> Option<Asked> {
+    fn why(&self) -> Option<EndReason> {
         self.why.map(|(why, _)| why)
     }
 
@@ -265,8 +265,8 @@ impl Asking {
             // Only signals after the request count: those that came with the first one are one
             // wish.
             Some((_, before)) if signals > before => return Step::Kill,
-            None if signals > 0 => self.why = Some((Asked::ByPerson, signals)),
-            None if is_over => self.why = Some((Asked::ByLimit(self.limit), signals)),
+            None if signals > 0 => self.why = Some((EndReason::ByPerson, signals)),
+            None if is_over => self.why = Some((EndReason::ByLimit(self.limit), signals)),
             _ => {}
         }
         match self.why {
@@ -284,17 +284,17 @@ impl Asking {
 }
 
 /// A file that is being followed.
-struct Tail<'p> {
+struct FollowedFile<'p> {
     path: &'p Path,
     /// The bytes that were read; `shown` of them have been shown.
     read: Vec<u8>,
     shown: usize,
 }
 
-impl Tail<'_> {
+impl FollowedFile<'_> {
     /// Makes a reader at the start of the file, which need not exist yet.
-    fn new(path: &Path) -> Tail<'_> {
-        Tail {
+    fn new(path: &Path) -> FollowedFile<'_> {
+        FollowedFile {
             path,
             read: Vec::new(),
             shown: 0,
@@ -339,7 +339,7 @@ mod tests {
     use super::*;
     use std::io::Write;
 
-    fn wait(words: &[&str], limit: Duration, watch: impl FnMut() -> bool) -> Waited {
+    fn wait(words: &[&str], limit: Duration, watch: impl FnMut() -> bool) -> WaitEnd {
         let mut command = bound_to_us(Path::new(words[0]));
         let mut child = Child::start(command.args(&words[1..])).expect(words[0]);
         child.wait(limit, watch)
@@ -349,17 +349,20 @@ mod tests {
     fn a_child_ends_is_killed_or_is_given_up() {
         let long = Duration::from_secs(60);
         let ended = wait(&["sh", "-c", "exit 7"], long, || true);
-        assert!(matches!(ended, Waited::Ended(status) if status.code() == Some(7)));
+        assert!(matches!(ended, WaitEnd::Ended(status) if status.code() == Some(7)));
         let short = Duration::from_millis(50);
-        assert_eq!(wait(&["sleep", "60"], short, || true), Waited::TimedOut);
-        assert_eq!(wait(&["sleep", "60"], long, || false), Waited::GivenUp);
+        assert_eq!(wait(&["sleep", "60"], short, || true), WaitEnd::TimedOut);
+        assert_eq!(wait(&["sleep", "60"], long, || false), WaitEnd::GivenUp);
     }
 
     const LIMIT: Duration = Duration::from_secs(60);
 
     #[test]
     fn the_first_signal_or_the_limit_asks_and_the_second_or_silence_kills() {
-        let (person, limit) = (Step::Ask(Asked::ByPerson), Step::Ask(Asked::ByLimit(LIMIT)));
+        let (person, limit) = (
+            Step::Ask(EndReason::ByPerson),
+            Step::Ask(EndReason::ByLimit(LIMIT)),
+        );
         // Looks: seconds, signals, bytes. Of the steps, those that do not wait.
         for (looks, expected) in [
             (
@@ -383,7 +386,7 @@ mod tests {
             (&[(60, 0, 9), (61, 1, 9)], &[(60, limit), (61, Step::Kill)]),
             (&[(60, 0, 0)], &[(60, Step::TimeOut)]),
         ] {
-            let mut asking = Asking::new(LIMIT);
+            let mut asking = ChildWatch::new(LIMIT);
             let steps = looks.iter().map(|&(seconds, signals, bytes)| {
                 let elapsed = Duration::from_secs(seconds);
                 (seconds, asking.step(elapsed, signals, bytes))
@@ -396,7 +399,7 @@ mod tests {
     #[test]
     fn a_line_is_shown_once_and_only_when_it_is_whole() {
         let path = crate::system::new_log("tail").unwrap();
-        let mut tail = Tail::new(&path);
+        let mut tail = FollowedFile::new(&path);
         let mut shown: Vec<String> = Vec::new();
         let mut show = |line: &str| shown.push(line.to_string());
         assert!(tail.follow(&mut show).is_err(), "it is not there yet");

@@ -27,17 +27,17 @@ const MOST_TEXT_BYTES: usize = 64 << 20;
 
 /// A file of a command line.
 #[derive(Clone, Copy, Debug)]
-pub struct Named<'n> {
+pub struct NamedFile<'n> {
     /// The option that names it, without its dashes; empty: it is a positional word.
     pub option: &'n str,
     /// Its name.
     pub path: &'n Path,
 }
 
-impl Named<'_> {
+impl NamedFile<'_> {
     /// Returns the words that name it, for a message.
     fn words(&self) -> String {
-        let Named { option, path } = self;
+        let NamedFile { option, path } = self;
         let place = shown_path(path);
         match option.is_empty() {
             true => format!("`{place}`"),
@@ -97,7 +97,7 @@ pub fn read_at(path: &Path) -> Result<Vec<u8>, String> {
 /// # Errors
 ///
 /// In words, with the option and the file.
-pub(crate) fn read_named(named: &Named<'_>) -> Result<Vec<u8>, String> {
+pub(crate) fn read_named(named: &NamedFile<'_>) -> Result<Vec<u8>, String> {
     read(named.path).map_err(|why| format!("{} {why}; name another file", named.words()))
 }
 
@@ -111,7 +111,7 @@ pub(crate) fn write_named(
     path: &Path,
     content: impl AsRef<[u8]>,
 ) -> Result<(), String> {
-    let named = Named { option, path };
+    let named = NamedFile { option, path };
     let written = fs::write(path, content);
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
 }
@@ -196,7 +196,7 @@ pub fn read_text(path: &Path) -> Result<String, String> {
 /// # Errors
 ///
 /// In words, with the offender: the two names of one file, or the output that cannot be written.
-pub fn check(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), String> {
+pub fn check(inputs: &[NamedFile<'_>], outputs: &[NamedFile<'_>]) -> Result<(), String> {
     for (position, output) in outputs.iter().enumerate() {
         let before = inputs.iter().chain(&outputs[..position]);
         let own = identity(output.path);
@@ -221,7 +221,7 @@ pub fn check(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), String> 
 ///
 /// In words, which two are one file.
 pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), String> {
-    let mut before: Vec<(&Path, Identity)> = Vec::new();
+    let mut before: Vec<(&Path, FileIdentity)> = Vec::new();
     for path in inputs {
         // A file in a folder that is not there is refused when it is read.
         let Some(own) = identity(path) else {
@@ -238,20 +238,20 @@ pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), Stri
 
 /// The identity of a file, equal for all its names.
 #[derive(PartialEq, Eq)]
-enum Identity {
+enum FileIdentity {
     /// It exists: its device and its inode.
     There(u64, u64),
     /// It does not exist yet: its folder and its name there.
     ToCome(PathBuf),
 }
 
-fn identity(path: &Path) -> Option<Identity> {
+fn identity(path: &Path) -> Option<FileIdentity> {
     if let Ok(data) = fs::metadata(path) {
-        return Some(Identity::There(data.dev(), data.ino()));
+        return Some(FileIdentity::There(data.dev(), data.ino()));
     }
     // The folder's canonical path resolves links and `..`, so two spellings compare equal.
     let folder = folder_of(path).canonicalize().ok()?;
-    Some(Identity::ToCome(folder.join(path.file_name()?)))
+    Some(FileIdentity::ToCome(folder.join(path.file_name()?)))
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -262,7 +262,7 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// Makes sure that an output can be written.
-fn try_output(output: &Named<'_>) -> Result<(), String> {
+fn try_output(output: &NamedFile<'_>) -> Result<(), String> {
     let path = output.path;
     let there = fs::metadata(path).ok();
     let cannot = |why: &dyn Display| {
@@ -290,7 +290,7 @@ fn try_output(output: &Named<'_>) -> Result<(), String> {
 /// # Errors
 ///
 /// In words, with the offender.
-pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
+pub fn check_folder(output: &NamedFile<'_>) -> Result<(), String> {
     let there = output.path.ancestors().find_map(|folder| {
         let folder = match folder.as_os_str().is_empty() {
             true => Path::new("."),
@@ -304,7 +304,7 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
             static TRIALS: AtomicU64 = AtomicU64::new(0);
             let (process, trial) = (std::process::id(), TRIALS.fetch_add(1, Ordering::Relaxed));
             let probe = folder.join(format!(".trial-{process}-{trial}"));
-            let trial = Named {
+            let trial = NamedFile {
                 path: &probe,
                 ..*output
             };
@@ -321,16 +321,16 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
 
 /// A file of ours, removed when this value is dropped.
 #[derive(Debug)]
-pub(crate) struct Temporary(pub(crate) Option<PathBuf>);
+pub(crate) struct TemporaryFile(pub(crate) Option<PathBuf>);
 
-impl Temporary {
+impl TemporaryFile {
     /// Returns its path; empty if there is no file.
     pub(crate) fn path(&self) -> &Path {
         self.0.as_deref().unwrap_or(Path::new(""))
     }
 }
 
-impl Drop for Temporary {
+impl Drop for TemporaryFile {
     fn drop(&mut self) {
         // The file is ours; one that cannot be removed harms nothing.
         let _ = self.0.take().map(fs::remove_file);
@@ -348,8 +348,8 @@ mod tests {
         folder
     }
 
-    fn named<'n>(option: &'n str, path: &'n Path) -> Named<'n> {
-        Named { option, path }
+    fn named<'n>(option: &'n str, path: &'n Path) -> NamedFile<'n> {
+        NamedFile { option, path }
     }
 
     /// `tests/it/files.rs` has the commands that refuse such names.

@@ -16,7 +16,7 @@ use crate::elf;
 use crate::files;
 use crate::install::WASM_TARGET;
 use crate::options::did_you_mean;
-use crate::progress::Lasting;
+use crate::progress::ProgressNote;
 use crate::system;
 use views::json::Value;
 
@@ -200,7 +200,7 @@ pub fn build_target(
     command.arg("--message-format=json-render-diagnostics");
     command.args(flags);
     say_if_cargo_waits(profile);
-    let _lasting = Lasting::new(&format!("building `{package}`"));
+    let _lasting = ProgressNote::new(&format!("building `{package}`"));
     let (messages, ended) = system::messages_of(&mut command);
     ended.map_err(|why| failed(&why))?;
     let mut paths = messages.iter().filter_map(|it| executable(it, name));

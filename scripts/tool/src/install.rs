@@ -14,7 +14,7 @@ use crate::qemu::{Loader, OVMF_FILE, PROGRAM};
 use crate::system::{self, find_program};
 
 /// Something of the host's that a command needs.
-pub struct Need {
+pub struct HostNeed {
     /// Its name, and a description for messages.
     name: &'static str,
     what: &'static str,
@@ -25,7 +25,7 @@ pub struct Need {
 }
 
 /// The emulator that everything boots in, with the firmware that it brings.
-pub static QEMU: Need = Need {
+pub static QEMU: HostNeed = HostNeed {
     name: "QEMU",
     what: "QEMU's system emulator for x86_64",
     parts: &[PROGRAM],
@@ -33,7 +33,7 @@ pub static QEMU: Need = Need {
 };
 
 /// The debugger.
-pub static GDB: Need = Need {
+pub static GDB: HostNeed = HostNeed {
     name: "gdb",
     what: "GNU's debugger",
     parts: &["gdb"],
@@ -41,7 +41,7 @@ pub static GDB: Need = Need {
 };
 
 /// The programs that make an ISO, for BIOS and for UEFI.
-pub static GRUB: Need = Need {
+pub static GRUB: HostNeed = HostNeed {
     name: "GRUB",
     what: "GRUB for BIOS and for UEFI, xorriso and mtools",
     parts: &[
@@ -55,7 +55,7 @@ pub static GRUB: Need = Need {
 };
 
 /// UEFI for QEMU.
-pub static OVMF: Need = Need {
+pub static OVMF: HostNeed = HostNeed {
     name: "OVMF",
     what: "the firmware that gives QEMU's machines UEFI",
     parts: &[OVMF_FILE],
@@ -63,7 +63,7 @@ pub static OVMF: Need = Need {
 };
 
 /// The emulator that imitates a PC the most strictly.
-pub static BOCHS: Need = Need {
+pub static BOCHS: HostNeed = HostNeed {
     name: "Bochs",
     what: "the emulator Bochs with its firmware and SDL's display",
     parts: &[
@@ -75,7 +75,7 @@ pub static BOCHS: Need = Need {
 };
 
 /// The program that counts instructions on Linux.
-pub static VALGRIND: Need = Need {
+pub static VALGRIND: HostNeed = HostNeed {
     name: "Valgrind",
     what: "a program that counts the instructions of others",
     parts: &["valgrind"],
@@ -83,7 +83,7 @@ pub static VALGRIND: Need = Need {
 };
 
 /// The runtime in which tests run the page's engine without a browser.
-pub static NODE: Need = Need {
+pub static NODE: HostNeed = HostNeed {
     name: "Node.js",
     what: "a runtime of JavaScript and WebAssembly",
     parts: &["node"],
@@ -91,7 +91,7 @@ pub static NODE: Need = Need {
 };
 
 /// The prover that checks the proofs of bounds, and the compiler of the checker that it extracts.
-pub static COQ: Need = Need {
+pub static COQ: HostNeed = HostNeed {
     name: "Coq",
     what: "a prover, with OCaml",
     parts: &["coqc", "ocamlopt"],
@@ -99,7 +99,7 @@ pub static COQ: Need = Need {
 };
 
 /// A browser, in which tests open the page. It is large, so it is not installed for them.
-pub static CHROMIUM: Need = Need {
+pub static CHROMIUM: HostNeed = HostNeed {
     name: "Chromium",
     what: "a browser",
     parts: &["chromium"],
@@ -107,7 +107,7 @@ pub static CHROMIUM: Need = Need {
 };
 
 /// The reader of YAML for `scripts/convert`, which Debian's Python finds here.
-static YAML: Need = Need {
+static YAML: HostNeed = HostNeed {
     name: "PyYAML",
     what: "Python's reader of YAML",
     parts: &["python3", "/usr/lib/python3/dist-packages/yaml"],
@@ -148,7 +148,7 @@ pub fn ensure_loader(loader: Loader) -> Result<(), String> {
 /// # Errors
 ///
 /// In words: the system is not known, or the installation failed, with the remedy by hand.
-pub fn ensure(need: &Need) -> Result<(), String> {
+pub fn ensure(need: &HostNeed) -> Result<(), String> {
     let Some(part) = missing(need) else {
         return Ok(());
     };
@@ -239,7 +239,7 @@ pub fn python() -> Result<PathBuf, String> {
 }
 
 /// Returns the first part that is missing.
-fn missing(need: &Need) -> Option<&'static str> {
+fn missing(need: &HostNeed) -> Option<&'static str> {
     let is_there = |part: &&str| match part.starts_with('/') {
         true => Path::new(part).exists(),
         false => find_program(part).is_some(),
@@ -250,12 +250,12 @@ fn missing(need: &Need) -> Option<&'static str> {
 /// Returns the beginnings of the commands that update the list of packages and that install some,
 /// from the programs that exist and whether we are root.
 fn plan(
-    need: &Need,
+    need: &HostNeed,
     part: &str,
     exists: impl Fn(&str) -> bool,
     root: bool,
 ) -> Result<[String; 2], String> {
-    let Need {
+    let HostNeed {
         name,
         what,
         packages,
@@ -307,9 +307,9 @@ fn is_root() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{GRUB, Need, QEMU, plan};
+    use super::{GRUB, HostNeed, QEMU, plan};
 
-    fn lines(need: &Need, programs: &[&str], root: bool) -> Result<String, String> {
+    fn lines(need: &HostNeed, programs: &[&str], root: bool) -> Result<String, String> {
         let exists = |name: &str| programs.contains(&name);
         plan(need, need.parts[0], exists, root).map(|lines| lines.join("; "))
     }

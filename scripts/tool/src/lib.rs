@@ -58,10 +58,10 @@ pub mod wire_script;
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
 
-use options::Menu;
+use options::WordMenu;
 
 /// The subcommands.
-pub static TOOL: Menu = Menu {
+pub static TOOL: WordMenu = WordMenu {
     invocation: "fass-tool",
     word: "SUBCOMMAND",
     about: "Does what the scripts in scripts/ are there for.",

@@ -3,7 +3,7 @@
 //! A medium is an ISO, for a stick or a disc. It holds the loaded part of the app's image, a file
 //! to leave in memory if there is one, GRUB for BIOS and for UEFI, and the commands by which GRUB
 //! boots the image with its words. `grub-mkrescue` makes it, with the few modules of GRUB that this
-//! takes. A [`Medium`] is a stick for one boot: a file that QEMU shows as one, and that is removed
+//! takes. A [`StickImage`] is a stick for one boot: a file that QEMU shows as one, and that is removed
 //! afterwards. Everything is checked before anything is built.
 //!
 //! Exit codes: 0 the file is there, 1 it could not be made, 2 a refused command line.
@@ -14,10 +14,10 @@ use std::path::Path;
 use std::process::{self, ExitCode};
 
 use crate::elf;
-use crate::files::{self, Temporary};
+use crate::files::{self, TemporaryFile};
 use crate::image;
 use crate::install;
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 use crate::qemu::Qemu;
 use crate::system;
 
@@ -26,7 +26,7 @@ pub static TABLE: Command = Command {
     invocation: "./scripts/image",
     about: "Makes a file that boots an app on a PC: to be written to a stick, or to a disc.",
     positional: Some((
-        Takes::Text("WORD..."),
+        OptionValue::Text("WORD..."),
         "Words for the app and the kernel, such as `jobs=20`.",
     )),
     options: OPTIONS,
@@ -43,13 +43,13 @@ exit codes: 0 the file is there; 1 it could not be made; 2 a refused command lin
 
 options! {
     /// The app: a package under apps/.
-    APP: Takes::Text("NAME"), or "fork-join";
+    APP: OptionValue::Text("NAME"), or "fork-join";
     /// The ISO to be made.
-    ISO: Takes::File("FILE");
+    ISO: OptionValue::File("FILE");
     /// A file that the app finds in memory, as dag-file does its DAGs.
-    MODULE: Takes::File("MODULE");
+    MODULE: OptionValue::File("MODULE");
     /// Take this image; build nothing.
-    IMAGE: Takes::File("IMAGE");
+    IMAGE: OptionValue::File("IMAGE");
 }
 
 /// Runs the subcommand with the words after its name.
@@ -62,7 +62,7 @@ pub fn image(words: &[OsString]) -> ExitCode {
 }
 
 /// Checks everything that can be refused, and returns the words for the guest.
-fn check(options: &Parsed) -> Result<String, String> {
+fn check(options: &Arguments) -> Result<String, String> {
     let outputs = options.named(&[name::ISO]);
     if outputs.is_empty() {
         return Err("which file? give --iso FILE".into());
@@ -93,12 +93,12 @@ fn check(options: &Parsed) -> Result<String, String> {
 }
 
 /// Makes the ISO, and returns a line about it.
-fn make(options: &Parsed, words: &str) -> Result<String, String> {
+fn make(options: &Arguments, words: &str) -> Result<String, String> {
     let image = match options.path(name::IMAGE) {
         Some(path) => path.into(),
         None => image::build(options.text(name::APP).unwrap_or_default())?,
     };
-    let made = Medium::new(&image, words, options.path(name::MODULE))?;
+    let made = StickImage::new(&image, words, options.path(name::MODULE))?;
     let path = options.path(name::ISO).unwrap_or(Path::new(""));
     let place = files::shown_path(path);
     let bytes = fs::copy(made.path(), path)
@@ -111,9 +111,9 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
 }
 
 /// The content of a stick; the file is removed when this value is dropped.
-pub struct Medium(Temporary);
+pub struct StickImage(TemporaryFile);
 
-impl Medium {
+impl StickImage {
     /// Makes the medium from which GRUB boots `image`, with `words`, and with `module` left in
     /// memory.
     ///
@@ -121,12 +121,12 @@ impl Medium {
     ///
     /// In words: a file cannot be read, the image is no ELF file, the words are refused, something
     /// is missing, `grub-mkrescue` failed, or there is no room.
-    pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<Medium, String> {
+    pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<StickImage, String> {
         let loaded = elf::loaded(files::read_at(image)?);
         let loaded = loaded.map_err(|why| format!("`{}`: {why}", files::shown_path(image)))?;
         let module = module.map(files::read_at).transpose()?;
         let log = system::new_log("stick")?;
-        let medium = Medium(Temporary(Some(log.with_extension("iso"))));
+        let medium = StickImage(TemporaryFile(Some(log.with_extension("iso"))));
         write_iso(medium.path(), &loaded, words, module.as_deref())?;
         Ok(medium)
     }

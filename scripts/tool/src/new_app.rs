@@ -25,7 +25,7 @@ use text::quoted;
 
 use crate::files;
 use crate::image::package_name;
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 use crate::system::{self, files_below};
 
 /// The table of `new-app`.
@@ -36,7 +36,7 @@ Makes an app of your own, in a repository of its own or under apps/: a library w
 functions and their DAG, a program that boots it, and a test that runs it on the host in
 virtual time.",
     positional: Some((
-        Takes::Text("NAME"),
+        OptionValue::Text("NAME"),
         "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
     )),
     options: OPTIONS,
@@ -52,10 +52,10 @@ command line
 
 options! {
     /// Make the app in this new folder, which is the root of a repository.
-    OUT: Takes::File("DIR");
+    OUT: OptionValue::File("DIR");
     /// --out: take the crates from this git repository, not from the folder of these commands.
     /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
-    GIT: Takes::Text("URL");
+    GIT: OptionValue::Text("URL");
 }
 
 /// The template's name, as a package and as a crate.
@@ -99,7 +99,7 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
 }
 
 /// Makes the app, and returns the next steps for the person.
-fn make(options: &Parsed) -> Result<String, Refusal> {
+fn make(options: &Arguments) -> Result<String, Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     let Some(name) = options.positional() else {
         return usage("which name? give one, such as `./scripts/new-app brake-assist`");

@@ -12,10 +12,10 @@ use std::process::{Command as Program, ExitCode};
 use fass_dag_file::parse;
 use views::json::Object;
 
-use crate::files::{self, Named};
+use crate::files::{self, NamedFile};
 use crate::image::{self, PAGE_PROFILE};
 use crate::install;
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 use crate::system;
 use crate::trace;
 
@@ -24,7 +24,7 @@ pub static PAGE: Command = Command {
     invocation: "./scripts/page",
     about: "Makes a page of one file that plays DAG files, and shows runs, in any browser.",
     positional: Some((
-        Takes::File("FILE..."),
+        OptionValue::File("FILE..."),
         "DAG files to begin with; or records of runs, by ./scripts/run --keep or --trace, to show.",
     )),
     options: OPTIONS,
@@ -33,7 +33,7 @@ pub static PAGE: Command = Command {
 
 options! {
     /// Write to this file.
-    OUT 'o': Takes::File("FILE"), or "page.html";
+    OUT 'o': OptionValue::File("FILE"), or "page.html";
 }
 
 /// Runs the subcommand with the words after its name.
@@ -50,17 +50,17 @@ pub fn page(words: &[OsString]) -> ExitCode {
 
 /// Files in a page, as the elements of two lists in JavaScript, with a comma behind each.
 #[derive(Default)]
-pub(crate) struct Content {
+pub(crate) struct PageFiles {
     examples: String,
     records: String,
 }
 
 /// Reads the files that the options name.
-fn read(options: &Parsed) -> Result<Content, String> {
-    let inputs = options.files().map(|path| Named { option: "", path });
+fn read(options: &Arguments) -> Result<PageFiles, String> {
+    let inputs = options.files().map(|path| NamedFile { option: "", path });
     files::check_once(options.files())?;
     files::check(&inputs.collect::<Vec<_>>(), &options.named(&[name::OUT]))?;
-    let mut content = Content::default();
+    let mut content = PageFiles::default();
     for path in options.files() {
         let place = files::shown_path(path);
         if path.extension().is_some_and(|ending| ending == "dag") {
@@ -84,7 +84,7 @@ fn read(options: &Parsed) -> Result<Content, String> {
 /// # Errors
 ///
 /// In words: the sources are not there, or the engine cannot be built.
-pub(crate) fn html(content: &Content, is_live: bool) -> Result<String, String> {
+pub(crate) fn html(content: &PageFiles, is_live: bool) -> Result<String, String> {
     let web = system::workspace().join("scripts/web");
     if !web.is_dir() {
         let why = "are not there; clone the project, and call its ./scripts/page";
@@ -102,7 +102,7 @@ pub(crate) fn html(content: &Content, is_live: bool) -> Result<String, String> {
 }
 
 /// Puts all into one file.
-fn assembled(engine: &str, content: &Content, is_live: bool) -> Result<String, String> {
+fn assembled(engine: &str, content: &PageFiles, is_live: bool) -> Result<String, String> {
     let read = |name: &str| files::read_text(&system::workspace().join(name));
     let source = |name: &str| read(&format!("scripts/web/{name}"));
     let page = source("page.html")?;
@@ -110,7 +110,7 @@ fn assembled(engine: &str, content: &Content, is_live: bool) -> Result<String, S
     let listed = listed.and_then(|(before, rest)| Some((before, rest.split_once(" -->")?)));
     let (before, (scripts, after)) = listed.ok_or("page.html lists no scripts")?;
     let scripts: Vec<String> = scripts.split(' ').map(source).collect::<Result<_, _>>()?;
-    let Content { examples, records } = content;
+    let PageFiles { examples, records } = content;
     let mut all = examples.clone();
     for line in source("examples.txt")?.lines() {
         let (path, words) = line.split_once(' ').unwrap_or((line, ""));
@@ -151,7 +151,7 @@ mod tests {
         let (name, text) = (format!("{words}.dag"), format!("# {words}\n"));
         let examples = example(Path::new(&name), &text, "cores=4 policy=edf");
         let records = Object::new().text("name", words).into_text();
-        let html = assembled("Zm9v", &Content { examples, records }, false).unwrap();
+        let html = assembled("Zm9v", &PageFiles { examples, records }, false).unwrap();
         let (page, script) = html.split_once("<script ").unwrap();
         assert!(!page.contains("/*STYLE*/") && page.contains("</style>"));
         let (script, after) = script.split_once("</script").unwrap();

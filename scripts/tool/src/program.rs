@@ -12,9 +12,9 @@ use std::time::Duration;
 
 use end_signals::EndSignals;
 
-use crate::child::{Asked, Child, Waited, bound_to_us};
+use crate::child::{Child, EndReason, WaitEnd, bound_to_us};
 use crate::outcome::Outcome;
-use crate::qemu::Ending;
+use crate::qemu::QemuEnd;
 use crate::system;
 use views::protocol::{Status, Transcript};
 
@@ -81,22 +81,22 @@ pub fn run_for(
     let process = child.id();
     let mut ask = |why| {
         // In our process group ctrl-C has reached it already; a second signal would end it at once.
-        if is_apart || why != Asked::ByPerson {
+        if is_apart || why != EndReason::ByPerson {
             EndSignals::send(process);
         }
     };
     // Without `stop` the limit kills the program at once, and ctrl-C is not caught.
-    let stop: Option<&mut dyn FnMut(Asked)> = if stops { Some(&mut ask) } else { None };
+    let stop: Option<&mut dyn FnMut(EndReason)> = if stops { Some(&mut ask) } else { None };
     let followed = child.follow(limit, log, show, stop, |_| Some(0))?;
     let mut outcome = Outcome {
         asked: followed.asked,
         elapsed: child.elapsed(),
-        ..Outcome::of(Ending::Killed, followed.text, log, program)
+        ..Outcome::of(QemuEnd::Killed, followed.text, log, program)
     };
     outcome.ending = match followed.waited {
-        Waited::Ended(status) => ending_of(status, code(&status), &outcome.transcript),
-        Waited::Killed => Ending::Killed,
-        Waited::TimedOut | Waited::GivenUp => Ending::Program(format!(
+        WaitEnd::Ended(status) => ending_of(status, code(&status), &outcome.transcript),
+        WaitEnd::Killed => QemuEnd::Killed,
+        WaitEnd::TimedOut | WaitEnd::GivenUp => QemuEnd::Program(format!(
             "no end within {} s, the program was killed; {}; `--timeout SECONDS` gives it longer",
             limit.as_secs(),
             system::host_load()
@@ -105,14 +105,14 @@ pub fn run_for(
     Ok(outcome)
 }
 
-fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> Ending {
+fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> QemuEnd {
     let has_verdict = transcript.of_kind("verdict").next().is_some();
     // An exit code counts only with a verdict: a program may end with 0 and not have run the app.
     match code.filter(|_| has_verdict) {
-        Some(0) => Ending::Guest(Status::Success),
-        Some(1) => Ending::Guest(Status::Failure),
-        Some(2) => Ending::Guest(Status::Usage),
-        _ => Ending::Program(format!(
+        Some(0) => QemuEnd::Guest(Status::Success),
+        Some(1) => QemuEnd::Guest(Status::Failure),
+        Some(2) => QemuEnd::Guest(Status::Usage),
+        _ => QemuEnd::Program(format!(
             "the program gave no verdict and ended with {status}"
         )),
     }
@@ -130,11 +130,11 @@ mod tests {
             let status = ExitStatus::from_raw(wait_status);
             ending_of(status, status.code(), &Transcript::read(text))
         };
-        assert_eq!(of(0, verdict), Ending::Guest(Status::Success));
-        assert_eq!(of(2 << 8, verdict), Ending::Guest(Status::Usage));
+        assert_eq!(of(0, verdict), QemuEnd::Guest(Status::Success));
+        assert_eq!(of(2 << 8, verdict), QemuEnd::Guest(Status::Usage));
         for wait_status in [0, 9, 101 << 8] {
-            assert!(matches!(of(wait_status, ""), Ending::Program(_)));
+            assert!(matches!(of(wait_status, ""), QemuEnd::Program(_)));
         }
-        assert!(matches!(of(9, verdict), Ending::Program(_)));
+        assert!(matches!(of(9, verdict), QemuEnd::Program(_)));
     }
 }

@@ -78,21 +78,21 @@ const MOST: Duration = Duration::from_secs(60);
 
 /// Repeats on standard error that work goes on, first after [`SILENCE`] and then with doubling
 /// pauses, until it is dropped.
-pub struct Lasting {
+pub struct ProgressNote {
     _over: Sender<()>,
 }
 
-impl Lasting {
+impl ProgressNote {
     /// Starts the reports; `what` names the work, such as "building `drone`".
     #[must_use = "it ends when it is dropped"]
-    pub fn new(what: &str) -> Lasting {
+    pub fn new(what: &str) -> ProgressNote {
         let what = what.to_string();
-        Lasting::saying(SILENCE, move |since| {
+        ProgressNote::saying(SILENCE, move |since| {
             eprintln!("{what}: {} s so far", since.as_secs());
         })
     }
 
-    fn saying(first: Duration, say: impl Fn(Duration) + Send + 'static) -> Lasting {
+    fn saying(first: Duration, say: impl Fn(Duration) + Send + 'static) -> ProgressNote {
         let (over, is_over) = channel::<()>();
         thread::spawn(move || {
             let (begun, mut pause) = (Instant::now(), first);
@@ -103,7 +103,7 @@ impl Lasting {
                 pause = (pause * 2).min(MOST);
             }
         });
-        Lasting { _over: over }
+        ProgressNote { _over: over }
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn what_lasts_is_said_until_it_ends() {
         let (sender, said) = channel();
-        let lasting = Lasting::saying(Duration::from_millis(1), move |since| {
+        let lasting = ProgressNote::saying(Duration::from_millis(1), move |since| {
             let _ = sender.send(since);
         });
         let first = said.recv().expect("it lasts");

@@ -1,16 +1,16 @@
 //! Starting QEMU: the machine, the meaning of time, and the image.
 //!
 //! A [`Qemu`] is a description that becomes a command line; [`Qemu::start`] makes it a process
-//! ([`Running`]). The *mode* says what the guest's clock means, the *machine* is the board that
+//! ([`RunningQemu`]). The *mode* says what the guest's clock means, the *machine* is the board that
 //! QEMU imitates, and the *loader* brings the image into memory: QEMU itself, or a firmware, with
 //! GRUB or without. Everything a guest could see of the host is fixed or left out (`-nodefaults`,
 //! no display, no network), so that in [`Mode::Deterministic`] two runs give the same bytes.
 //!
 //! Serial output goes to a file, which loses nothing, whereas a slow pipe drops bytes. The guest
-//! ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`Ending`]. Input to
+//! ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`QemuEnd`]. Input to
 //! the serial port comes from us by a pipe.
 //!
-//! An [`Ending`] is the end of the process, seen from outside. A guest writes a byte `v` to port
+//! An [`QemuEnd`] is the end of the process, seen from outside. A guest writes a byte `v` to port
 //! 0xf4, and QEMU's `isa-debug-exit` ends the process with status `(v << 1) | 1`: 33 for success,
 //! 35 for failure, 37 for a refused command line. No other status is a guest's own word.
 //!
@@ -30,8 +30,8 @@ use std::time::Duration;
 
 use boot::MOST_COMMAND_LINE_BYTES;
 
-use crate::child::{Asked, Child, Waited};
-use crate::files::Temporary;
+use crate::child::{Child, EndReason, WaitEnd};
+use crate::files::TemporaryFile;
 use crate::system;
 use views::protocol::Status;
 
@@ -46,14 +46,14 @@ pub const MOST_CORES: u64 = text::MOST_CORES as u64;
 
 /// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Second {
-    /// Forward the bytes written to [`Running`]'s input to this port; then the first one has none.
+pub struct SecondPort {
+    /// Forward the bytes written to [`RunningQemu`]'s input to this port; then the first one has none.
     pub is_live: bool,
     /// The file for the bytes that the guest sends.
     pub output: Option<PathBuf>,
 }
 
-impl Second {
+impl SecondPort {
     /// Returns QEMU's arguments for it.
     fn arguments(&self) -> [OsString; 4] {
         let device = match (&self.output, self.is_live) {
@@ -113,17 +113,17 @@ pub struct Qemu {
     pub module: Option<PathBuf>,
     /// The file for the bytes that the guest sends to QEMU's debug port; `None`: no such port.
     pub records: Option<PathBuf>,
-    /// Forward the bytes written to [`Running`]'s input to the guest's serial port.
+    /// Forward the bytes written to [`RunningQemu`]'s input to the guest's serial port.
     pub has_input: bool,
     /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
     pub stops: bool,
     /// The connection of the second serial port; `None`: there is no such port.
-    pub second: Option<Second>,
+    pub second: Option<SecondPort>,
     /// QEMU's words for further devices, with blanks between.
     pub devices: String,
     /// The network; `None`: there is no card.
     pub network: Option<Network>,
-    /// Write the address of each instruction that is executed to [`Running`]'s output.
+    /// Write the address of each instruction that is executed to [`RunningQemu`]'s output.
     pub logs_instructions: bool,
     /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
     pub debugger: Option<OsString>,
@@ -172,7 +172,7 @@ impl Qemu {
         } else {
             arguments.extend(["-serial".into(), file_value("file:", serial)]);
         }
-        arguments.extend(self.second.iter().flat_map(Second::arguments));
+        arguments.extend(self.second.iter().flat_map(SecondPort::arguments));
         if let Some(path) = &self.records {
             let port = file_value("file,id=edge,path=", path);
             arguments.extend(["-chardev".into(), port]);
@@ -235,7 +235,7 @@ impl Qemu {
     ///
     /// In words: the guest's command line is too long, a file could not be made, or QEMU
     /// could not be started.
-    pub fn start(&self, image: &Path, serial: &Path) -> Result<Running, String> {
+    pub fn start(&self, image: &Path, serial: &Path) -> Result<RunningQemu, String> {
         self.check_words()?;
         let program = crate::system::find_program(&self.program).ok_or_else(|| {
             let name = self.program.display();
@@ -249,8 +249,9 @@ impl Qemu {
         command.args(arguments);
         let is_live = self.second.as_ref().is_some_and(|second| second.is_live);
         let (has_input, stops) = (self.has_input || self.stops || is_live, self.stops);
-        let started = Running::start(command, serial, has_input, stops, self.logs_instructions)?;
-        Ok(Running {
+        let started =
+            RunningQemu::start(command, serial, has_input, stops, self.logs_instructions)?;
+        Ok(RunningQemu {
             records: self.records.clone(),
             ..started
         })
@@ -425,7 +426,7 @@ const KVM_FAILURES: [&str; 4] = [
 
 /// How a QEMU process ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum QemuEnd {
     /// The guest ended it with one of the agreed statuses.
     Guest(Status),
     /// QEMU ended with another status; 0 is a reset or a shutdown.
@@ -449,28 +450,28 @@ pub enum Ending {
     Program(String),
 }
 
-impl fmt::Display for Ending {
+impl fmt::Display for QemuEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Ending::Guest(Status::Success) => f.write_str("the guest ended in success"),
-            Ending::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
-            Ending::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
-            Ending::Program(words) => f.write_str(words),
-            Ending::Status(0) => f.write_str(
+            QemuEnd::Guest(Status::Success) => f.write_str("the guest ended in success"),
+            QemuEnd::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
+            QemuEnd::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
+            QemuEnd::Program(words) => f.write_str(words),
+            QemuEnd::Status(0) => f.write_str(
                 "the machine was reset or shut down without an exit status (a triple fault?)",
             ),
-            Ending::Status(status) => write!(f, "QEMU ended with status {status}"),
-            Ending::Signal => f.write_str("a signal ended QEMU"),
-            Ending::TimedOut { limit, load } => write!(
+            QemuEnd::Status(status) => write!(f, "QEMU ended with status {status}"),
+            QemuEnd::Signal => f.write_str("a signal ended QEMU"),
+            QemuEnd::TimedOut { limit, load } => write!(
                 f,
                 "no end within {} s, QEMU was killed; {load}",
                 limit.as_secs_f64()
             ),
-            Ending::Killed => f.write_str("ctrl-C was pressed again, and QEMU was killed"),
-            Ending::KvmFailed => {
+            QemuEnd::Killed => f.write_str("ctrl-C was pressed again, and QEMU was killed"),
+            QemuEnd::KvmFailed => {
                 f.write_str("KVM could not run the guest any further, QEMU was killed")
             }
-            Ending::TooMuchOutput => write!(
+            QemuEnd::TooMuchOutput => write!(
                 f,
                 "more than {} MiB of serial output, QEMU was killed",
                 MOST_SERIAL_BYTES >> 20
@@ -481,20 +482,20 @@ impl fmt::Display for Ending {
 
 /// A QEMU that was started and not yet waited for.
 #[derive(Debug)]
-pub struct Running {
+pub struct RunningQemu {
     /// Its input is the guest's serial port, its output the log of instructions, if wanted.
     pub child: Child,
     serial: PathBuf,
-    complaints: Temporary,
+    complaints: TemporaryFile,
     /// The file that the record goes to, if there is one.
     records: Option<PathBuf>,
     /// The serial port through which the guest is asked to end, if it listens.
     stop: Option<File>,
     /// The reason why the guest was asked to end, if it was.
-    pub(crate) asked: Option<Asked>,
+    pub(crate) asked: Option<EndReason>,
 }
 
-impl Running {
+impl RunningQemu {
     /// Starts `command` with its streams away from the terminal.
     fn start(
         mut command: Command,
@@ -502,7 +503,7 @@ impl Running {
         has_input: bool,
         stops: bool,
         has_log: bool,
-    ) -> Result<Running, String> {
+    ) -> Result<RunningQemu, String> {
         let file_error = |path: &Path| {
             let path = path.display().to_string();
             move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
@@ -511,7 +512,7 @@ impl Running {
         File::create(serial).map_err(file_error(serial))?;
         let mut complaints = serial.as_os_str().to_owned();
         complaints.push(OsString::from(".qemu"));
-        let complaints = Temporary(Some(complaints.into()));
+        let complaints = TemporaryFile(Some(complaints.into()));
         let errors = File::create(complaints.path()).map_err(file_error(complaints.path()))?;
 
         let piped = |is_piped: bool| match is_piped {
@@ -526,7 +527,7 @@ impl Running {
         }
         let child = Child::start(&mut command)
             .map_err(|error| format!("cannot start QEMU: {error}; is it for this machine?"))?;
-        Ok(Running {
+        Ok(RunningQemu {
             stop: child.second_input().filter(|_| stops),
             child,
             serial: serial.to_path_buf(),
@@ -546,7 +547,7 @@ impl Running {
         &mut self,
         limit: Duration,
         show: &mut dyn FnMut(&str),
-    ) -> Result<(Ending, String), String> {
+    ) -> Result<(QemuEnd, String), String> {
         let complaints = self.complaints.path();
         let mut kvm_failed = false;
         let records = self.records.as_deref();
@@ -561,18 +562,19 @@ impl Running {
         // The request may fail: a guest that has just ended does not listen.
         let stop = self.stop.take();
         let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
-        let ask: Option<&mut dyn FnMut(Asked)> = if stop.is_some() { Some(&mut ask) } else { None };
+        let ask: Option<&mut dyn FnMut(EndReason)> =
+            if stop.is_some() { Some(&mut ask) } else { None };
         let followed = (self.child).follow(limit, &self.serial, show, ask, sent)?;
         self.asked = followed.asked;
         let ending = match followed.waited {
-            Waited::Ended(status) => ending_of(status),
-            Waited::TimedOut => Ending::TimedOut {
+            WaitEnd::Ended(status) => ending_of(status),
+            WaitEnd::TimedOut => QemuEnd::TimedOut {
                 limit,
                 load: system::host_load(),
             },
-            Waited::Killed => Ending::Killed,
-            Waited::GivenUp if kvm_failed => Ending::KvmFailed,
-            Waited::GivenUp => Ending::TooMuchOutput,
+            WaitEnd::Killed => QemuEnd::Killed,
+            WaitEnd::GivenUp if kvm_failed => QemuEnd::KvmFailed,
+            WaitEnd::GivenUp => QemuEnd::TooMuchOutput,
         };
         Ok((ending, followed.text))
     }
@@ -585,13 +587,13 @@ impl Running {
     }
 }
 
-fn ending_of(status: ExitStatus) -> Ending {
+fn ending_of(status: ExitStatus) -> QemuEnd {
     match status.code() {
-        Some(33) => Ending::Guest(Status::Success),
-        Some(35) => Ending::Guest(Status::Failure),
-        Some(37) => Ending::Guest(Status::Usage),
-        Some(code) => Ending::Status(code),
-        None => Ending::Signal,
+        Some(33) => QemuEnd::Guest(Status::Success),
+        Some(35) => QemuEnd::Guest(Status::Failure),
+        Some(37) => QemuEnd::Guest(Status::Usage),
+        Some(code) => QemuEnd::Status(code),
+        None => QemuEnd::Signal,
     }
 }
 

@@ -2,13 +2,13 @@
 
 use sched_dag::Policy;
 
-use crate::options::{Command, Name, Takes, options};
+use crate::options::{Command, OptionName, OptionValue, options};
 use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 
 /// The options that become words `name=value` on the guest's command line, if
 /// they are given: kernel and apps have defaults of their own, and not every app
 /// knows every word.
-pub(crate) const GUEST_WORDS: &[Name] = &[
+pub(crate) const GUEST_WORDS: &[OptionName] = &[
     name::POLICY,
     name::PREEMPTION,
     name::CLUSTERS,
@@ -41,107 +41,107 @@ exit codes: 0 all is well; 1 a failure; 2 a refused command line; 130 ended by c
 
 options! {
     /// The app: a package under apps/.
-    APP in "what": Takes::Text("NAME"), or "fork-join";
+    APP in "what": OptionValue::Text("NAME"), or "fork-join";
     /// A file of DAGs (docs/dag-file.md), or a folder.
-    DAG: Takes::File("FILE");
+    DAG: OptionValue::File("FILE");
     /// Boot this image, or program; build nothing.
-    IMAGE: Takes::File("FILE");
+    IMAGE: OptionValue::File("FILE");
     /// Jobs that a DAG releases; 0: no end.
-    JOBS: Takes::Number(0, 1_000_000);
+    JOBS: OptionValue::Number(0, 1_000_000);
     /// Seed of the app's random draws; 1.
-    SEED: Takes::Number(0, u64::MAX);
+    SEED: OptionValue::Number(0, u64::MAX);
     /// Parameters of the app, with commas between.
-    SET: Takes::Text("NAME=VALUE");
+    SET: OptionValue::Text("NAME=VALUE");
     /// Those of a file, a line for each; --set prevails.
-    PARAMS: Takes::File("FILE");
+    PARAMS: OptionValue::File("FILE");
     /// A file in the guest's memory, for the app.
-    MODULE: Takes::File("FILE");
+    MODULE: OptionValue::File("FILE");
     /// More words for the guest's command line.
-    APPEND: Takes::Text("WORDS");
+    APPEND: OptionValue::Text("WORDS");
     /// On.
-    ON in "where": Takes::OneOf(&["machine", "linux", "debian", "host"]), or "machine";
+    ON in "where": OptionValue::OneOf(&["machine", "linux", "debian", "host"]), or "machine";
     /// Processors; 4 on debian.
-    CORES: Takes::Number(1, MOST_CORES), or "8";
+    CORES: OptionValue::Number(1, MOST_CORES), or "8";
     /// See docs/commands.md.
-    MODE: Takes::OneOf(Mode::NAMES);
+    MODE: OptionValue::OneOf(Mode::NAMES);
     /// The board.
-    MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
+    MACHINE: OptionValue::OneOf(Machine::NAMES), or "microvm";
     /// QEMU's words for devices, with blanks between; on q35.
-    DEVICE: Takes::Text("WORDS");
+    DEVICE: OptionValue::Text("WORDS");
     /// QEMU's words for a network; on q35.
-    NET: Takes::Text("WORDS");
+    NET: OptionValue::Text("WORDS");
     /// Its card.
-    CARD: Takes::OneOf(&["virtio", "e1000e"]), or "virtio";
+    CARD: OptionValue::OneOf(&["virtio", "e1000e"]), or "virtio";
     /// The network's traffic, for Wireshark.
-    PCAP: Takes::File("FILE");
+    PCAP: OptionValue::File("FILE");
     /// The loader.
-    BOOT: Takes::OneOf(Loader::NAMES), or "pvh";
+    BOOT: OptionValue::OneOf(Loader::NAMES), or "pvh";
     /// The guest's MiB.
-    MEMORY: Takes::Number(LEAST_MEMORY_MIB, 65_536), or "32";
+    MEMORY: OptionValue::Number(LEAST_MEMORY_MIB, 65_536), or "32";
     /// Use this QEMU; install nothing.
-    QEMU: Takes::File("PROGRAM");
+    QEMU: OptionValue::File("PROGRAM");
     /// On Linux, by what.
-    MECHANISM: Takes::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
+    MECHANISM: OptionValue::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
     /// On debian: so many programs next to it.
-    BUSY: Takes::Number(0, 64);
+    BUSY: OptionValue::Number(0, 64);
     /// Order of instances.
-    POLICY in "rules": Takes::OneOf(Policy::WORDS);
+    POLICY in "rules": OptionValue::OneOf(Policy::WORDS);
     /// Whether instances may lose their cores.
-    PREEMPTION: Takes::OneOf(&["on", "off"]);
+    PREEMPTION: OptionValue::OneOf(&["on", "off"]);
     /// Sizes of clusters of cores: N,N,... or auto.
-    CLUSTERS: Takes::Text("SIZES");
+    CLUSTERS: OptionValue::Text("SIZES");
     /// Parallel ones, a run for each; 2,4,6.
-    SUBTASKS in "fork-join": Takes::Numbers(1, MOST_SUBTASKS);
+    SUBTASKS in "fork-join": OptionValue::Numbers(1, MOST_SUBTASKS);
     /// Milliseconds of the longest execution.
-    LONGEST: Takes::Number(1, 50);
+    LONGEST: OptionValue::Number(1, 50);
     /// How a simulated one has its core.
-    OCCUPY: Takes::OneOf(&["hold", "spin"]);
+    OCCUPY: OptionValue::OneOf(&["hold", "spin"]);
     /// The one to take of a set of task graphs.
-    GRAPH in "--dag": Takes::Text("NAME");
+    GRAPH in "--dag": OptionValue::Text("NAME");
     /// The unit of numbers where a format has none; 1ms.
-    UNIT: Takes::Text("TIME");
+    UNIT: OptionValue::Text("TIME");
     /// wcet (default), uniform:0.2..1, samples, sequence.
-    EXECUTION: Takes::Text("MODEL");
+    EXECUTION: OptionValue::Text("MODEL");
     /// The jobs of so many seconds.
-    SECONDS: Takes::Number(1, 1_000_000);
+    SECONDS: OptionValue::Number(1, 1_000_000);
     /// A deadline miss is a failure.
-    STRICT_DEADLINES: Takes::Nothing;
+    STRICT_DEADLINES: OptionValue::Nothing;
     /// Print the file in our format; run nothing.
-    PRINT_DAG: Takes::Nothing;
+    PRINT_DAG: OptionValue::Nothing;
     /// All of the run; docs/recordings.md.
-    KEEP in "files": Takes::File("FILE");
+    KEEP in "files": OptionValue::File("FILE");
     /// As --keep, without values; for check-trace.
-    TRACE: Takes::File("FILE");
+    TRACE: OptionValue::File("FILE");
     /// Serve a page that shows the run while it goes on.
-    PAGE: Takes::Nothing;
+    PAGE: OptionValue::Nothing;
     /// Jobs of a DAG to keep for a crash; 16.
-    LATEST: Takes::Number(0, 64);
+    LATEST: OptionValue::Number(0, 64);
     /// Take the sources' values from it, compare others.
-    REPLAY: Takes::File("FILE");
+    REPLAY: OptionValue::File("FILE");
     /// --replay: begin with this job.
-    FROM: Takes::Text("DAG/JOB");
+    FROM: OptionValue::Text("DAG/JOB");
     /// The serial log.
-    SERIAL: Takes::File("FILE");
+    SERIAL: OptionValue::File("FILE");
     /// Measure, commit, and compare; docs/proving.md.
-    PROVE in "bounds": Takes::Nothing;
+    PROVE in "bounds": OptionValue::Nothing;
     /// --prove: per cent more; 20.
-    MARGIN: Takes::Number(0, 1_000);
+    MARGIN: OptionValue::Number(0, 1_000);
     /// --prove: measure so many seeds; 1.
-    SEEDS: Takes::Number(1, 1_000);
+    SEEDS: OptionValue::Number(1, 1_000);
     /// Commit with WCETs of `recording --observe`.
-    WCETS: Takes::File("FILE");
+    WCETS: OptionValue::File("FILE");
     /// Talk to the kernel, in real time: type `help`.
-    CONSOLE in "person": Takes::Nothing;
+    CONSOLE in "person": OptionValue::Nothing;
     /// Bytes for the app's wire; docs/wires.md. -: stdin.
-    INPUT: Takes::File("FILE");
+    INPUT: OptionValue::File("FILE");
     /// Write what the app sends on its wire.
-    OUTPUT: Takes::File("FILE");
+    OUTPUT: OptionValue::File("FILE");
     /// Seconds until its end; 120, one a job.
-    TIMEOUT: Takes::Number(1, 86_400);
+    TIMEOUT: OptionValue::Number(1, 86_400);
     /// Only machine lines on standard output.
-    JSON: Takes::Nothing;
+    JSON: OptionValue::Nothing;
     /// Only what the guest prints.
-    QUIET 'q': Takes::Nothing;
+    QUIET 'q': OptionValue::Nothing;
     /// Wait for a debugger on TCP port 1234.
-    GDB: Takes::Nothing;
+    GDB: OptionValue::Nothing;
 }

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use tool::options::{Command, Parsed};
+use tool::options::{Arguments, Command};
 
 #[path = "../../views/src/tests.rs"]
 mod cells;
@@ -14,7 +14,7 @@ pub(crate) mod made;
 pub(crate) use cells::{altered, rows};
 
 /// Parses a command line that a table must accept.
-pub(crate) fn right(table: &Command, line: &str) -> Parsed {
+pub(crate) fn right(table: &Command, line: &str) -> Arguments {
     let words: Vec<_> = line.split_whitespace().map(OsString::from).collect();
     table.parse(&words).expect(line)
 }

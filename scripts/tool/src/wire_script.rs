@@ -28,7 +28,7 @@ const MOST_OF_PACKET: usize = 1472;
 
 /// Bytes that arrive at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct ScriptEntry {
     /// The number of its line.
     pub line: usize,
     /// The time of the run.
@@ -46,8 +46,8 @@ pub struct Entry {
 /// # Errors
 ///
 /// In words that begin with the number of the line: the fault and the remedy.
-pub fn read(text: &str) -> Result<Vec<Entry>, String> {
-    let mut entries: Vec<Entry> = Vec::new();
+pub fn read(text: &str) -> Result<Vec<ScriptEntry>, String> {
+    let mut entries: Vec<ScriptEntry> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
@@ -65,7 +65,7 @@ pub fn read(text: &str) -> Result<Vec<Entry>, String> {
     Ok(entries)
 }
 
-fn entry(number: usize, line: &str) -> Result<Entry, String> {
+fn entry(number: usize, line: &str) -> Result<ScriptEntry, String> {
     let (time, rest) = first_word(line);
     let at_ns = parse_ns(time)?;
     let (wire, rest) = match rest.strip_prefix("wire.") {
@@ -97,7 +97,7 @@ fn entry(number: usize, line: &str) -> Result<Entry, String> {
             "{count} bytes arrive at once, and {most} is the most; divide them, the time may be the \
              same"
         )),
-        _ => Ok(Entry {
+        _ => Ok(ScriptEntry {
             line: number,
             at_ns,
             wire,
@@ -172,7 +172,7 @@ fn pair(digits: &str) -> Result<u8, String> {
 }
 
 /// Returns the entries as the guest takes them.
-pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
+pub fn for_guest(entries: &[ScriptEntry]) -> Vec<u8> {
     let nobody = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
     let mut script = Vec::new();
     for entry in entries {

@@ -107,21 +107,21 @@ impl fmt::Display for JsonError {
 /// assert_eq!(line.get("done").and_then(|done| done.as_u64()), Some(120));
 /// ```
 pub fn parse(text: &str) -> Result<Value, JsonError> {
-    Parser::new(text).whole()
+    JsonParser::new(text).whole()
 }
 
 #[derive(Default)]
-struct Parser<'t> {
+struct JsonParser<'t> {
     text: &'t str,
     position: usize,
     depth: usize,
 }
 
-impl<'t> Parser<'t> {
+impl<'t> JsonParser<'t> {
     fn new(text: &'t str) -> Self {
-        Parser {
+        JsonParser {
             text,
-            ..Parser::default()
+            ..JsonParser::default()
         }
     }
 

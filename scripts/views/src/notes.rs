@@ -6,11 +6,11 @@
 use recording::{CommittedDag, CommittedTopic};
 use sched_dag::{DagId, Policy, SubtaskId};
 
-use crate::record::Committed;
+use crate::record::CommittedDags;
 use crate::units::briefly;
 
 /// Returns the notes on a DAG of a commit; none if there is no such DAG.
-pub fn of_dag(commit: &Committed, dag: DagId) -> Vec<String> {
+pub fn of_dag(commit: &CommittedDags, dag: DagId) -> Vec<String> {
     let Some(told) = commit.told.dags.get(dag.index()) else {
         return Vec::new();
     };
@@ -40,7 +40,7 @@ pub fn of_dag(commit: &Committed, dag: DagId) -> Vec<String> {
 
 /// Returns the note on a topic: its type, its writer and its readers.
 fn of_topic(
-    commit: &Committed,
+    commit: &CommittedDags,
     (dag, told): (DagId, &CommittedDag),
     number: u32,
     topic: &CommittedTopic,
@@ -75,7 +75,7 @@ fn of_topic(
 }
 
 /// Returns the notes on a subtask of a commit; none if there is no such subtask.
-pub fn of_subtask(commit: &Committed, dag: DagId, subtask: SubtaskId) -> Vec<String> {
+pub fn of_subtask(commit: &CommittedDags, dag: DagId, subtask: SubtaskId) -> Vec<String> {
     let told = commit.told.dags.get(dag.index());
     let Some((told, of)) = told.and_then(|of| Some((of, of.subtasks.get(subtask.index())?))) else {
         return Vec::new();
@@ -135,7 +135,7 @@ mod tests {
 eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2
 beat T=25000000 D=25000000: tick/4/1000000";
 
-    fn committed(policy: Policy) -> Committed {
+    fn committed(policy: Policy) -> CommittedDags {
         let mut told = commit(EYE);
         let eye = &mut told.dags[0];
         eye.jobs = Some(20);
@@ -166,7 +166,7 @@ beat T=25000000 D=25000000: tick/4/1000000";
             affinities: vec![(0, 0)],
             ..told
         };
-        let mut committed = Committed::new(0, told).expect("it is right");
+        let mut committed = CommittedDags::new(0, told).expect("it is right");
         // A commit refuses it, but notes can tell of it.
         committed.told.dags[0].subtasks[1].name.clear();
         committed

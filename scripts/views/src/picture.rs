@@ -6,7 +6,7 @@
 //! late entry in red, arrows of messages between machines, and a thin bar below for each wait; then a row for each DAG with the response time of each job, its
 //! proven bound and its deadline.
 //!
-//! A [`Window`] says which jobs of which DAGs are drawn. Coordinates are whole pixels, so that a run
+//! A [`TimeWindow`] says which jobs of which DAGs are drawn. Coordinates are whole pixels, so that a run
 //! whose times differ by less than that has the same picture, byte by byte. Pages keep such pictures,
 //! and tests draw them again.
 
@@ -39,7 +39,7 @@ pub const COLOURS: [&str; 10] = [
 
 /// The part of a run that a person asks for, in the person's words.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Asked<'w> {
+pub struct WindowRequest<'w> {
     /// The first time of release, such as `20ms`; else 0, or where machines first hear of each other.
     pub from: Option<&'w str>,
     /// The time of release from which on nothing is drawn.
@@ -52,20 +52,20 @@ pub struct Asked<'w> {
 
 /// The part of a run that a picture shows.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub struct TimeWindow {
     /// Jobs that are released then are drawn.
     pub released_ns: Range<u64>,
     /// The DAGs.
     pub dags: Vec<DagId>,
 }
 
-impl Window {
+impl TimeWindow {
     /// Finds the part of a run that is asked for.
     ///
     /// # Errors
     ///
     /// In words: a malformed time, or an unknown DAG.
-    pub fn of(view: &View<'_>, asked: &Asked<'_>) -> Result<Self, String> {
+    pub fn of(view: &View<'_>, asked: &WindowRequest<'_>) -> Result<Self, String> {
         let dags = view.run.task_set.dags();
         let names: Vec<&str> = dags.iter().map(Dag::name).collect();
         let find = |name: &str| {
@@ -107,7 +107,7 @@ impl Window {
 /// # Errors
 ///
 /// In words: no job is left of that time.
-pub fn draw(view: &View<'_>, window: Window) -> Result<String, String> {
+pub fn draw(view: &View<'_>, window: TimeWindow) -> Result<String, String> {
     let mut picture = Picture::new(view, window);
     let jobs = view.jobs.iter();
     let jobs = jobs.filter(|((dag, job), _)| picture.is_drawn(*dag, *job));
@@ -133,7 +133,8 @@ pub fn draw(view: &View<'_>, window: Window) -> Result<String, String> {
 
 /// Draws the graphs of all DAGs alone.
 pub fn graphs(view: &View<'_>) -> String {
-    let window = Window::of(view, &Asked::default()).expect("nothing is asked that could be wrong");
+    let window = TimeWindow::of(view, &WindowRequest::default())
+        .expect("nothing is asked that could be wrong");
     let mut picture = Picture::new(view, window);
     let height = picture.graphs();
     picture.svg.into_text((picture.right, height))
@@ -159,13 +160,13 @@ struct Picture<'v> {
     left: u64,
     /// Where the widest graph ends.
     right: u64,
-    window: Window,
+    window: TimeWindow,
     /// Where the axis of time ends.
     end_ns: u64,
 }
 
 impl<'v> Picture<'v> {
-    fn new(view: &'v View<'v>, window: Window) -> Self {
+    fn new(view: &'v View<'v>, window: TimeWindow) -> Self {
         let dags = window.dags.iter().map(|dag| view.run.task_set.dag(*dag));
         let names = dags.map(|dag| dag.name().len() as u64);
         Self {
@@ -460,10 +461,10 @@ mod tests {
     use crate::made::DIAMOND;
 
     /// Returns how often each of these parts stands in the picture of what is asked for.
-    fn counted<const N: usize>(asked: Asked<'_>, parts: [&str; N]) -> [usize; N] {
+    fn counted<const N: usize>(asked: WindowRequest<'_>, parts: [&str; N]) -> [usize; N] {
         let run = run_of(DIAMOND[0], DIAMOND[1]);
         let view = View::new(&run);
-        let window = Window::of(&view, &asked).expect("it is there");
+        let window = TimeWindow::of(&view, &asked).expect("it is there");
         let svg = draw(&view, window).expect("it has jobs");
         parts.map(|part| svg.matches(part).count())
     }
@@ -477,9 +478,9 @@ mod tests {
             ">deadline 1.5 us<",
             ">deadline 100 ns<",
         ];
-        let whole = Asked {
+        let whole = WindowRequest {
             to: Some("1500ns"),
-            ..Asked::default()
+            ..WindowRequest::default()
         };
         // The page, five boxes, five executions in six pieces, three of job 1, two complete jobs;
         // an arrow for each edge.
@@ -487,20 +488,23 @@ mod tests {
         // There is none, and neither of these is stated.
         assert_eq!(counted(whole, [">core 2<", "WCET", ">bound"]), [0; 3]);
         // Without its end it has the longest period, of which job 1 is a part.
-        assert_eq!(counted(Asked::default(), parts), counted(whole, parts));
+        assert_eq!(
+            counted(WindowRequest::default(), parts),
+            counted(whole, parts)
+        );
         // Of DAG `a` alone once its own one; job 1 only as far as it executes before job 0 ends.
-        let of_a = Asked {
+        let of_a = WindowRequest {
             dags: Some("a"),
-            ..Asked::default()
+            ..WindowRequest::default()
         };
         assert_eq!(counted(of_a, parts), [1 + 4 + 5 + 1 + 1, 4, 1, 0, 0]);
-        let twice = Asked {
+        let twice = WindowRequest {
             periods: Some(2),
             ..of_a
         };
         assert_eq!(counted(twice, parts), [1 + 4 + 5 + 3 + 1, 4, 1, 1, 0]);
         // From then on: of `a` job 1, which is not complete, and `b`; and what job 0 still executes.
-        let later = Asked {
+        let later = WindowRequest {
             from: Some("1ns"),
             dags: Some("b,a"),
             ..whole
@@ -512,29 +516,29 @@ mod tests {
     fn what_is_not_there_is_named() {
         let run = run_of(DIAMOND[0], DIAMOND[1]);
         let view = View::new(&run);
-        let refused = |asked: Asked<'_>| {
-            let window = Window::of(&view, &asked);
+        let refused = |asked: WindowRequest<'_>| {
+            let window = TimeWindow::of(&view, &asked);
             window.and_then(|window| draw(&view, window)).unwrap_err()
         };
-        let unknown = refused(Asked {
+        let unknown = refused(WindowRequest {
             dags: Some("a,A"),
-            ..Asked::default()
+            ..WindowRequest::default()
         });
         let there = "`--dags`: the run has no dag `A`; there are `a`, `b`; did you mean `a`?";
         assert_eq!(unknown, there);
-        let time = refused(Asked {
+        let time = refused(WindowRequest {
             to: Some("5"),
-            ..Asked::default()
+            ..WindowRequest::default()
         });
         assert!(time.starts_with("`--to`: `5` has no unit"), "{time}");
         let (from, to) = (
             Some("18446744073709551614ns"),
             Some("18446744073709551615ns"),
         );
-        let none = refused(Asked {
+        let none = refused(WindowRequest {
             from,
             to,
-            ..Asked::default()
+            ..WindowRequest::default()
         });
         assert!(
             none.contains("keeps no job that was released from 18446744073.7 s"),
@@ -555,7 +559,7 @@ mod tests {
 1010 wait c0 0.1.0";
         let run = run_of(&format!("{}\nwait 0.0 30\nwait 0.0 20", DIAMOND[0]), waits);
         let view = View::new(&run);
-        let window = Window::of(&view, &Asked::default()).expect("it is there");
+        let window = TimeWindow::of(&view, &WindowRequest::default()).expect("it is there");
         let svg = draw(&view, window).expect("it has a job");
         assert_eq!(svg.matches(">waits 50 ns<").count(), 1, "{svg}");
         // Job 1 has no release, but executes and waits.

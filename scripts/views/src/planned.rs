@@ -6,7 +6,7 @@ use crate::view::View;
 
 /// An entry of a table, in one job of the run.
 #[derive(Clone, Copy, Debug)]
-pub struct Planned {
+pub struct PlannedEntry {
     /// The core.
     pub core: CoreId,
     /// The entry's instance.
@@ -19,7 +19,7 @@ pub struct Planned {
     pub to_ns: u64,
 }
 
-impl Planned {
+impl PlannedEntry {
     /// Reports whether it was late by more than a platform may take for its own work.
     pub fn is_late(&self, view: &View<'_>) -> bool {
         let history = view.histories.get(&self.instance);
@@ -31,7 +31,7 @@ impl Planned {
 
 /// Returns the entries of the jobs that a run has released, by start, the outer before the inner. A
 /// table without times has none.
-pub fn entries(view: &View<'_>) -> Vec<Planned> {
+pub fn entries(view: &View<'_>) -> Vec<PlannedEntry> {
     let (task_set, mut all) = (&view.run.task_set, Vec::new());
     for table in task_set.tables() {
         let (is_alone, cores) = (table.is_of_one_dag(), view.run.options.cores);
@@ -59,7 +59,7 @@ pub fn entries(view: &View<'_>) -> Vec<Planned> {
                 // Stated by hand, or in a record, times may be of any size.
                 let from_ns = u64::try_from(from_ns).unwrap_or(0);
                 let from_ns = from_ns.saturating_add(entry.start_ns);
-                all.push(Planned {
+                all.push(PlannedEntry {
                     core,
                     instance: Instance::new(dag, job, subtask),
                     depth: entry.depth,
@@ -69,12 +69,12 @@ pub fn entries(view: &View<'_>) -> Vec<Planned> {
             }
         }
     }
-    all.sort_unstable_by_key(|of: &Planned| (of.from_ns, of.depth, of.core));
+    all.sort_unstable_by_key(|of: &PlannedEntry| (of.from_ns, of.depth, of.core));
     all
 }
 
 /// Returns the entry that was late first.
-pub fn first_late(view: &View<'_>) -> Option<Planned> {
+pub fn first_late(view: &View<'_>) -> Option<PlannedEntry> {
     let late = entries(view).into_iter().filter(|of| of.is_late(view));
     late.min_by_key(|of| of.to_ns)
 }

@@ -51,7 +51,7 @@ pub struct History {
     /// The time of its cancellation, or of its end by a fault.
     pub dropped_ns: Option<u64>,
     /// The times on a core.
-    pub slices: Vec<Slice>,
+    pub slices: Vec<ExecutionSlice>,
     /// When each wait began and ended; `None`: it went on when the trace ended.
     pub waits: Vec<(u64, Option<u64>)>,
     /// How many times it was preempted.
@@ -60,7 +60,7 @@ pub struct History {
 
 /// A stretch of execution on one core.
 #[derive(Clone, Copy, Debug)]
-pub struct Slice {
+pub struct ExecutionSlice {
     /// The core.
     pub core: CoreId,
     /// Its begin.
@@ -170,7 +170,7 @@ impl JobHistory {
 
 impl History {
     /// Returns the wait that ended a stretch of execution, if one did.
-    pub fn wait_after(&self, slice: Slice) -> Option<(u64, Option<u64>)> {
+    pub fn wait_after(&self, slice: ExecutionSlice) -> Option<(u64, Option<u64>)> {
         let mut waits = self.waits.iter().copied();
         waits.find(|(from_ns, _)| slice.to_ns == Some(*from_ns))
     }
@@ -179,7 +179,7 @@ impl History {
     pub fn end_of(&self, number: usize) -> SliceEnd {
         let is_last = number + 1 == self.slices.len();
         match self.slices[number] {
-            Slice { to_ns: None, .. } => SliceEnd::Open,
+            ExecutionSlice { to_ns: None, .. } => SliceEnd::Open,
             slice if self.wait_after(slice).is_some() => SliceEnd::Waits,
             _ if is_last && self.finish_ns.is_some() => SliceEnd::Finished,
             _ if is_last && self.dropped_ns.is_some() => SliceEnd::Fault,
@@ -225,7 +225,7 @@ impl History {
     }
 
     fn begin_slice(&mut self, core: CoreId, from_ns: u64) {
-        self.slices.push(Slice {
+        self.slices.push(ExecutionSlice {
             core,
             from_ns,
             to_ns: None,

@@ -11,14 +11,14 @@ use sched_dag::law::{self, Distribution};
 use sched_dag::{Dag, DagId, Instance, Preemption, SubtaskId};
 use views::chains::{self, MeasuredChain};
 use views::json::{Object, quoted};
-use views::planned::{self, Planned};
-use views::record::Committed;
-use views::view::{Slice, View};
+use views::planned::{self, PlannedEntry};
+use views::record::CommittedDags;
+use views::view::{ExecutionSlice, View};
 use views::{links, marks, notes, picture};
 
-use crate::opened::Opened;
+use crate::opened::OpenedRecords;
 use crate::request::{Faults, Request};
-use crate::tables::Columns;
+use crate::tables::TypedColumns;
 
 /// So many breaches are told; all are counted.
 const MOST_BREACHES: usize = 100;
@@ -27,10 +27,13 @@ const MOST_BREACHES: usize = 100;
 const MOST_MARKS: usize = 10_000;
 
 /// Answers a request for all that is to be seen of a run.
-pub(crate) fn picture(opened: &Opened<'_>, request: &Request<'_>) -> Result<Vec<u8>, Faults> {
+pub(crate) fn picture(
+    opened: &OpenedRecords<'_>,
+    request: &Request<'_>,
+) -> Result<Vec<u8>, Faults> {
     let run = opened.run(request)?;
     let (view, options) = (View::new(run), run.options);
-    let mut columns = Columns::default();
+    let mut columns = TypedColumns::default();
     let firsts = slices(&view, &mut columns);
     jobs(&view, opened, &mut columns);
     plan(&view, &mut columns);
@@ -129,7 +132,7 @@ fn or_null(number: Option<u64>) -> String {
 }
 
 /// The DAGs with their bounds and what was observed.
-fn dags(view: &View<'_>, opened: &Opened<'_>) -> Vec<String> {
+fn dags(view: &View<'_>, opened: &OpenedRecords<'_>) -> Vec<String> {
     let told = opened.commits(view.run).flat_map(|(_, commit, _)| {
         let own = (0..).map(DagId).zip(&commit.told.dags);
         own.map(move |(dag, _)| (commit, dag))
@@ -139,7 +142,7 @@ fn dags(view: &View<'_>, opened: &Opened<'_>) -> Vec<String> {
     all.map(|(model, told)| dag(view, model, told)).collect()
 }
 
-fn dag(view: &View<'_>, (id, model): (DagId, &Dag), told: (&Committed, DagId)) -> String {
+fn dag(view: &View<'_>, (id, model): (DagId, &Dag), told: (&CommittedDags, DagId)) -> String {
     let jobs = || view.jobs.range((id, 0)..=(id, u64::MAX));
     let responses = Distribution::new(jobs().filter_map(|(&(_, job), history)| {
         let release_ns = view.release_ns(id, job);
@@ -203,7 +206,7 @@ fn marks(view: &View<'_>, warnings: &mut Vec<String>) -> Vec<String> {
 }
 
 /// Adds the entries of tables.
-fn plan(view: &View<'_>, columns: &mut Columns) {
+fn plan(view: &View<'_>, columns: &mut TypedColumns) {
     let all = planned::entries(view);
     let late = planned::first_late(view).map(|late| late.instance);
     let before = first_subtasks(view);
@@ -213,7 +216,7 @@ fn plan(view: &View<'_>, columns: &mut Columns) {
     let subtask = |of: Instance| before[of.dag.index()] + u64::from(of.subtask.0);
     columns.numbers("plan_subtask", each().map(|of| subtask(of.instance)));
     columns.numbers("plan_core", each().map(|of| of.core.0.into()));
-    let is_late = |of: &Planned| u8::from(late == Some(of.instance));
+    let is_late = |of: &PlannedEntry| u8::from(late == Some(of.instance));
     columns.bytes("plan_late", each().map(is_late));
 }
 
@@ -227,14 +230,14 @@ fn first_subtasks(view: &View<'_>) -> Vec<u64> {
 }
 
 /// Adds the slices; returns where those of each core begin, and where the last ones end.
-fn slices(view: &View<'_>, columns: &mut Columns) -> Vec<usize> {
+fn slices(view: &View<'_>, columns: &mut TypedColumns) -> Vec<usize> {
     let before = first_subtasks(view);
     let mut all = Vec::new();
     for (&instance, history) in &view.histories {
         let slices = history.slices.iter().enumerate();
         all.extend(slices.map(|(number, slice)| (*slice, instance, history, number)));
     }
-    let to_ns = |slice: Slice| slice.to_ns.unwrap_or(view.end_ns);
+    let to_ns = |slice: ExecutionSlice| slice.to_ns.unwrap_or(view.end_ns);
     all.sort_unstable_by_key(|it| (it.0.core, it.0.from_ns, to_ns(it.0), it.1));
     let each = || all.iter();
     columns.times("from", each().map(|it| Some(it.0.from_ns)));
@@ -262,7 +265,7 @@ fn slices(view: &View<'_>, columns: &mut Columns) -> Vec<usize> {
 }
 
 /// Adds the jobs.
-fn jobs(view: &View<'_>, opened: &Opened<'_>, columns: &mut Columns) {
+fn jobs(view: &View<'_>, opened: &OpenedRecords<'_>, columns: &mut TypedColumns) {
     let mut valued = BTreeSet::new();
     for (bytes, _, dags) in opened.commits(view.run) {
         let recording = Recording::read(bytes);

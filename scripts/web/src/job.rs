@@ -7,12 +7,12 @@ use recording::{CommittedDag, Decoder, Entry, EntryKind, Recordable, Recording, 
 use sched_dag::{DagId, SubtaskId};
 use views::json::Object;
 
-use crate::opened::Opened;
+use crate::opened::OpenedRecords;
 use crate::request::{Faults, Request};
 use crate::tables::framed;
 
 /// Answers with the values taken and given by the subtasks of a job.
-pub(crate) fn job(opened: &Opened<'_>, request: &Request<'_>) -> Result<Vec<u8>, Faults> {
+pub(crate) fn job(opened: &OpenedRecords<'_>, request: &Request<'_>) -> Result<Vec<u8>, Faults> {
     let run = opened.run(request)?;
     let wanted = request.number("dag", 0..=u32::MAX, 0)?;
     let job = request.number("job", 0..=u64::MAX, 0)?;

@@ -19,7 +19,7 @@ mod tables;
 
 use std::io::{self, Read, Write};
 
-use opened::Opened;
+use opened::OpenedRecords;
 use request::{Faults, Request};
 
 /// The memory of wasm ends at 4 GiB, and a record takes some twenty-five times its size.
@@ -48,9 +48,9 @@ fn answer(request: &Request<'_>) -> Result<Vec<u8>, Faults> {
     let of_play = request.choice("of", &[("open", false), ("play", true)])?;
     let opened = match request.what {
         "record-of-play" => return Ok(play::play(request)?.0),
-        "play" | "svg-of-play" => Opened::played(request)?,
-        "job" if of_play => Opened::played(request)?,
-        _ => Opened::read(request)?,
+        "play" | "svg-of-play" => OpenedRecords::played(request)?,
+        "job" if of_play => OpenedRecords::played(request)?,
+        _ => OpenedRecords::read(request)?,
     };
     match request.what {
         "play" | "open" => answer::picture(&opened, request),

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use recording::{MAGIC, completed};
 use views::links;
-use views::picture::{self, Asked, Window};
-use views::record::{Committed, Record, Run, bytes_of_log};
+use views::picture::{self, TimeWindow, WindowRequest};
+use views::record::{CommittedDags, Record, Run, bytes_of_log};
 use views::view::View;
 
 use crate::play;
@@ -14,7 +14,7 @@ use crate::request::{Faults, Request};
 
 /// Records, read, with their bytes.
 #[derive(Default)]
-pub(crate) struct Opened<'r> {
+pub(crate) struct OpenedRecords<'r> {
     pub(crate) records: Vec<(String, Record)>,
     bytes: Vec<Cow<'r, [u8]>>,
     /// The records of several machines, joined.
@@ -23,7 +23,7 @@ pub(crate) struct Opened<'r> {
     pub(crate) warnings: Option<Vec<String>>,
 }
 
-impl<'r> Opened<'r> {
+impl<'r> OpenedRecords<'r> {
     /// Plays, and opens the play's record: so a play is seen as its record will be.
     pub(crate) fn played(request: &Request<'r>) -> Result<Self, Faults> {
         let (record, warnings) = play::play(request)?;
@@ -96,22 +96,22 @@ impl<'r> Opened<'r> {
     }
 }
 
-type Part<'o> = (&'o [u8], &'o Committed, Range<u32>);
+type Part<'o> = (&'o [u8], &'o CommittedDags, Range<u32>);
 
 /// Draws the run that a request names, or a window of it.
-pub(crate) fn svg(opened: &Opened<'_>, request: &Request<'_>) -> Result<Vec<u8>, Faults> {
+pub(crate) fn svg(opened: &OpenedRecords<'_>, request: &Request<'_>) -> Result<Vec<u8>, Faults> {
     let view = View::new(opened.run(request)?);
     // Those of a play say how long it runs.
     let periods = match opened.warnings {
         Some(_) => 1,
         None => request.number("periods", 1..=1000, 1)?,
     };
-    let asked = Asked {
+    let asked = WindowRequest {
         from: request.text("from"),
         to: request.text("to"),
         dags: request.text("dags"),
         periods: Some(periods),
     };
-    let window = Window::of(&view, &asked)?;
+    let window = TimeWindow::of(&view, &asked)?;
     Ok(picture::draw(&view, window)?.into_bytes())
 }

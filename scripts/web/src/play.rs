@@ -1,6 +1,6 @@
 //! DAGs run in virtual time: their record, as `./scripts/run --keep` writes that of a boot.
 
-use dag_file::{Settings, build};
+use dag_file::{RunSettings, build};
 use fass::commit::{ConstructionPolicy, Overheads, finish_create_dags_in_order};
 use fass::{Dag, Occupation};
 use fass_dag_file::{Execution, FileDag, Length, check, kernel_overheads_ns, parse};
@@ -78,7 +78,7 @@ fn of_file(
     }
     check(set, options, length).map_err(Faults)?;
     let execution = Execution::parse(request.text("execution").unwrap_or("wcet"));
-    let settings = Settings {
+    let settings = RunSettings {
         execution: execution.map_err(|why| format!("execution: {why}"))?,
         seed,
         occupation: Occupation::Hold,

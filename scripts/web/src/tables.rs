@@ -8,12 +8,12 @@ use views::json::Object;
 
 /// Columns, each with its name and the type of its elements in the head.
 #[derive(Default)]
-pub(crate) struct Columns {
+pub(crate) struct TypedColumns {
     head: Vec<String>,
     bytes: Vec<u8>,
 }
 
-impl Columns {
+impl TypedColumns {
     fn add<const N: usize>(&mut self, names: [&str; 2], values: impl Iterator<Item = [u8; N]>) {
         self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
         let from = self.bytes.len();

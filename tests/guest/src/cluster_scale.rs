@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
-use hand_off::{Shape, Stamping, Stamps, Workload, build};
+use hand_off::{BodyStamps, Shape, Stamping, Workload, build};
 use kernel::{AppError, Machine};
 
 use crate::values::emit;
@@ -53,7 +53,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     }
     let period_ns = u64::try_from(PERIOD.as_nanos()).unwrap_or(u64::MAX);
     let of_job = |job| {
-        let of_cluster = |(stamps, cluster): (&Stamps, u64)| {
+        let of_cluster = |(stamps, cluster): (&BodyStamps, u64)| {
             let release_ns = run.epoch_ns() + (job * u64::from(count) + cluster) * period_ns;
             stamps.first(SUBTASKS - 1, job)?.checked_sub(release_ns)
         };

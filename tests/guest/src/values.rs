@@ -11,7 +11,7 @@ use core::time::Duration;
 
 use executive::machine::clock;
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
-use hand_off::{Pen, Stamps};
+use hand_off::{BodyStamps, StampPen};
 use kernel::report::Distribution;
 use kernel::{AppError, Machine, json};
 
@@ -69,11 +69,11 @@ pub(crate) fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIte
 }
 
 /// Builds the chain, and the place where its bodies leave their times.
-fn build(jobs: u64) -> (Dag, Stamps) {
+fn build(jobs: u64) -> (Dag, BodyStamps) {
     let period = Duration::from_millis(4);
     let dag = create_dag();
     dag.name("values").jobs(jobs).in_flight(1);
-    let mut stamps = Stamps::default();
+    let mut stamps = BodyStamps::default();
     let topics: Vec<String> = (1..SUBTASKS).map(|number| format!("t{number}")).collect();
     let named = |number| SubtaskAttributes::named(&format!("s{number}"));
     let mut pen = stamps.pen(jobs);
@@ -106,7 +106,7 @@ const fn is_recorded(subtask: usize) -> bool {
     subtask % 2 == 1
 }
 
-fn stamped(value: Value, pen: &mut Pen) -> Value {
+fn stamped(value: Value, pen: &mut StampPen) -> Value {
     // The times are not to be recorded.
     pen.put(clock::now_ns());
     pen.put(clock::now_ns());

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cruise::{Releases, build};
+use cruise::{ReleaseSource, build};
 use fass::finish_create_dags;
 use fass::shared::{Wire, WireCounts};
 use harness::Guest;
@@ -17,7 +17,7 @@ const JOBS: u64 = 30;
 const INPUT: &str = include_str!("../../../apps/cruise/gaps.txt");
 
 /// Returns the bytes that are sent in virtual time, and the wire's counts.
-fn in_virtual_time(input: &str, releases: Releases) -> (Vec<u8>, WireCounts) {
+fn in_virtual_time(input: &str, releases: ReleaseSource) -> (Vec<u8>, WireCounts) {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
     finish_create_dags(&build(&wire, releases, JOBS)).expect("it is sound");
@@ -53,8 +53,8 @@ fn counted(outcome: &Outcome) -> WireCounts {
 #[test]
 fn a_run_sends_what_virtual_time_sends_on_any_cores_and_each_time() {
     for (releases, word) in [
-        (Releases::Period, "releases=period"),
-        (Releases::Packets, "releases=packets"),
+        (ReleaseSource::Period, "releases=period"),
+        (ReleaseSource::Packets, "releases=packets"),
     ] {
         let (wanted, counts) = in_virtual_time(INPUT, releases);
         assert!(!wanted.is_empty());
@@ -76,7 +76,7 @@ fn a_run_sends_what_virtual_time_sends_on_any_cores_and_each_time() {
 
 #[test]
 fn a_pc_has_the_port_too() {
-    let (wanted, _) = in_virtual_time(INPUT, Releases::Period);
+    let (wanted, _) = in_virtual_time(INPUT, ReleaseSource::Period);
     let (_, sent) = guest(INPUT).machine(Machine::Q35).succeed_sending();
     assert_eq!(sent, wanted);
 }
@@ -88,7 +88,7 @@ fn a_burst_beyond_the_room_is_lost_and_counted() {
         "{burst}5ms \"{}\\n\"\n25ms \"gap 3000\\n\"\n",
         "x".repeat(300)
     );
-    let (wanted, counts) = in_virtual_time(&input, Releases::Period);
+    let (wanted, counts) = in_virtual_time(&input, ReleaseSource::Period);
     assert_eq!(
         (counts.packets + counts.lost_packets, counts.malformed),
         (321, 1)

@@ -6,7 +6,7 @@ use std::time::Duration;
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 use recording::Commit;
-use views::record::{Committed, Record};
+use views::record::{CommittedDags, Record};
 use virtual_time::VirtualTime;
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -104,7 +104,7 @@ fn a_divided_set_is_recorded_replayed_and_judged() {
             affinities: vec![(1, 0)],
             ..told.clone()
         };
-        let other = Committed::new(0, told).expect("it is sound");
+        let other = CommittedDags::new(0, told).expect("it is sound");
         assert!(other.check_bounds().is_err());
         let mut run = recorded.runs[0].clone();
         run.task_set = other.task_set;

@@ -3,10 +3,10 @@
 
 use std::fs;
 
-use dag_file::{Settings, commit};
+use dag_file::{RunSettings, commit};
 use fass::{Occupation, Policy, Preemption};
 use fass_dag_file::{Execution, Length, Set};
-use tool::dag_file::{Import, load};
+use tool::dag_file::{ImportSettings, load};
 use tool::system::workspace;
 use views::json::{self, Value};
 use virtual_time::VirtualTime;
@@ -20,7 +20,7 @@ fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
         .cores(cores)
         .policy(Policy::StaticPriority)
         .preemption(Preemption::Disabled);
-    let settings = Settings {
+    let settings = RunSettings {
         execution: Execution::Wcet,
         seed: 1,
         occupation: Occupation::Hold,
@@ -39,7 +39,7 @@ fn virtual_time_finds_the_published_makespans() {
     let text = fs::read_to_string(&path).expect("it is in the tree");
     let published = json::parse(&text).expect("it is JSON");
     let published = published.get("graphs").expect("graphs").elements();
-    let import = Import {
+    let import = ImportSettings {
         unit_ns: Some(UNIT_NS),
         graph: None,
         cores: 16,

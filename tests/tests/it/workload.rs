@@ -4,13 +4,13 @@
 //! do: over seeds, the sets per job have a standard deviation of at most 0.009.
 
 use harness::workload;
-use join_latency::Samples;
+use join_latency::RunSamples;
 use random::Random;
 
 const JOBS: usize = 2000;
 const SEEDS: u64 = 3;
 
-fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> Samples {
+fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> RunSamples {
     let mut seeds = Random::new(seed);
     let times_ns = |mut random: Random| {
         let times_ns = (0..JOBS).map(|_| random.within(1_000_000..=50_000_000));

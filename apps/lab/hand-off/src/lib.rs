@@ -2,7 +2,7 @@
 //!
 //! A *body* here does nothing but read the clock, so the time between two bodies
 //! is the system's alone. [`Shape`] describes the graphs, purely; [`build()`] makes
-//! DAGs of them through the same API that every app uses; [`Stamps`] holds the
+//! DAGs of them through the same API that every app uses; [`BodyStamps`] holds the
 //! times that the bodies have read. Chains and fork-joins are typed, with one `u64` on each edge,
 //! for that is what an app writes; random graphs are made at run time, without values.
 //!
@@ -61,13 +61,13 @@ pub struct Workload {
 /// # Panics
 ///
 /// If a fork-join has no or more than 16 parallel subtasks.
-pub fn build(workload: &Workload) -> (Dag, Stamps) {
+pub fn build(workload: &Workload) -> (Dag, BodyStamps) {
     let dag = create_dag();
     dag.jobs(workload.jobs).in_flight(1);
     let mut builder = Builder {
         workload,
         dag: &dag,
-        stamps: Stamps::default(),
+        stamps: BodyStamps::default(),
     };
     match workload.shape {
         Shape::Chain(subtasks) => builder.chain(subtasks),
@@ -81,7 +81,7 @@ pub fn build(workload: &Workload) -> (Dag, Stamps) {
 struct Builder<'a> {
     workload: &'a Workload,
     dag: &'a Dag,
-    stamps: Stamps,
+    stamps: BodyStamps,
 }
 
 impl Builder<'_> {
@@ -182,7 +182,7 @@ impl Builder<'_> {
         dag.register_sink_subtask(body, inputs, self.workload.period, attributes);
     }
 
-    fn pen(&mut self, number: usize) -> Option<Pen> {
+    fn pen(&mut self, number: usize) -> Option<StampPen> {
         let is_end = number == 0 || number + 1 == self.workload.shape.subtasks();
         if is_end || self.workload.stamping == Stamping::All {
             return Some(self.stamps.pen(self.workload.jobs));
@@ -202,7 +202,7 @@ impl Builder<'_> {
 
 /// The whole body: first and last instruction.
 #[inline]
-fn twice(pen: &mut Pen) {
+fn twice(pen: &mut StampPen) {
     pen.stamp();
     pen.stamp();
 }
@@ -210,18 +210,18 @@ fn twice(pen: &mut Pen) {
 /// The times of all stamping bodies of a DAG, in nanoseconds on the clock of
 /// [`fass::now_ns`].
 #[derive(Clone, Debug, Default)]
-pub struct Stamps {
+pub struct BodyStamps {
     /// By subtask; job by job, within a job first and last instruction.
     times: Vec<Arc<[AtomicU64]>>,
 }
 
 /// A pen, by which one body writes its times.
-pub struct Pen {
+pub struct StampPen {
     times: Arc<[AtomicU64]>,
     next: usize,
 }
 
-impl Pen {
+impl StampPen {
     /// Makes a pen by itself with room for a given number of times.
     pub fn new(times: usize) -> Self {
         Self {
@@ -251,10 +251,10 @@ impl Pen {
     }
 }
 
-impl Stamps {
+impl BodyStamps {
     /// Makes a pen for the next subtask's body, which writes twice a job.
-    pub fn pen(&mut self, jobs: u64) -> Pen {
-        let pen = Pen::new(
+    pub fn pen(&mut self, jobs: u64) -> StampPen {
+        let pen = StampPen::new(
             usize::try_from(jobs)
                 .unwrap_or(usize::MAX)
                 .saturating_mul(2),

@@ -18,14 +18,14 @@ use kernel::{AppError, Machine};
 kernel::entry!(main);
 
 fn main(machine: &Machine) -> Result<(), AppError> {
-    let plan = Plan::read(machine)?;
+    let plan = MeasurementPlan::read(machine)?;
     (plan.part)(machine, &plan)?;
     machine.report_memory();
     Ok(())
 }
 
 /// Makes some of the measurements.
-type Part = fn(&Machine, &Plan) -> Result<(), AppError>;
+type Part = fn(&Machine, &MeasurementPlan) -> Result<(), AppError>;
 
 const PARTS: [(&str, Part); 3] = [
     ("hand-off", on_one_core),
@@ -34,7 +34,7 @@ const PARTS: [(&str, Part); 3] = [
 ];
 
 /// Measures all that one core is enough for.
-fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
+fn on_one_core(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     measure::clock();
     workloads(machine, plan)?;
     measure::preemption(machine, plan.jobs)?;
@@ -45,7 +45,7 @@ fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
 }
 
 /// Measures what needs a second core.
-fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
+fn elsewhere(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     measure::woken_cores(machine, plan.jobs)?;
     measure::joins(machine, plan.jobs)?;
     measure::hops_elsewhere(machine, plan.jobs)?;
@@ -54,7 +54,7 @@ fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
 }
 
 /// Measures chains, fork-joins and layered graphs alone.
-fn workloads(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
+fn workloads(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     for &subtasks in &plan.chain {
         measure::chain(machine, subtasks, plan.jobs)?;
     }
@@ -67,13 +67,13 @@ fn workloads(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     Ok(())
 }
 
-fn wake_ups(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
+fn wake_ups(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     let mut branches = plan.branches.iter();
     branches.try_for_each(|&parallel| measure::wake_ups(machine, parallel))
 }
 
 /// The measurements to be taken.
-struct Plan {
+struct MeasurementPlan {
     part: Part,
     jobs: u64,
     chain: Vec<usize>,
@@ -81,7 +81,7 @@ struct Plan {
     layered: Vec<usize>,
 }
 
-impl Plan {
+impl MeasurementPlan {
     fn read(machine: &Machine) -> Result<Self, UsageError> {
         let options = machine.options();
         let sizes = |key, least, most, default: &[u64]| {

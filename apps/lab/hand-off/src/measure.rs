@@ -16,7 +16,7 @@ use core::time::Duration;
 
 use fass::commit::{ConstructionPolicy, finish_create_dags_in_order, finish_create_dags_with};
 use fass::{Dag, Policy, Preemption, SubtaskAttributes, create_dag};
-use hand_off::{Pen, Shape, Stamping, Stamps, Workload, build};
+use hand_off::{BodyStamps, Shape, StampPen, Stamping, Workload, build};
 use kernel::report::Distribution;
 use kernel::{AppError, Machine, Run, json};
 use sched_dag::journal::{Event, EventKind};
@@ -31,7 +31,7 @@ pub(crate) fn clock() {
         *reading = fass::now_ns();
     }
     emit("clock", "reading", 1, differences(readings.into_iter()));
-    let mut pen = Pen::new(READINGS);
+    let mut pen = StampPen::new(READINGS);
     for _ in 0..READINGS {
         pen.stamp();
     }
@@ -42,7 +42,7 @@ pub(crate) fn clock() {
 pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("chain-{subtasks}");
     let shape = Shape::Chain(subtasks);
-    let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
+    let all = MeasuredRun::run(machine, workload(shape, jobs, Stamping::All))?;
     let hops = all
         .jobs()
         .flat_map(|job| (1..subtasks).map(move |later| (job, later)));
@@ -53,7 +53,7 @@ pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(),
         )
     };
     emit(&name, "return_to_start", 1, hops.filter_map(hop));
-    let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
+    let ends = MeasuredRun::run(machine, workload(shape, jobs, Stamping::Ends))?;
     emit_hop(&name, &ends);
     ends.emit_common(&name);
     Ok(())
@@ -63,12 +63,12 @@ pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(),
 pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let mut workload = workload(Shape::Chain(subtasks), jobs, Stamping::Ends);
     workload.wcet = Some(Duration::from_millis(1));
-    let ends = Measured::run(machine, workload)?;
+    let ends = MeasuredRun::run(machine, workload)?;
     emit_hop(&format!("chain-{subtasks} with budgets"), &ends);
     workload.wcet = None;
     in_a_table(machine, workload, 1)?;
     machine.configure(Policy::Edf, Preemption::Enabled);
-    let ends = Measured::run(machine, workload)?;
+    let ends = MeasuredRun::run(machine, workload)?;
     emit_hop(&format!("chain-{subtasks} by deadlines"), &ends);
     Ok(())
 }
@@ -85,7 +85,7 @@ pub(crate) fn in_a_table(
         let words: String = words.map(|of| format!(" chain.s{of}")).collect();
         format!("core {core}:{words}")
     });
-    let ends = Measured::run_in_order(machine, workload, &lists.collect::<Vec<_>>())?;
+    let ends = MeasuredRun::run_in_order(machine, workload, &lists.collect::<Vec<_>>())?;
     emit_hop(&format!("chain-{subtasks} in a table of {cores}"), &ends);
     Ok(())
 }
@@ -95,7 +95,7 @@ pub(crate) fn hops_elsewhere(machine: &Machine, jobs: u64) -> Result<(), AppErro
     in_a_table(machine, workload(Shape::Chain(64), jobs, Stamping::Ends), 2)
 }
 
-fn emit_hop(name: &str, ends: &Measured) {
+fn emit_hop(name: &str, ends: &MeasuredRun) {
     let hops = ends.workload.shape.subtasks() as u64 - 1;
     emit(name, "hop", hops, ends.source_to_sink());
 }
@@ -104,16 +104,16 @@ fn emit_hop(name: &str, ends: &Measured) {
 pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("fork-join-{parallel}");
     let shape = Shape::ForkJoin(parallel);
-    let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
+    let all = MeasuredRun::run(machine, workload(shape, jobs, Stamping::All))?;
     emit_join(&name, &all);
-    let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
+    let ends = MeasuredRun::run(machine, workload(shape, jobs, Stamping::Ends))?;
     emit(&name, "source_to_sink", 1, ends.source_to_sink());
     ends.emit_common(&name);
     Ok(())
 }
 
 /// Prints the times from the last return to the sink's start.
-fn emit_join(name: &str, all: &Measured) {
+fn emit_join(name: &str, all: &MeasuredRun) {
     let sink = all.workload.shape.subtasks() - 1;
     let started = |job| all.stamps.first(sink, job);
     let ready = |job| all.ready_ns(sink, job);
@@ -129,7 +129,7 @@ fn emit_join(name: &str, all: &Measured) {
 pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), AppError> {
     const JOBS: u64 = 20;
     let shape = Shape::ForkJoin(parallel);
-    let ends = Measured::run(machine, workload(shape, JOBS, Stamping::Ends))?;
+    let ends = MeasuredRun::run(machine, workload(shape, JOBS, Stamping::Ends))?;
     let is_sinks = |of: SubtaskId| of.index() == parallel + 1;
     let wakes =
         |event: &Event| event.what == EventKind::Ready && event.subtask.is_some_and(is_sinks);
@@ -149,7 +149,7 @@ pub(crate) fn layered(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(
     // As many instances as a chain has, and a few jobs at least.
     let jobs = (jobs.saturating_mul(64) / subtasks as u64).clamp(3, jobs.max(3));
     let shape = Shape::Layered { subtasks, seed: 1 };
-    let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
+    let ends = MeasuredRun::run(machine, workload(shape, jobs, Stamping::Ends))?;
     emit(&name, "instance", subtasks as u64, ends.source_to_sink());
     ends.emit_common(&name);
     Ok(())
@@ -164,7 +164,7 @@ fn differences(times: impl Iterator<Item = u64> + Clone) -> impl Iterator<Item =
 /// source's core, the other on a core that has to be woken.
 pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let shape = Shape::ForkJoin(2);
-    let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
+    let all = MeasuredRun::run(machine, workload(shape, jobs, Stamping::All))?;
     let core = |subtask, job| all.instance(subtask, job)?.core;
     let branches = || all.jobs().flat_map(|job| [(1, job), (2, job)]);
     let elsewhere = || branches().filter(|&(branch, job)| core(branch, job) != core(0, job));
@@ -182,7 +182,7 @@ pub(crate) fn joins(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     for parallel in [2, 4] {
         let mut workload = workload(Shape::ForkJoin(parallel), jobs, Stamping::All);
         workload.work = WORK;
-        let all = Measured::run(machine, workload)?;
+        let all = MeasuredRun::run(machine, workload)?;
         emit_join(&format!("fork-join-{parallel} of 2 us bodies"), &all);
     }
     Ok(())
@@ -198,7 +198,7 @@ const WORK_NS: u64 = 2_000_000;
 
 /// Preempts one of the low subtasks, of which each core has one.
 pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
-    let mut stamps = Stamps::default();
+    let mut stamps = BodyStamps::default();
     let mut dags = alloc::vec![preemptor(jobs, stamps.pen(jobs))];
     for priority in 1..=machine.cores() {
         dags.push(preempted(jobs, priority, stamps.pen(jobs)));
@@ -284,7 +284,7 @@ fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>
     parts
 }
 
-fn preemptor(jobs: u64, mut pen: Pen) -> Dag {
+fn preemptor(jobs: u64, mut pen: StampPen) -> Dag {
     let body = move |_| {
         pen.stamp();
         pen.stamp();
@@ -294,7 +294,7 @@ fn preemptor(jobs: u64, mut pen: Pen) -> Dag {
     dag
 }
 
-fn preempted(jobs: u64, priority: u32, mut pen: Pen) -> Dag {
+fn preempted(jobs: u64, priority: u32, mut pen: StampPen) -> Dag {
     let body = move |_| {
         let start_ns = fass::now_ns();
         let (mut last_ns, mut gap) = (start_ns, (0, 0));
@@ -338,15 +338,15 @@ fn workload(shape: Shape, jobs: u64, stamping: Stamping) -> Workload {
 }
 
 /// A run that has ended, with its stamps.
-struct Measured {
+struct MeasuredRun {
     run: Run,
-    stamps: Stamps,
+    stamps: BodyStamps,
     workload: Workload,
     dag: DagId,
     commit_ns: u64,
 }
 
-impl Measured {
+impl MeasuredRun {
     /// Commits and runs.
     fn run(machine: &Machine, workload: Workload) -> Result<Self, AppError> {
         Self::run_in_order(machine, workload, &[])

@@ -18,19 +18,19 @@ use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fork_join::{ExecutionTimes, PERIOD};
-use join_latency::{Joined, Samples, Span};
+use join_latency::{CompletedJoin, ExecutionSpan, RunSamples};
 use kernel::{AppError, Event, Lock, Machine};
-use pub_sub::graph::{Graph, Next};
+use pub_sub::graph::{Graph, NextCallback};
 use pub_sub::{ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 
-use super::Outcome;
+use super::ConditionOutcome;
 
 /// Longer than any run.
 const FOREVER: Duration = Duration::from_secs(1_000_000);
 
 /// Runs all jobs.
-pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, AppError> {
-    let shared = Arc::new(Cores {
+pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<ConditionOutcome, AppError> {
+    let shared = Arc::new(ExecutorCores {
         graph: Lock::new("graph", experiment.graph()),
         event: Event::new(),
         epoch_ns: AtomicU64::new(u64::MAX),
@@ -43,7 +43,7 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, 
     let graph = shared
         .graph
         .with(|graph| core::mem::replace(graph, Graph::new(0)));
-    Ok(Outcome {
+    Ok(ConditionOutcome {
         samples: samples(graph),
         allocations: run.allocations(),
         violations: run.violations().count() as u64,
@@ -51,7 +51,7 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, 
 }
 
 /// Builds the DAG of workers.
-fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
+fn workers(cores: u32, shared: &Arc<ExecutorCores>) -> Dag {
     let dag = create_dag();
     dag.name("executor")
         .jobs(1)
@@ -80,8 +80,8 @@ fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
 }
 
 /// The cores as the executor's host.
-struct Cores {
-    graph: Lock<Graph<Message, Part>>,
+struct ExecutorCores {
+    graph: Lock<Graph<Message, GroupPart>>,
     event: Event,
     /// Time 0 of the graph on the kernel's clock.
     epoch_ns: AtomicU64,
@@ -91,7 +91,7 @@ struct Cores {
     latest_seen: AtomicU64,
 }
 
-impl Cores {
+impl ExecutorCores {
     /// Sets the epoch, a little ahead so that all workers are there.
     fn set_epoch(&self) {
         const LEAD_NS: u64 = 1_000_000;
@@ -115,18 +115,18 @@ impl Cores {
             let seen = self.event.version();
             let now_ns = self.now_ns();
             match self.graph.with(|graph| graph.take(now_ns)) {
-                Next::Call(group, mut callbacks, message) => {
+                NextCallback::Call(group, mut callbacks, message) => {
                     callbacks.call(message, self);
                     let now_ns = self.now_ns();
-                    let is_awaited = |graph: &mut Graph<Message, Part>| {
+                    let is_awaited = |graph: &mut Graph<Message, GroupPart>| {
                         graph.give_back(group, callbacks, now_ns)
                     };
                     if self.graph.with(is_awaited) {
                         self.event.notify();
                     }
                 }
-                Next::WaitUntil(until_ns) => self.wait(seen, until_ns),
-                Next::End => return,
+                NextCallback::WaitUntil(until_ns) => self.wait(seen, until_ns),
+                NextCallback::End => return,
             }
         }
     }
@@ -168,7 +168,7 @@ impl Cores {
 
 /// How messages are matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Matching {
+pub(crate) enum MatchingPolicy {
     /// By equal stamps. Parallel subtasks pass the source's stamp on.
     Exact,
     /// By stamps at most so far apart. Parallel subtasks stamp anew.
@@ -188,7 +188,7 @@ pub(crate) struct Experiment {
     /// The seed of the execution times.
     pub(crate) seed: u64,
     /// How messages are matched.
-    pub(crate) matching: Matching,
+    pub(crate) matching: MatchingPolicy,
     /// The synchronizer's queue size.
     pub(crate) queue: NonZeroUsize,
     /// The depth of all subscriptions. If one drops a message, the run is of no use:
@@ -199,23 +199,24 @@ pub(crate) struct Experiment {
 impl Experiment {
     /// Builds the graph. Its time 0 is the run's epoch; it shuts down when all has
     /// been published and joined.
-    fn graph(self) -> Graph<Message, Part> {
+    fn graph(self) -> Graph<Message, GroupPart> {
         let mut graph = Graph::new(1 + self.parallel);
-        let part = |role, executions| Part {
+        let part = |role, executions| GroupPart {
             experiment: self,
             role,
             spans: Vec::with_capacity(executions),
         };
-        let source = graph.add_group(part(Role::Source, self.jobs));
+        let source = graph.add_group(part(CallbackRole::Source, self.jobs));
         let period_ns = u64::try_from(PERIOD.as_nanos()).unwrap_or(u64::MAX);
         graph.add_timer(source, 0, period_ns);
         for branch in 0..self.parallel {
             let times = ExecutionTimes::new(self.seed, branch);
             let output = FIRST_OUTPUT + branch;
-            let parallel = graph.add_group(part(Role::Parallel { output, times }, self.jobs));
+            let parallel =
+                graph.add_group(part(CallbackRole::Parallel { output, times }, self.jobs));
             graph.subscribe(parallel, INPUT, self.depth.get());
         }
-        let join = Role::Join {
+        let join = CallbackRole::Join {
             synchronizer: self.synchronizer(),
             joins: Vec::with_capacity(self.jobs),
             indices: Vec::with_capacity(self.jobs * self.parallel),
@@ -230,8 +231,8 @@ impl Experiment {
 
     fn synchronizer(&self) -> Box<dyn Synchronizer<u64> + Send> {
         match self.matching {
-            Matching::Exact => Box::new(ExactTime::new(self.parallel, self.queue.get())),
-            Matching::Approximate { max_interval_ns } => {
+            MatchingPolicy::Exact => Box::new(ExactTime::new(self.parallel, self.queue.get())),
+            MatchingPolicy::Approximate { max_interval_ns } => {
                 let mut parameters = Parameters::new(self.parallel, self.queue);
                 parameters.max_interval_ns = Some(max_interval_ns);
                 Box::new(ApproximateTime::new(parameters))
@@ -250,14 +251,14 @@ const INPUT: usize = 0;
 const FIRST_OUTPUT: usize = 1;
 
 /// The callbacks of one group, with what they have seen so far.
-struct Part {
+struct GroupPart {
     experiment: Experiment,
-    role: Role,
+    role: CallbackRole,
     /// The executions of the source or a parallel subtask, one a job.
-    spans: Vec<Span>,
+    spans: Vec<ExecutionSpan>,
 }
 
-enum Role {
+enum CallbackRole {
     /// Publishes a job at each call of its timer, until all are published.
     Source,
     /// Executes each job it receives for a drawn time, and publishes it.
@@ -268,49 +269,49 @@ enum Role {
     /// Joins what the parallel subtasks publish.
     Join {
         synchronizer: Box<dyn Synchronizer<u64> + Send>,
-        joins: Vec<Joined>,
-        /// The jobs that were joined, as in [`Samples::indices`].
+        joins: Vec<CompletedJoin>,
+        /// The jobs that were joined, as in [`RunSamples::indices`].
         indices: Vec<u64>,
         /// How many messages are to come; after that, nothing can happen any more.
         expected: usize,
     },
 }
 
-impl Part {
+impl GroupPart {
     /// Executes one of them: for a message, which comes with its topic, or for the timer.
-    fn call(&mut self, message: Option<(usize, Message)>, cores: &Cores) {
+    fn call(&mut self, message: Option<(usize, Message)>, cores: &ExecutorCores) {
         let start_ns = cores.now_ns();
         let spans = &mut self.spans;
         match (&mut self.role, message) {
-            (Role::Source, _) if spans.len() < self.experiment.jobs => {
+            (CallbackRole::Source, _) if spans.len() < self.experiment.jobs => {
                 let stamp_ns = cores.now_ns();
                 let message = spans.len() as u64;
-                spans.push(Span {
+                spans.push(ExecutionSpan {
                     start_ns,
                     finish_ns: stamp_ns,
                 });
                 cores.publish(INPUT, Stamped { stamp_ns, message });
             }
             // The join waits for messages that will never come.
-            (Role::Source, _) if cores.graph.with(|graph| graph.dropped()) > 0 => {
+            (CallbackRole::Source, _) if cores.graph.with(|graph| graph.dropped()) > 0 => {
                 cores.shut_down();
             }
-            (Role::Parallel { output, times }, Some((_, job))) => {
+            (CallbackRole::Parallel { output, times }, Some((_, job))) => {
                 // The core is held while the processor halts.
                 fass::execute_for(times.next_time(), Occupation::Hold);
                 let finish_ns = cores.now_ns();
-                spans.push(Span {
+                spans.push(ExecutionSpan {
                     start_ns,
                     finish_ns,
                 });
                 let stamp_ns = match self.experiment.matching {
-                    Matching::Exact => job.stamp_ns,
-                    Matching::Approximate { .. } => finish_ns,
+                    MatchingPolicy::Exact => job.stamp_ns,
+                    MatchingPolicy::Approximate { .. } => finish_ns,
                 };
                 cores.publish(*output, Stamped { stamp_ns, ..job });
             }
             (
-                Role::Join {
+                CallbackRole::Join {
                     synchronizer,
                     joins,
                     indices,
@@ -318,7 +319,7 @@ impl Part {
                 },
                 Some((topic, message)),
             ) => {
-                let mut outlet = Joining {
+                let mut outlet = JoinOutlet {
                     cores,
                     joins,
                     indices,
@@ -330,43 +331,43 @@ impl Part {
                 }
             }
             // A source that is through; and the graph registers no other timer.
-            (Role::Source, _) | (_, None) => {}
+            (CallbackRole::Source, _) | (_, None) => {}
         }
     }
 }
 
 /// Where sets go: to the join's function, which is called at once, as the original
 /// calls it. Like the DAG's sink, it only looks.
-struct Joining<'a> {
-    cores: &'a Cores,
-    joins: &'a mut Vec<Joined>,
+struct JoinOutlet<'a> {
+    cores: &'a ExecutorCores,
+    joins: &'a mut Vec<CompletedJoin>,
     indices: &'a mut Vec<u64>,
 }
 
-impl Outlet<u64> for Joining<'_> {
+impl Outlet<u64> for JoinOutlet<'_> {
     fn emitted(&mut self, set: Set<'_, u64>) {
         let ready_ns = self.cores.now_ns();
         let start_ns = self.cores.now_ns();
         self.indices.extend(set.map(|stamped| stamped.message));
-        let span = Span {
+        let span = ExecutionSpan {
             start_ns,
             finish_ns: self.cores.now_ns(),
         };
-        self.joins.push(Joined { ready_ns, span });
+        self.joins.push(CompletedJoin { ready_ns, span });
     }
 }
 
 /// Takes what a graph has seen when it was shut down and no worker uses it.
-fn samples(graph: Graph<Message, Part>) -> Samples {
-    let mut samples = Samples {
+fn samples(graph: Graph<Message, GroupPart>) -> RunSamples {
+    let mut samples = RunSamples {
         lost_inputs: graph.dropped(),
-        ..Samples::default()
+        ..RunSamples::default()
     };
-    for Part { role, spans, .. } in graph.into_callbacks() {
+    for GroupPart { role, spans, .. } in graph.into_callbacks() {
         match role {
-            Role::Source => samples.source = spans,
-            Role::Parallel { .. } => samples.parallel.push(spans),
-            Role::Join { joins, indices, .. } => {
+            CallbackRole::Source => samples.source = spans,
+            CallbackRole::Parallel { .. } => samples.parallel.push(spans),
+            CallbackRole::Join { joins, indices, .. } => {
                 (samples.joins, samples.indices) = (joins, indices);
             }
         }

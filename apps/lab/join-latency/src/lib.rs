@@ -13,7 +13,7 @@
 //! The join latency as the paper defines it compares the i-th join with the last publication of
 //! index i. If joins are skipped, all later ones are compared with indices that they have nothing
 //! to do with, so that it grows with the length of the run and never converges.
-//! [`Samples::cover_delays_ns`] has no such trouble. Either says nothing of joins that never
+//! [`RunSamples::cover_delays_ns`] has no such trouble. Either says nothing of joins that never
 //! happened: state these, too.
 //!
 //! Nothing here knows the kernel, and figures computed from the times are exact.
@@ -27,7 +27,7 @@ use alloc::vec::Vec;
 
 /// From when to when something executed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Span {
+pub struct ExecutionSpan {
     /// The function's first instruction.
     pub start_ns: u64,
     /// For the source and the parallel subtasks: the publication. For a join: the
@@ -37,22 +37,22 @@ pub struct Span {
 
 /// A join that happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Joined {
+pub struct CompletedJoin {
     /// When all that is joined had been put together.
     pub ready_ns: u64,
     /// When the function that uses it executed.
-    pub span: Span,
+    pub span: ExecutionSpan,
 }
 
 /// The times of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Samples {
+pub struct RunSamples {
     /// For each job the source's execution.
-    pub source: Vec<Span>,
+    pub source: Vec<ExecutionSpan>,
     /// For each parallel subtask and job its execution; it publishes at the end.
-    pub parallel: Vec<Vec<Span>>,
+    pub parallel: Vec<Vec<ExecutionSpan>>,
     /// The joins in their order.
-    pub joins: Vec<Joined>,
+    pub joins: Vec<CompletedJoin>,
     /// For each join the jobs whose values it joined, one a parallel subtask; all
     /// joins one after the other.
     pub indices: Vec<u64>,
@@ -61,7 +61,7 @@ pub struct Samples {
     pub lost_inputs: u64,
 }
 
-impl Samples {
+impl RunSamples {
     /// Returns the jobs whose values a join has joined.
     pub fn indices_of(&self, join: usize) -> &[u64] {
         let parallel = self.parallel.len();
@@ -132,23 +132,23 @@ mod tests {
 
     /// Two topics with four publications each; index 1 is skipped, and the second join mixes 2
     /// and 3.
-    fn samples() -> Samples {
+    fn samples() -> RunSamples {
         let spans = |times_ns: [u64; 4]| {
-            let span = |finish_ns| Span {
+            let span = |finish_ns| ExecutionSpan {
                 start_ns: 0,
                 finish_ns,
             };
             times_ns.map(span).to_vec()
         };
-        let joined = |ready_ns| Joined {
+        let joined = |ready_ns| CompletedJoin {
             ready_ns,
-            span: Span::default(),
+            span: ExecutionSpan::default(),
         };
-        Samples {
+        RunSamples {
             parallel: vec![spans([10, 20, 30, 40]), spans([12, 19, 35, 60])],
             joins: vec![joined(13), joined(44)],
             indices: vec![0, 0, 3, 2],
-            ..Samples::default()
+            ..RunSamples::default()
         }
     }
 
@@ -160,7 +160,7 @@ mod tests {
         // Nothing covers index 3.
         assert_eq!(samples.cover_delays_ns(), [13 - 12, 44 - 20, 44 - 35]);
         assert_eq!(samples.covering_joins(), [0, 1, 1]);
-        let none = Samples::default();
+        let none = RunSamples::default();
         assert_eq!((none.counts(), none.cover_delays_ns()), ([0; 4], vec![]));
     }
 }

@@ -16,10 +16,10 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::num::NonZeroUsize;
 
-use by_stamps::{Experiment, Matching};
+use by_stamps::{Experiment, MatchingPolicy};
 use fass::Occupation;
-use fork_join::{MOST_PARALLEL, Work, Workload};
-use join_latency::{Joined, Samples, Span};
+use fork_join::{ExecutionWork, MOST_PARALLEL, Workload};
+use join_latency::{CompletedJoin, ExecutionSpan, RunSamples};
 use kernel::options::UsageError;
 use kernel::report::{Distribution, Ns};
 use kernel::{AppError, Machine, Run, json, println};
@@ -46,10 +46,10 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     let max_interval_ns = max_interval_ms * 1_000_000;
     let policies = [
         ("fass", None),
-        ("exact", Some(Matching::Exact)),
+        ("exact", Some(MatchingPolicy::Exact)),
         (
             "approximate",
-            Some(Matching::Approximate { max_interval_ns }),
+            Some(MatchingPolicy::Approximate { max_interval_ns }),
         ),
     ];
     let matching = options.choice("policy_under_test", &policies)?;
@@ -70,8 +70,8 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     }
     let name = match matching {
         None => String::from("fass"),
-        Some(Matching::Exact) => String::from("exact"),
-        Some(Matching::Approximate { .. }) => format!("approximate-{max_interval_ms}"),
+        Some(MatchingPolicy::Exact) => String::from("exact"),
+        Some(MatchingPolicy::Approximate { .. }) => format!("approximate-{max_interval_ms}"),
     };
     let outcome = match matching {
         None => {
@@ -80,7 +80,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
                 longest: fork_join::WCET,
                 jobs,
                 seed,
-                work: Work::Simulate(Occupation::Hold),
+                work: ExecutionWork::Simulate(Occupation::Hold),
             };
             run_dag(machine, &workload)?
         }
@@ -118,7 +118,7 @@ fn at_least_one(number: u64) -> NonZeroUsize {
 }
 
 /// Runs all jobs.
-fn run_dag(machine: &Machine, workload: &Workload) -> Result<Outcome, AppError> {
+fn run_dag(machine: &Machine, workload: &Workload) -> Result<ConditionOutcome, AppError> {
     let (dag, joins) = workload.build();
     // As many jobs in flight as the subscriptions' queues have room for by default,
     // so that no release waits for the backlog on either side.
@@ -129,7 +129,7 @@ fn run_dag(machine: &Machine, workload: &Workload) -> Result<Outcome, AppError> 
     );
     fass::finish_create_dags(&[dag])?;
     let run = machine.run()?;
-    Ok(Outcome {
+    Ok(ConditionOutcome {
         samples: samples(&run, workload.parallel),
         allocations: run.allocations(),
         violations: run.violations().count() as u64 + joins.mixed(),
@@ -138,7 +138,7 @@ fn run_dag(machine: &Machine, workload: &Workload) -> Result<Outcome, AppError> 
 
 /// Reads the times from the scheduler's record. Each join has the values of its own
 /// job, which `fork-join` checks and counts otherwise.
-fn samples(run: &Run, parallel: usize) -> Samples {
+fn samples(run: &Run, parallel: usize) -> RunSamples {
     let dag = run.task_set().find("fork-join");
     let jobs = run.record().numbered(dag).map(|(job, _)| job);
     let instances = |subtask: usize| {
@@ -154,13 +154,13 @@ fn samples(run: &Run, parallel: usize) -> Samples {
             .collect()
     };
     let joins = instances(parallel + 1).filter_map(|(job, times)| {
-        let joined = Joined {
+        let joined = CompletedJoin {
             ready_ns: times.ready_ns?,
             span: span(&times)?,
         };
         Some((job, joined))
     });
-    Samples {
+    RunSamples {
         source: spans(0),
         parallel: (1..=parallel).map(spans).collect(),
         joins: joins.clone().map(|(_, joined)| joined).collect(),
@@ -171,8 +171,8 @@ fn samples(run: &Run, parallel: usize) -> Samples {
     }
 }
 
-fn span(times: &InstanceRecord) -> Option<Span> {
-    Some(Span {
+fn span(times: &InstanceRecord) -> Option<ExecutionSpan> {
+    Some(ExecutionSpan {
         start_ns: times.start_ns?,
         finish_ns: times.finish_ns?,
     })
@@ -182,15 +182,15 @@ fn span(times: &InstanceRecord) -> Option<Span> {
 const BATCH: usize = 32;
 
 /// The outcome of a condition.
-pub(crate) struct Outcome {
-    pub(crate) samples: Samples,
+pub(crate) struct ConditionOutcome {
+    pub(crate) samples: RunSamples,
     /// Allocations while it ran.
     pub(crate) allocations: u64,
     /// Breaches of the scheduler's rules, and joins of a DAG that mix jobs.
     pub(crate) violations: u64,
 }
 
-impl Outcome {
+impl ConditionOutcome {
     /// Says what makes the condition worthless, if anything does.
     fn complaint(&self, jobs: u64) -> Option<String> {
         let Self {
@@ -216,7 +216,7 @@ impl Outcome {
 }
 
 /// Prints the times of all executions and joins.
-fn emit_samples(samples: &Samples) {
+fn emit_samples(samples: &RunSamples) {
     let subtasks = core::iter::once(&samples.source).chain(&samples.parallel);
     for (subtask, spans) in (0u64..).zip(subtasks) {
         for (batch, spans) in spans.chunks(BATCH).enumerate() {
@@ -233,7 +233,7 @@ fn emit_samples(samples: &Samples) {
     for (batch, joins) in samples.joins.chunks(BATCH).enumerate() {
         json::emit("joins", |line| {
             let times = joins.iter().enumerate().map(|(offset, joined)| {
-                let Joined { ready_ns, span } = joined;
+                let CompletedJoin { ready_ns, span } = joined;
                 let indices = samples.indices_of(batch * BATCH + offset);
                 let times = [*ready_ns, span.start_ns, span.finish_ns].into_iter();
                 list(times.chain(indices.iter().copied()))
@@ -250,7 +250,7 @@ fn list(numbers: impl IntoIterator<Item = u64>) -> String {
 }
 
 /// Prints the counts and distributions, as a machine line and for people.
-fn emit_summary(name: &str, outcome: &Outcome) {
+fn emit_summary(name: &str, outcome: &ConditionOutcome) {
     let samples = &outcome.samples;
     let [joins, same_index, cross_index, missing] = samples.counts();
     let literal = Distribution::new(samples.join_latencies_ns());

@@ -158,7 +158,7 @@ impl Default for AgePenalty {
 /// The policy that makes sets of stamps that are close to each other.
 pub struct ApproximateTime<M> {
     parameters: Parameters,
-    rings: Vec<Ring<M>>,
+    rings: Vec<TopicRing<M>>,
     candidate: Option<Candidate>,
     /// Where the cursors were when a virtual search began.
     cursors: Vec<usize>,
@@ -182,14 +182,14 @@ struct Candidate {
 /// Stamps are compared as `i128`: their differences, and stamps that a lower bound
 /// moves on, do not fit 64 bits.
 #[derive(Clone, Copy, Debug)]
-struct Ends {
+struct StampEnds {
     earliest_ns: i128,
     earliest: usize,
     latest_ns: i128,
     latest: usize,
 }
 
-impl Ends {
+impl StampEnds {
     /// Finds the ends of stamps in the order of their topics (step 8).
     fn of(stamps_ns: impl Iterator<Item = i128>) -> Option<Self> {
         let mut stamps_ns = stamps_ns.enumerate();
@@ -223,7 +223,9 @@ impl<M> ApproximateTime<M> {
         let entries = parameters.queue_size.get().saturating_add(1);
         Self {
             parameters,
-            rings: (0..topics).map(|_| Ring::with_capacity(entries)).collect(),
+            rings: (0..topics)
+                .map(|_| TopicRing::with_capacity(entries))
+                .collect(),
             candidate: None,
             cursors: vec![0; topics],
             set: Vec::with_capacity(topics),
@@ -272,15 +274,15 @@ impl<M> ApproximateTime<M> {
     }
 
     /// Returns the ends of the heads, or `None` if a topic has no waiting entry.
-    fn heads(&self) -> Option<Ends> {
+    fn heads(&self) -> Option<StampEnds> {
         if self.rings.iter().any(|ring| ring.head_ns().is_none()) {
             return None;
         }
-        Ends::of(self.rings.iter().filter_map(Ring::head_ns))
+        StampEnds::of(self.rings.iter().filter_map(TopicRing::head_ns))
     }
 
     /// Whether heads cannot be a first candidate (step 10).
-    fn is_hopeless(&self, heads: Ends) -> bool {
+    fn is_hopeless(&self, heads: StampEnds) -> bool {
         let interval_ns = heads.latest_ns - heads.earliest_ns;
         let longest_ns = self.parameters.max_interval_ns;
         longest_ns.is_some_and(|longest_ns| interval_ns > longest_ns.into())
@@ -288,7 +290,7 @@ impl<M> ApproximateTime<M> {
     }
 
     /// Whether heads are better than the candidate (step 11). At a tie they are not.
-    fn is_better(&self, heads: Ends, candidate: Candidate) -> bool {
+    fn is_better(&self, heads: StampEnds, candidate: Candidate) -> bool {
         let ends_later_ns = heads.latest_ns - candidate.latest_ns;
         let starts_later_ns = heads.earliest_ns - candidate.earliest_ns;
         self.parameters.age_penalty.scaled(ends_later_ns) < starts_later_ns
@@ -329,10 +331,10 @@ impl<M> ApproximateTime<M> {
 
     /// Returns the ends of the heads; where a topic has none, the earliest stamp that
     /// its next message can have counts.
-    fn virtual_heads(&self, candidate: Candidate) -> Option<Ends> {
+    fn virtual_heads(&self, candidate: Candidate) -> Option<StampEnds> {
         let lower_bounds_ns = &self.parameters.lower_bounds_ns;
         let stamps_ns = self.rings.iter().zip(lower_bounds_ns);
-        Ends::of(stamps_ns.map(|(ring, &lower_bound_ns)| {
+        StampEnds::of(stamps_ns.map(|(ring, &lower_bound_ns)| {
             ring.head_ns().unwrap_or_else(|| {
                 let bound_ns = ring
                     .last_passed_ns()
@@ -395,7 +397,7 @@ impl<M> Synchronizer<M> for ApproximateTime<M> {
 /// The messages of one topic, oldest arrival first, and how far a search got. A *cursor* parts
 /// them: those before it are *passed*, those from it on are *waiting*. The first waiting one is the
 /// *head*. Entries leave at the front.
-struct Ring<M> {
+struct TopicRing<M> {
     entries: VecDeque<Stamped<M>>,
     cursor: usize,
     /// Whether an entry was discarded for want of room, and nothing since has shown
@@ -403,7 +405,7 @@ struct Ring<M> {
     lossy: bool,
 }
 
-impl<M> Ring<M> {
+impl<M> TopicRing<M> {
     /// Makes an empty ring with room for `entries` entries.
     fn with_capacity(entries: usize) -> Self {
         Self {

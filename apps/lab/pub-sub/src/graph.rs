@@ -60,7 +60,7 @@ struct Subscription<M> {
 }
 
 /// The next work of a worker.
-pub enum Next<M, C> {
+pub enum NextCallback<M, C> {
     /// Call the callbacks of this group and give them back: for a message, which comes with its
     /// topic, or for the timer that is due.
     Call(usize, C, Option<(usize, M)>),
@@ -135,14 +135,14 @@ impl<M, C> Graph<M, C> {
     }
 
     /// Returns what is ready and takes it, or says what to wait for.
-    pub fn take(&mut self, now_ns: u64) -> Next<M, C> {
+    pub fn take(&mut self, now_ns: u64) -> NextCallback<M, C> {
         if self.is_shut_down {
-            return Next::End;
+            return NextCallback::End;
         }
         for timer in self.timers.iter_mut().filter(|timer| timer.is_due(now_ns)) {
             if let Some(callbacks) = self.groups[timer.group].take() {
                 timer.serve(now_ns);
-                return Next::Call(timer.group, callbacks, None);
+                return NextCallback::Call(timer.group, callbacks, None);
             }
         }
         for subscription in &mut self.subscriptions {
@@ -152,13 +152,13 @@ impl<M, C> Graph<M, C> {
                 && let Some(callbacks) = group.take()
             {
                 let message = Some((subscription.topic, message));
-                return Next::Call(subscription.group, callbacks, message);
+                return NextCallback::Call(subscription.group, callbacks, message);
             }
         }
         // A timer that is due has a busy group: the worker that gives that back sees it.
         let to_come = self.timers.iter().filter(|timer| !timer.is_due(now_ns));
         let next_ns = to_come.map(|timer| timer.next_ns).min();
-        Next::WaitUntil(next_ns.unwrap_or(u64::MAX))
+        NextCallback::WaitUntil(next_ns.unwrap_or(u64::MAX))
     }
 
     /// Takes a group's callbacks back, and returns whether another callback of the
@@ -217,7 +217,7 @@ impl<M> Subscription<M> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Graph, Next};
+    use super::{Graph, NextCallback};
 
     /// Callbacks that are only a name.
     type Names = Graph<u32, &'static str>;
@@ -225,8 +225,8 @@ mod tests {
     /// Takes what is ready, as (name, message with its topic).
     fn take(graph: &mut Names, now_ns: u64) -> Option<(&'static str, Option<(usize, u32)>)> {
         match graph.take(now_ns) {
-            Next::Call(_, name, message) => Some((name, message)),
-            Next::WaitUntil(_) | Next::End => None,
+            NextCallback::Call(_, name, message) => Some((name, message)),
+            NextCallback::WaitUntil(_) | NextCallback::End => None,
         }
     }
 
@@ -253,7 +253,7 @@ mod tests {
         graph.publish(topics[0], 2);
         let (name, message) = take(&mut graph, 0).unwrap();
         assert_eq!(message, Some((topics[0], 2)));
-        assert!(matches!(graph.take(0), Next::WaitUntil(u64::MAX)));
+        assert!(matches!(graph.take(0), NextCallback::WaitUntil(u64::MAX)));
         assert!(graph.give_back(group, name, 0), "another one waits");
         let (name, message) = take(&mut graph, 0).unwrap();
         assert_eq!(message, Some((topics[1], 1)));
@@ -282,7 +282,7 @@ mod tests {
         let mut graph = Names::new(0);
         let group = graph.add_group("timer");
         graph.add_timer(group, 100, 10);
-        assert!(matches!(graph.take(99), Next::WaitUntil(100)));
+        assert!(matches!(graph.take(99), NextCallback::WaitUntil(100)));
         // Served late by less than a period, exactly one, and more.
         for (now_ns, next_ns) in [(103, 110), (120, 120), (165, 170), (170, 180)] {
             let (name, message) = take(&mut graph, now_ns).unwrap();
@@ -298,8 +298,8 @@ mod tests {
         let group = graph.add_group("timer");
         graph.add_timer(group, 0, 10);
         let (name, _) = take(&mut graph, 0).unwrap();
-        assert!(matches!(graph.take(5), Next::WaitUntil(10)));
-        assert!(matches!(graph.take(10), Next::WaitUntil(u64::MAX)));
+        assert!(matches!(graph.take(5), NextCallback::WaitUntil(10)));
+        assert!(matches!(graph.take(10), NextCallback::WaitUntil(u64::MAX)));
         assert!(graph.give_back(group, name, 10), "it is due by now");
     }
 
@@ -309,7 +309,7 @@ mod tests {
         let group = graph.add_group("timer");
         graph.add_timer(group, 0, 10);
         graph.shut_down();
-        assert!(matches!(graph.take(0), Next::End));
+        assert!(matches!(graph.take(0), NextCallback::End));
         assert_eq!(graph.into_callbacks().collect::<Vec<_>>(), ["timer"]);
     }
 }

@@ -10,7 +10,7 @@ use std::iter;
 use std::path::Path;
 
 use crate::bench::frame::Figure;
-use crate::golden::Golden;
+use crate::golden::GoldenText;
 use tool::files;
 use tool::output::Table;
 use tool::qemu::Mode;
@@ -105,7 +105,7 @@ impl Baseline {
             (complaints, None) => Err(complaints.join("; ")),
             (_, Some(_)) => {
                 let (file, below, before) = (self.file, "", text(&before));
-                let golden = Golden {
+                let golden = GoldenText {
                     file,
                     below,
                     text: &before,

@@ -24,9 +24,9 @@ pub mod sizes;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use tool::options::{Menu, choices};
+use tool::options::{WordMenu, choices};
 
-static BENCH: Menu = Menu {
+static BENCH: WordMenu = WordMenu {
     invocation: "./scripts/bench",
     word: "WHAT",
     about: "Measures one part of the project.",

@@ -12,8 +12,8 @@ use std::process::ExitCode;
 
 use super::code::{self, Frames};
 use super::frame::by_plan;
-use tool::options::{Command, Parsed, Takes, options};
-use tool::progress::Lasting;
+use tool::options::{Arguments, Command, OptionValue, options};
+use tool::progress::ProgressNote;
 use tool::{elf, files, image};
 use views::json::Object;
 
@@ -33,7 +33,7 @@ command line is refused.
 
 options! {
     /// The app.
-    APP: Takes::Text("APP"), or "fork-join";
+    APP: OptionValue::Text("APP"), or "fork-join";
 }
 
 /// The part of code from no file of ours.
@@ -41,7 +41,7 @@ const LIBRARY: &str = "the library, and what drops values";
 
 /// Measures, and prints.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    let app = |options: &Parsed| {
+    let app = |options: &Arguments| {
         let app = options.text(name::APP).unwrap_or_default();
         image::check_app(app).map(|()| app.to_string())
     };
@@ -52,7 +52,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 /// limit.
 fn weigh(app: &str) -> Result<bool, String> {
     // Nothing is printed before there is a result.
-    let _lasting = Lasting::new("measuring");
+    let _lasting = ProgressNote::new("measuring");
     let image = image::build(app)?;
     let stripped = elf::stripped_bytes(&files::read_at(&image)?)?;
     let addresses: Vec<u64> = code::instructions(&image)?.into_keys().collect();

@@ -96,7 +96,7 @@ pub struct JobTimes {
 
 /// How the times of a case become times of the machine.
 #[derive(Clone, Copy, Debug)]
-pub struct Scale {
+pub struct TimeScale {
     /// The length of a unit, in nanoseconds.
     pub unit_ns: u64,
     /// How much less each segment executes, in nanoseconds.
@@ -140,7 +140,7 @@ impl Case {
     /// # Errors
     ///
     /// In words: a time is too long at this scale.
-    pub fn set_at(&self, scale: Scale) -> Result<Set, String> {
+    pub fn set_at(&self, scale: TimeScale) -> Result<Set, String> {
         let unit_ns = scale.unit_ns;
         let at_scale = |units: u64| {
             unit_ns.checked_mul(units).ok_or_else(|| {

@@ -36,13 +36,13 @@ use std::process::ExitCode;
 use text::Malformed;
 
 use tool::files;
-use tool::options::{Command, Menu, Refusal, Takes, choices, options};
+use tool::options::{Command, OptionValue, Refusal, WordMenu, choices, options};
 use tool::progress::Progress;
 
 /// A reader of the cases of one kind.
 type Parse<Case> = fn(&str) -> Result<Vec<Case>, Malformed>;
 
-static ORACLE: Menu = Menu {
+static ORACLE: WordMenu = WordMenu {
     invocation: "./scripts/oracle",
     word: "KIND",
     about: "Compares reference cases with what this project computes.",
@@ -75,7 +75,7 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 options! {
     /// Schedules alone, on the bare machine; with options of its own, see schedules --in-kernel
     /// --help.
-    IN_KERNEL: Takes::Nothing;
+    IN_KERNEL: OptionValue::Nothing;
 }
 
 /// Runs the subcommand.
@@ -107,7 +107,7 @@ impl<Case> FileOracle<Case> {
         let table = Command {
             invocation: self.invocation,
             about: self.about,
-            positional: Some((Takes::File("FILE..."), files)),
+            positional: Some((OptionValue::File("FILE..."), files)),
             options: self.schedules.map_or(&[], |_| OPTIONS),
             notes: NOTES,
         };

@@ -31,7 +31,7 @@ use sched_dag::{
     Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskSpec, verify,
 };
 
-use tool::options::{Command, Takes as Value, options};
+use tool::options::{Command, OptionValue as Value, options};
 use tool::progress::Progress;
 
 static TABLE: Command = Command {
@@ -59,7 +59,7 @@ options! {
 
 /// The observations of all sets.
 #[derive(Default)]
-struct Seen {
+struct ObservedResponses {
     accepted: u64,
     /// Those of them with a DAG that has no bound.
     in_part: u64,
@@ -78,7 +78,7 @@ pub(super) fn command(words: &[OsString]) -> ExitCode {
         let sets = options.number(name::SETS).unwrap_or(1_000);
         let mut seeds = options.number(name::SEED).unwrap_or(1)..;
         let mut progress = Progress::new(sets, "sets with a bound");
-        let mut seen = Seen::default();
+        let mut seen = ObservedResponses::default();
         while seen.accepted < sets
             && let Some(seed) = seeds.next()
         {
@@ -93,7 +93,7 @@ pub(super) fn command(words: &[OsString]) -> ExitCode {
     })
 }
 
-impl Seen {
+impl ObservedResponses {
     /// Draws a set, with a device or without, runs it if a DAG of it has a bound, and returns a line
     /// for each response above its own.
     fn add(&mut self, seed: u64, has_device: bool) -> Vec<String> {
@@ -134,7 +134,7 @@ impl Seen {
                 longest_ns: Vec::new(),
                 costs,
                 takes,
-                device: Device::draw(options.cores, &mut random),
+                device: InterruptingDevice::draw(options.cores, &mut random),
                 random: &mut random,
             };
             let seen_ns = machine.longest_responses_ns(until_ns);
@@ -175,7 +175,7 @@ impl Seen {
 
 /// Draws a set, a platform of up to 5 cores, and its overheads. Some subtasks keep their cores, or
 /// DAGs are in groups; an overhead is up to a fifth of the least WCET.
-fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
+fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, LargestOverheads) {
     let cores = random.within(1..=5);
     let mut specs = set(random, 1_000, &[cores]);
     let (mixed, grouped) = (random.once_in(6), random.once_in(2));
@@ -222,7 +222,7 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
         // Fewer and more than are enough for the deadline.
         spec.in_flight = random.once_in(4).then(|| random.within(1..=8));
     }
-    (specs, options, Costs { overheads, late_ns })
+    (specs, options, LargestOverheads { overheads, late_ns })
 }
 
 /// Makes a DAG slower, so that many jobs of others are released during one of it.
@@ -253,13 +253,13 @@ fn widen(spec: &mut DagSpec, random: &mut Random) {
 
 /// The largest overheads of the platform.
 #[derive(Clone, Copy, Debug)]
-struct Costs {
+struct LargestOverheads {
     overheads: Overheads,
     /// The time from a nominal release to its interrupt.
     late_ns: u64,
 }
 
-impl Costs {
+impl LargestOverheads {
     fn add_device(&mut self, random: &mut Random) {
         let takes_ns = random.within(1..=400);
         self.overheads.device_ns = takes_ns;
@@ -285,7 +285,7 @@ enum DrawnTimes {
 }
 
 /// A device, with the core that it interrupts.
-struct Device {
+struct InterruptingDevice {
     core: usize,
     /// Whether the other cores stand still, too.
     holds_all: bool,
@@ -296,7 +296,7 @@ struct Device {
     until_ns: u64,
 }
 
-impl Device {
+impl InterruptingDevice {
     fn draw(cores: u32, random: &mut Random) -> Self {
         Self {
             core: random.index(cores as usize),
@@ -320,9 +320,9 @@ struct Machine<'r> {
     queued: BTreeSet<(DagId, u64)>,
     /// Each DAG's longest response.
     longest_ns: Vec<u64>,
-    costs: Costs,
+    costs: LargestOverheads,
     takes: DrawnTimes,
-    device: Device,
+    device: InterruptingDevice,
     random: &'r mut Random,
 }
 
@@ -507,13 +507,13 @@ fn beyond(ready: &[SubtaskId]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::Seen;
+    use super::ObservedResponses;
 
     #[test]
     fn no_response_of_an_accepted_set_is_above_its_bound_with_overheads_charged() {
         // In two of these a backlog, and moves, would delay a DAG beyond what is charged otherwise.
         for (has_device, seeds) in [(false, 790..=3_200), (true, 1..=2_500)] {
-            let mut seen = Seen::default();
+            let mut seen = ObservedResponses::default();
             for seed in seeds {
                 let lines = seen.add(seed, has_device);
                 assert!(lines.is_empty(), "{lines:?}");

@@ -17,7 +17,7 @@ use sched_dag::lifecycle::{Request, WaitId, WaitLimit};
 use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, SubtaskId, TaskSet};
 
-pub use super::case::{Case, Scale, parse};
+pub use super::case::{Case, TimeScale, parse};
 
 use super::{FileOracle, equal};
 
@@ -219,7 +219,7 @@ pub fn compare_turns(
             _ => {}
         }
     }
-    let mut near = Near {
+    let mut near = TimeComparison {
         unit_ns,
         tolerance_ns,
         deviation: Deviation::default(),
@@ -260,7 +260,7 @@ pub fn compare(
     if !instances.keys().eq(case.instances.keys()) || !jobs.keys().eq(case.jobs.keys()) {
         return Err("there were other jobs or instances than the case's".to_owned());
     }
-    let mut near = Near {
+    let mut near = TimeComparison {
         unit_ns,
         tolerance_ns,
         deviation: Deviation::default(),
@@ -291,13 +291,13 @@ pub fn compare(
 }
 
 /// Compares times, and keeps the largest deviations.
-struct Near {
+struct TimeComparison {
     unit_ns: u64,
     tolerance_ns: u64,
     deviation: Deviation,
 }
 
-impl Near {
+impl TimeComparison {
     fn check(
         &mut self,
         place: impl Display,

@@ -16,7 +16,7 @@ use std::mem;
 use std::path::Path;
 
 use super::{SourceFile, none_of};
-use crate::golden::Golden;
+use crate::golden::GoldenText;
 use tool::system::workspace;
 
 /// The table, from the workspace's root.
@@ -51,7 +51,7 @@ pub(super) fn check(sources: &[SourceFile], list: Option<&Path>) -> Result<(), S
                 .get_key_value(ALL)
                 .map(|(row, all)| (row.clone(), *all)),
         );
-        Golden { file, below, text }.compare(&write(&blessed), list)?;
+        GoldenText { file, below, text }.compare(&write(&blessed), list)?;
         return none_of(complaints(&blessed, &there));
     }
     none_of(complaints(&budgets, &there))

@@ -22,7 +22,7 @@ use sched_dag::Policy;
 use tool::image;
 use tool::install;
 use tool::probe;
-use tool::progress::Lasting;
+use tool::progress::ProgressNote;
 use tool::qemu::Qemu;
 use tool::recordings;
 use tool::system;
@@ -180,7 +180,7 @@ fn cargo(sources: &[SourceFile], words: &str, remedy: &str) -> Result<(), String
     // A folder of their own, since cargo would have tests wait for them, or them for tests.
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
     command.env("CARGO_TARGET_DIR", target.join("lints"));
-    let _lasting = Lasting::new(&format!("cargo {words}"));
+    let _lasting = ProgressNote::new(&format!("cargo {words}"));
     let output = command.output();
     let output = output.map_err(|error| format!("cannot start cargo: {error}"))?;
     if output.status.success() {

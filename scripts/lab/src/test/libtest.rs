@@ -13,13 +13,13 @@ use std::time::Duration;
 
 use super::{Tally, TestPlan};
 use crate::golden;
-use tool::child::{Child, Waited};
-use tool::install::{self, Need};
-use tool::progress::Lasting;
+use tool::child::{Child, WaitEnd};
+use tool::install::{self, HostNeed};
+use tool::progress::ProgressNote;
 use tool::system;
 
 /// The programs that modules of boot tests need besides QEMU.
-const NEEDS: [(&str, &[&Need]); 4] = [
+const NEEDS: [(&str, &[&HostNeed]); 4] = [
     ("debugger::", &[&install::GDB]),
     ("on_screen::", &[&install::GRUB, &install::OVMF]),
     ("by_grub::", &[&install::GRUB, &install::OVMF]),
@@ -27,7 +27,7 @@ const NEEDS: [(&str, &[&Need]); 4] = [
 ];
 
 /// The modules of tests on the host that run the page's engine, with their programs.
-const OF_PAGE: [(&str, &Need); 2] = [
+const OF_PAGE: [(&str, &HostNeed); 2] = [
     ("in_node::", &install::NODE),
     ("in_chromium::", &install::CHROMIUM),
 ];
@@ -54,7 +54,7 @@ const BY_MORE: [(&str, Ensure); 2] = [
 /// In words: something did not compile.
 pub(super) fn compile(plan: &TestPlan) -> Result<Vec<String>, String> {
     println!("compiling the tests");
-    let _lasting = Lasting::new("compiling the tests");
+    let _lasting = ProgressNote::new("compiling the tests");
     let mut command = programs("--quiet", "boots", plan);
     let listed = system::run(command.arg("--list").stderr(Stdio::inherit()))?;
     let tests = listed.lines().filter(|line| line.ends_with(": test"));
@@ -158,14 +158,14 @@ fn leave_out(module: &str, there: Result<(), String>, command: &mut Command, tal
 /// Runs one command, and counts the results in its output.
 pub(super) fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tally) {
     let before = tally.failures.len();
-    let mut program = Program::new(name);
+    let mut program = TestProgram::new(name);
     // Cargo itself has no result.
     program.has_result = true;
     let ended = follow(plan, command, &mut |line| {
         let line = line.trim_end();
         if line.starts_with("program: ") || line.starts_with("   Doc-tests ") {
             let name = line.trim_start().trim_start_matches("program: ");
-            mem::replace(&mut program, Program::new(name)).finish(tally);
+            mem::replace(&mut program, TestProgram::new(name)).finish(tally);
         } else {
             program.read_line(plan.verbose, line, tally);
         }
@@ -190,7 +190,7 @@ fn follow(plan: &TestPlan, mut command: Command, show: &mut dyn FnMut(&str)) -> 
     // Each program has a limit of its own; this one is for doctests, and for cargo itself.
     let limit = Duration::from_secs(4 * 3600);
     match child.follow(limit, &log, show, None, |_| Some(0))?.waited {
-        Waited::Ended(status) if status.success() => {
+        WaitEnd::Ended(status) if status.success() => {
             // The file is ours; one that cannot be removed harms nothing.
             let _ = fs::remove_file(&log);
             Ok(())
@@ -201,7 +201,7 @@ fn follow(plan: &TestPlan, mut command: Command, show: &mut dyn FnMut(&str)) -> 
 
 /// A test program, and its output so far.
 #[derive(Default)]
-struct Program {
+struct TestProgram {
     name: String,
     output: String,
     /// The last list of names; before a result, it is that of the failed tests.
@@ -210,11 +210,11 @@ struct Program {
     has_result: bool,
 }
 
-impl Program {
-    fn new(name: &str) -> Program {
-        Program {
+impl TestProgram {
+    fn new(name: &str) -> TestProgram {
+        TestProgram {
             name: name.into(),
-            ..Program::default()
+            ..TestProgram::default()
         }
     }
 
@@ -266,7 +266,7 @@ impl Program {
 
 #[cfg(test)]
 mod tests {
-    use super::{Program, Tally};
+    use super::{Tally, TestProgram};
 
     const SAID: &str = "\
 running 4 tests
@@ -291,7 +291,7 @@ test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 9 filtered out; fin
     #[test]
     fn results_are_summed_and_names_kept() {
         let mut tally = Tally::default();
-        let mut program = Program::new("p: it");
+        let mut program = TestProgram::new("p: it");
         SAID.lines()
             .for_each(|line| program.read_line(false, line, &mut tally));
         // Its output is not shown here: it would count for this program's own.
@@ -307,7 +307,7 @@ test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 9 filtered out; fin
         ];
         assert_eq!(tally.skips, skips.map(String::from));
         // A program that dies without its result has failed.
-        Program::new("p: it").finish(&mut tally);
+        TestProgram::new("p: it").finish(&mut tally);
         assert_eq!(tally.failures.len(), 2);
     }
 }

@@ -31,7 +31,7 @@ use std::thread;
 use std::time::Instant;
 
 use tool::image::{self, package_name};
-use tool::options::{Command, Refusal, Takes, options};
+use tool::options::{Command, OptionValue, Refusal, options};
 use tool::{elf, files, install, system};
 
 /// The table of `test`.
@@ -39,7 +39,7 @@ pub static TEST: Command = Command {
     invocation: "./scripts/test",
     about: "Runs every test, on the host and in QEMU, and counts them.",
     positional: Some((
-        Takes::Text("FILTER"),
+        OptionValue::Text("FILTER"),
         "Run only tests and checks whose name contains this.",
     )),
     options: OPTIONS,
@@ -57,15 +57,15 @@ a FILTER by which nothing has run
 
 options! {
     /// Only what runs on the host: no guests, no images, no lints.
-    QUICK: Takes::Nothing;
+    QUICK: OptionValue::Nothing;
     /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
-    BLESS: Takes::Nothing;
+    BLESS: OptionValue::Nothing;
     /// Only tests where threads meet, under Miri of a nightly toolchain.
-    MIRI: Takes::Nothing;
+    MIRI: OptionValue::Nothing;
     /// Only runs on threads of Linux, under ThreadSanitizer of a nightly toolchain.
-    THREAD_SANITIZER: Takes::Nothing;
+    THREAD_SANITIZER: OptionValue::Nothing;
     /// Show every test by name, not only those that fail.
-    VERBOSE 'v': Takes::Nothing;
+    VERBOSE 'v': OptionValue::Nothing;
 }
 
 /// The tests to run.

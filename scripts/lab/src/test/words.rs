@@ -12,7 +12,7 @@ use std::fs;
 use std::path::Path;
 
 use super::{SourceFile, none_of};
-use crate::golden::Golden;
+use crate::golden::GoldenText;
 use tool::system::workspace;
 
 /// The table of rooms, from the workspace's root.
@@ -120,7 +120,7 @@ pub(super) fn check_rooms(sources: &[SourceFile], list: Option<&Path>) -> Result
         let head = format!("{:20} {:>7}\n", "room", "most");
         let said = head + &there.iter().map(lower).collect::<String>();
         let (file, below, text) = (TABLE, "", &*table);
-        Golden { file, below, text }.compare(&said, list)?;
+        GoldenText { file, below, text }.compare(&said, list)?;
     }
     let over = there.iter().filter_map(|(room, count)| {
         let Some(&most) = most.get(room) else {

@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use fass_dag_file::time::Time;
 use fass_dag_file::{DagFile, parse};
 
-use super::Import;
+use super::ImportSettings;
 use crate::files;
 use crate::system::workspace;
 
@@ -22,7 +22,7 @@ const LINE: &str = " # line ";
 /// # Errors
 ///
 /// The converter's lines, or the reason why it did not run.
-pub(super) fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+pub(super) fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<String>> {
     let mut convert = Command::new("timeout");
     let limit_s = import.limit_s.to_string();
     // In the foreground, or ctrl-C would not reach it.

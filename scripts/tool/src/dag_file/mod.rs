@@ -22,12 +22,12 @@ use sched_dag::{CommitOptions, CoreDivision, Policy};
 use text::{Malformed, shown};
 
 use crate::files;
-use crate::options::{Name, Parsed};
+use crate::options::{Arguments, OptionName};
 use crate::run_options::name;
 
 /// The settings for reading a file.
 #[derive(Clone, Debug)]
-pub struct Import {
+pub struct ImportSettings {
     /// The length of a unit, for formats whose numbers have none; by default the format's.
     pub unit_ns: Option<u64>,
     /// The only graph wanted of a set of task graphs.
@@ -74,7 +74,7 @@ impl Format {
 /// # Errors
 ///
 /// Lines for people, each beginning with the file and mostly the line.
-pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+pub fn load(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<String>> {
     let file = read(path, import)?;
     check_sets(path, &file, import).map(|()| file)
 }
@@ -89,7 +89,7 @@ fn located(path: &Path, faults: Vec<Malformed>) -> Vec<String> {
 }
 
 /// Reads a file as [`load`] does, without checks of its sets.
-fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<String>> {
     let place = files::shown_path(path);
     let text = files::read_text(path).map_err(|line| vec![line])?;
     let text = text.as_str();
@@ -115,7 +115,7 @@ fn read(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
 }
 
 /// Checks all sets of a file as the commit will.
-fn check_sets(path: &Path, file: &DagFile, import: &Import) -> Result<(), Vec<String>> {
+fn check_sets(path: &Path, file: &DagFile, import: &ImportSettings) -> Result<(), Vec<String>> {
     // A commit with static priorities makes all checks of one with EDF, and more.
     let options = CommitOptions::new(Policy::StaticPriority, import.cores)
         .with_clusters(import.clusters.clone());
@@ -126,7 +126,7 @@ fn check_sets(path: &Path, file: &DagFile, import: &Import) -> Result<(), Vec<St
 }
 
 /// The options that only mean something together with `--dag`.
-const COMPANIONS: [Name; 6] = [
+const COMPANIONS: [OptionName; 6] = [
     name::GRAPH,
     name::UNIT,
     name::PRINT_DAG,
@@ -154,7 +154,7 @@ pub(crate) fn states_overheads(words: &str) -> bool {
 
 /// A file that is ready to be booted.
 #[derive(Debug)]
-pub struct Prepared {
+pub struct PreparedFile {
     /// Its name.
     pub path: PathBuf,
     /// Its content.
@@ -169,7 +169,7 @@ pub struct Prepared {
     pub limit_s: u64,
 }
 
-impl Prepared {
+impl PreparedFile {
     /// Translates a guest's refusal of the file into one as of [`load`], one line a fault; `None`
     /// if it is about something else.
     pub fn translate(&self, said: &str) -> Option<String> {
@@ -183,7 +183,7 @@ impl Prepared {
 ///
 /// In lines for people: the faults of the options or of the file.
 #[allow(clippy::too_many_lines, reason = "one option after the other")]
-pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+pub fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Vec<String>> {
     let refuse = |line: String| vec![line];
     // Without a file, an option that is about one is a mistake.
     let Some(path) = options.path(name::DAG) else {
@@ -207,7 +207,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
     let length = length(options);
     let cores = options.number(name::CORES).unwrap_or(1);
-    let import = Import {
+    let import = ImportSettings {
         unit_ns,
         graph: options.text(name::GRAPH).map(String::from),
         cores: u32::try_from(cores).unwrap_or(u32::MAX),
@@ -251,7 +251,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     if !states_overheads(options.text(name::APPEND).unwrap_or_default()) {
         words.push(overheads(cores));
     }
-    Ok(Some(Prepared {
+    Ok(Some(PreparedFile {
         length,
         memory_mib,
         limit_s: limit_s.min(MOST_S),
@@ -273,7 +273,7 @@ fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
     })
 }
 
-fn length(options: &Parsed) -> Length {
+fn length(options: &Arguments) -> Length {
     match (options.number(name::SECONDS), options.number(name::JOBS)) {
         (Some(seconds), _) => Length::Span(seconds.saturating_mul(1_000_000_000)),
         (None, Some(jobs)) => Length::Jobs(jobs),

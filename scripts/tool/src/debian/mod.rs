@@ -16,9 +16,9 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::files::{self, Temporary, write};
+use crate::files::{self, TemporaryFile, write};
 use crate::install;
-use crate::progress::Lasting;
+use crate::progress::ProgressNote;
 use crate::qemu::{self, Mode, PROGRAM, file_value};
 use crate::system::{self, find_program, run};
 
@@ -56,8 +56,8 @@ pub struct Guest {
     /// The file with the output of kernel and script.
     console: PathBuf,
     /// The file with the program's exit code.
-    end: Temporary,
-    _archive: Temporary,
+    end: TemporaryFile,
+    _archive: TemporaryFile,
 }
 
 impl Guest {
@@ -69,9 +69,9 @@ impl Guest {
     /// In words: something cannot be had, or the policy does not compile.
     pub fn new(order: &GuestOrder<'_>, log: &Path) -> Result<Guest, String> {
         install::ensure_qemu()?;
-        let packages = Packages::get()?;
+        let packages = UnpackedPackages::get()?;
         let own = system::new_log("debian")?;
-        let place = |kind: &str| Temporary(Some(own.with_extension(kind)));
+        let place = |kind: &str| TemporaryFile(Some(own.with_extension(kind)));
         let (archive, end) = (place("cpio"), place("end"));
         let console = log.with_extension("console");
         files::in_folder("debian", |folder| {
@@ -132,7 +132,7 @@ impl Guest {
 
 impl GuestOrder<'_> {
     /// Lays out the guest's files in a folder.
-    fn lay_out(&self, folder: &Path, packages: &Packages) -> Result<(), String> {
+    fn lay_out(&self, folder: &Path, packages: &UnpackedPackages) -> Result<(), String> {
         let add = |name: &str, source: &Path| write(&folder.join(name), files::read_at(source)?);
         let mut words = Vec::new();
         for word in self.words {
@@ -168,7 +168,7 @@ impl GuestOrder<'_> {
 
 /// Packs a folder into an archive in cpio's format, which Linux unpacks into memory when it starts,
 /// with the folders that the script mounts. Every file is executable and root's.
-fn pack(folder: &Path, packages: &Packages, archive: &Path) -> Result<(), String> {
+fn pack(folder: &Path, packages: &UnpackedPackages, archive: &Path) -> Result<(), String> {
     const LINES: &str = "set -e; mkdir proc sys dev tmp; chmod -R 755 .
         find . | \"$0\" cpio -o -H newc -R 0:0 >\"$1\"";
     let busybox = packages.busybox();
@@ -178,8 +178,8 @@ fn pack(folder: &Path, packages: &Packages, archive: &Path) -> Result<(), String
 }
 
 /// Compiles the policy.
-fn compile(packages: &Packages, object: &Path) -> Result<(), String> {
-    let _lasting = Lasting::new("compiling the policy");
+fn compile(packages: &UnpackedPackages, object: &Path) -> Result<(), String> {
+    let _lasting = ProgressNote::new("compiling the policy");
     let mut clang = packages.command("usr/lib/llvm-19/bin/clang");
     clang.args("-target bpf -mcpu=v3 -O2 -g -Wall -Werror -D__TARGET_ARCH_x86 -c".split(' '));
     clang.arg("-I").arg(packages.root.join("usr/include"));
@@ -199,16 +199,16 @@ const TRIED: [u32; 2] = [6, 18];
 const LEAST: [u32; 2] = [6, 13];
 
 /// The packages, unpacked.
-struct Packages {
+struct UnpackedPackages {
     /// The folder that stands for a file system's root.
     root: PathBuf,
     /// The kernel.
     kernel: PathBuf,
 }
 
-impl Packages {
+impl UnpackedPackages {
     /// Makes sure that the packages are there.
-    fn get() -> Result<Packages, String> {
+    fn get() -> Result<UnpackedPackages, String> {
         let folder = system::workspace().join("target/debian");
         let parts = ["lists/partial", "cache/archives/partial", "root"];
         for part in parts.map(|part| folder.join(part)) {
@@ -228,7 +228,7 @@ impl Packages {
         let kernel = fs::read_to_string(&ready)
             .map_err(|why| format!("cannot read `{}`: {why}", ready.display()))?;
         let kernel = root.join("boot").join(kernel);
-        Ok(Packages { root, kernel })
+        Ok(UnpackedPackages { root, kernel })
     }
 
     /// Returns the dynamic loader of the packages.
@@ -300,7 +300,7 @@ fn fetch(folder: &Path) -> Result<String, String> {
          unpacked they take 500 MB",
         folder.display()
     );
-    let lasting = Lasting::new("fetching Debian's packages");
+    let lasting = ProgressNote::new("fetching Debian's packages");
     let line = |suite: &str| {
         format!("deb [arch=amd64 signed-by={KEYS}] http://deb.debian.org/debian {suite} main\n")
     };
@@ -322,7 +322,7 @@ fn fetch(folder: &Path) -> Result<String, String> {
         .current_dir(&archives)
         .args(["download", kernel]))?;
     drop(lasting);
-    let _lasting = Lasting::new("unpacking Debian's packages");
+    let _lasting = ProgressNote::new("unpacking Debian's packages");
     let files = fs::read_dir(&archives);
     let files = files.map_err(|why| format!("cannot read `{}`: {why}", archives.display()))?;
     for file in files.flatten().map(|file| file.path()) {

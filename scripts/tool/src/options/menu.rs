@@ -10,7 +10,7 @@ use super::{Refusal, nearest};
 use crate::output;
 
 /// The words to choose from.
-pub struct Menu {
+pub struct WordMenu {
     /// The command as a person types it, such as `./scripts/bench`.
     pub invocation: &'static str,
     /// The placeholder of the word in the help text, such as `WHAT`.
@@ -18,14 +18,14 @@ pub struct Menu {
     /// One or more sentences that describe the command.
     pub about: &'static str,
     /// The words, in the order of the help text.
-    pub choices: &'static [Choice],
+    pub choices: &'static [MenuWord],
     /// Further text of the help, after the words.
     pub notes: &'static str,
 }
 
 /// One of the words.
 #[derive(Debug)]
-pub struct Choice {
+pub struct MenuWord {
     /// The word.
     pub name: &'static str,
     /// A few words for the help text.
@@ -34,14 +34,14 @@ pub struct Choice {
     pub work: fn(&[OsString]) -> ExitCode,
 }
 
-/// Makes the choices of a [`Menu`]: each word with its help text and its function. A word that
+/// Makes the choices of a [`WordMenu`]: each word with its help text and its function. A word that
 /// stands twice does not compile:
 ///
 /// ```compile_fail
 /// use std::process::ExitCode;
-/// use tool::options::{Choice, choices};
+/// use tool::options::{MenuWord, choices};
 ///
-/// static DISHES: &[Choice] = choices! {
+/// static DISHES: &[MenuWord] = choices! {
 ///     "soup": "hot", |_| ExitCode::SUCCESS;
 ///     "soup": "cold", |_| ExitCode::SUCCESS;
 /// };
@@ -51,12 +51,12 @@ macro_rules! choices {
     ($($name:literal: $about:literal, $work:expr;)*) => {{
         #[deny(unreachable_patterns)]
         const _: fn(&str) -> bool = |word| matches!(word, $($name)|*);
-        &[$($crate::options::Choice { name: $name, about: $about, work: $work }),*]
+        &[$($crate::options::MenuWord { name: $name, about: $about, work: $work }),*]
     }};
 }
 pub use choices;
 
-impl Menu {
+impl WordMenu {
     /// Runs the program that offers this menu, from the folder in which a script was called.
     pub fn carry_out(&self) -> ExitCode {
         if let Some(folder) = env::var_os("TOOL_CALLED_IN") {
@@ -75,7 +75,7 @@ impl Menu {
         }
     }
 
-    fn choose(&self, words: &[OsString]) -> Result<&Choice, Refusal> {
+    fn choose(&self, words: &[OsString]) -> Result<&MenuWord, Refusal> {
         let Some(word) = words.first() else {
             let question = format!("which {}? {}", self.word, self.remedy());
             return Err(Refusal::Usage(question));
@@ -124,17 +124,17 @@ impl Menu {
 mod tests {
     use super::*;
 
-    static MENU: Menu = Menu {
+    static MENU: WordMenu = WordMenu {
         invocation: "./scripts/cook",
         word: "DISH",
         about: "Cooks.",
         choices: &[
-            Choice {
+            MenuWord {
                 name: "soup",
                 about: "hot",
                 work: |words| ExitCode::from(u8::try_from(words.len()).unwrap()),
             },
-            Choice {
+            MenuWord {
                 name: "salad",
                 about: "cold",
                 work: |_| ExitCode::SUCCESS,

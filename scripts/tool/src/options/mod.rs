@@ -11,7 +11,7 @@
 //!
 //! Words come as bytes of the operating system and need not be text. The name of a file
 //! may be anything; every other word must be UTF-8.
-//! A command line that was understood is [`Parsed`].
+//! A command line that was understood is [`Arguments`].
 
 mod menu;
 
@@ -26,9 +26,9 @@ use std::str::{self, FromStr};
 
 use text::{quoted, shown, visible};
 
-use crate::files::Named;
+use crate::files::NamedFile;
 
-pub use menu::{Choice, Menu, choices};
+pub use menu::{MenuWord, WordMenu, choices};
 pub use sched_dag::nearest;
 
 /// The exit code of a run that a person has ended early, as a shell has it for ctrl-C.
@@ -42,7 +42,7 @@ pub struct Command {
     pub about: &'static str,
     /// The positional words it takes, if any, and their help. One word, or any
     /// number if the name that stands for it ends in `...`.
-    pub positional: Option<(Takes, &'static str)>,
+    pub positional: Option<(OptionValue, &'static str)>,
     /// The options, in the order of the help text.
     pub options: &'static [Opt],
     /// Further text of the help, after the options.
@@ -94,7 +94,7 @@ impl Command {
     pub fn carry_out(
         &self,
         words: &[OsString],
-        work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
+        work: impl FnOnce(&Arguments) -> Result<ExitCode, Refusal>,
     ) -> ExitCode {
         let done = self.parse(words).and_then(|options| work(&options));
         done.unwrap_or_else(|refusal| self.report(refusal))
@@ -111,8 +111,8 @@ impl Command {
     /// # Errors
     ///
     /// The first word that the table does not allow; or the help text, if the line asks for it.
-    pub fn parse(&self, words: &[OsString]) -> Result<Parsed, Refusal> {
-        let mut parsed = Parsed {
+    pub fn parse(&self, words: &[OsString]) -> Result<Arguments, Refusal> {
+        let mut parsed = Arguments {
             options: self.options,
             given: BTreeMap::new(),
             positionals: Vec::new(),
@@ -135,8 +135,8 @@ impl Command {
                 return Err(Refusal::Usage(line));
             }
             let value = match (option.takes, attached) {
-                (Takes::Nothing, None) => OsStr::new("yes"),
-                (Takes::Nothing, Some(_)) => return Err(takes_no_value(name.as_str())),
+                (OptionValue::Nothing, None) => OsStr::new("yes"),
+                (OptionValue::Nothing, Some(_)) => return Err(takes_no_value(name.as_str())),
                 (_, Some(value)) => value,
                 // A next word that is an option is no value: the value was forgotten.
                 (_, None) => words
@@ -149,7 +149,7 @@ impl Command {
         Ok(parsed)
     }
 
-    fn take_positional(&self, parsed: &mut Parsed, word: &OsStr) -> Result<(), Refusal> {
+    fn take_positional(&self, parsed: &mut Arguments, word: &OsStr) -> Result<(), Refusal> {
         let shown = quoted(&word.to_string_lossy()).to_string();
         let Some((takes, _)) = self.positional else {
             return Err(Refusal::Usage(format!(
@@ -167,7 +167,7 @@ impl Command {
                 quoted(&first.to_string_lossy())
             )));
         }
-        if matches!(takes, Takes::Text(_)) && word.to_str().is_none() {
+        if matches!(takes, OptionValue::Text(_)) && word.to_str().is_none() {
             return Err(Refusal::Usage(format!(
                 "{shown}: a {name} must be UTF-8 text; write it so"
             )));
@@ -285,14 +285,14 @@ fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
 
 /// The name of an option, without its dashes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Name(&'static str);
+pub struct OptionName(&'static str);
 
-impl Name {
+impl OptionName {
     /// Makes the name of an option, which is ASCII; empty for a positional word.
-    pub const fn new(name: &'static [u8]) -> Name {
+    pub const fn new(name: &'static [u8]) -> OptionName {
         match str::from_utf8(name) {
-            Ok(name) => Name(name),
-            Err(_) => Name(""),
+            Ok(name) => OptionName(name),
+            Err(_) => OptionName(""),
         }
     }
 
@@ -302,7 +302,7 @@ impl Name {
     }
 }
 
-impl fmt::Display for Name {
+impl fmt::Display for OptionName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.0)
     }
@@ -325,11 +325,11 @@ pub const fn typed<const LENGTH: usize>(constant: &str) -> [u8; LENGTH] {
 #[derive(Clone, Copy, Debug)]
 pub struct Opt {
     /// The long name.
-    pub name: Name,
+    pub name: OptionName,
     /// The short form without its dash, such as `q`.
     pub short: Option<char>,
     /// The kind of value that must follow.
-    pub takes: Takes,
+    pub takes: OptionValue,
     /// The value if the option is not given; empty: none.
     pub default: &'static str,
     /// One sentence for the help text.
@@ -350,12 +350,12 @@ macro_rules! options {
     )*) => {
         /// The names of the options.
         pub(crate) mod name {
-            use $crate::options::{Name, typed};
+            use $crate::options::{OptionName, typed};
             $(
                 $(#[doc = $help])+
-                pub(crate) const $name: Name = {
+                pub(crate) const $name: OptionName = {
                     const NAME: &[u8] = &typed::<{ stringify!($name).len() }>(stringify!($name));
-                    Name::new(NAME)
+                    OptionName::new(NAME)
                 };
             )*
         }
@@ -377,7 +377,7 @@ pub use options;
 
 /// A value that follows an option.
 #[derive(Clone, Copy, Debug)]
-pub enum Takes {
+pub enum OptionValue {
     /// Nothing: the option is a flag.
     Nothing,
     /// A decimal number, from the first of these to the second.
@@ -392,28 +392,30 @@ pub enum Takes {
     File(&'static str),
 }
 
-impl Takes {
+impl OptionValue {
     /// Returns the placeholder of a value in the help text; empty for a flag.
     const fn name(self) -> &'static str {
         match self {
-            Takes::Nothing => "",
-            Takes::Number(..) => "N",
-            Takes::Numbers(..) => "N,N,...",
-            Takes::OneOf(_) => "WORD",
-            Takes::Text(what) | Takes::File(what) => what,
+            OptionValue::Nothing => "",
+            OptionValue::Number(..) => "N",
+            OptionValue::Numbers(..) => "N,N,...",
+            OptionValue::OneOf(_) => "WORD",
+            OptionValue::Text(what) | OptionValue::File(what) => what,
         }
     }
 
     /// Describes the allowed values in words.
     fn allowed(self) -> String {
         match self {
-            Takes::Nothing => "nothing".into(),
-            Takes::Number(least, most) => format!("a number from {least} to {most}"),
-            Takes::Numbers(least, most) => {
+            OptionValue::Nothing => "nothing".into(),
+            OptionValue::Number(least, most) => format!("a number from {least} to {most}"),
+            OptionValue::Numbers(least, most) => {
                 format!("numbers from {least} to {most} with commas between")
             }
-            Takes::OneOf(words) => format!("one of {}", words.join(", ")),
-            Takes::Text(what) | Takes::File(what) => format!("a {}", what.to_lowercase()),
+            OptionValue::OneOf(words) => format!("one of {}", words.join(", ")),
+            OptionValue::Text(what) | OptionValue::File(what) => {
+                format!("a {}", what.to_lowercase())
+            }
         }
     }
 }
@@ -421,9 +423,9 @@ impl Takes {
 impl Opt {
     /// A flag without a name, which the others differ from.
     pub const FLAG: Opt = Opt {
-        name: Name(""),
+        name: OptionName(""),
         short: None,
-        takes: Takes::Nothing,
+        takes: OptionValue::Nothing,
         default: "",
         help: "",
         group: "",
@@ -433,17 +435,17 @@ impl Opt {
     fn check(&self, value: &OsStr) -> Result<(), String> {
         let text = value.to_str();
         let valid = match (self.takes, text) {
-            (Takes::Nothing, _) => true,
+            (OptionValue::Nothing, _) => true,
             // A file name may be any bytes; only an empty one, from `--name=`, is a mistake.
-            (Takes::File(_), _) => !value.is_empty(),
+            (OptionValue::File(_), _) => !value.is_empty(),
             // All other values are text.
             (_, None) => false,
-            (Takes::Number(least, most), Some(text)) => is_number(text, least..=most),
-            (Takes::Numbers(least, most), Some(text)) => {
+            (OptionValue::Number(least, most), Some(text)) => is_number(text, least..=most),
+            (OptionValue::Numbers(least, most), Some(text)) => {
                 text.split(',').all(|text| is_number(text, least..=most))
             }
-            (Takes::OneOf(words), Some(text)) => words.contains(&text),
-            (Takes::Text(_), Some(text)) => !text.is_empty(),
+            (OptionValue::OneOf(words), Some(text)) => words.contains(&text),
+            (OptionValue::Text(_), Some(text)) => !text.is_empty(),
         };
         if valid {
             return Ok(());
@@ -451,7 +453,7 @@ impl Opt {
         let mut must = format!("must be {}", self.takes.allowed());
         match (self.takes, text) {
             (_, None) => must = format!("is not UTF-8 text; {must}"),
-            (Takes::OneOf(words), Some(text)) => {
+            (OptionValue::OneOf(words), Some(text)) => {
                 must += &did_you_mean(text, words);
             }
             _ => {}
@@ -465,7 +467,7 @@ impl Opt {
     fn missing(&self, is_followed: bool) -> String {
         let (name, allowed) = (self.name, self.takes.allowed());
         let remedy = match (self.takes, is_followed) {
-            (Takes::Text(_) | Takes::File(_), true) => {
+            (OptionValue::Text(_) | OptionValue::File(_), true) => {
                 format!("; one that begins with `-` is written `--{name}=VALUE`")
             }
             _ => String::new(),
@@ -490,12 +492,14 @@ impl Opt {
         let mut parts = Vec::new();
         match self.takes {
             // `u64::MAX` stands for "no upper bound"; printing it would only be noise.
-            Takes::Number(least, most) | Takes::Numbers(least, most) => parts.push(match most {
-                u64::MAX => format!("from {least}"),
-                most => format!("{least} to {most}"),
-            }),
-            Takes::OneOf(words) => parts.push(words.join(" | ")),
-            Takes::Nothing | Takes::Text(_) | Takes::File(_) => {}
+            OptionValue::Number(least, most) | OptionValue::Numbers(least, most) => {
+                parts.push(match most {
+                    u64::MAX => format!("from {least}"),
+                    most => format!("{least} to {most}"),
+                })
+            }
+            OptionValue::OneOf(words) => parts.push(words.join(" | ")),
+            OptionValue::Nothing | OptionValue::Text(_) | OptionValue::File(_) => {}
         }
         if !self.default.is_empty() {
             parts.push(format!("default {}", self.default));
@@ -521,19 +525,19 @@ fn is_number(text: &str, range: RangeInclusive<u64>) -> bool {
 
 /// A command line that was parsed and checked.
 #[derive(Clone, Debug)]
-pub struct Parsed {
+pub struct Arguments {
     options: &'static [Opt],
-    given: BTreeMap<Name, OsString>,
+    given: BTreeMap<OptionName, OsString>,
     positionals: Vec<OsString>,
 }
 
-impl Parsed {
+impl Arguments {
     /// Returns whether the person gave the option (or flag).
-    pub fn is_given(&self, name: Name) -> bool {
+    pub fn is_given(&self, name: OptionName) -> bool {
         self.given.contains_key(&name)
     }
 
-    fn value(&self, name: Name) -> Option<&OsStr> {
+    fn value(&self, name: OptionName) -> Option<&OsStr> {
         if let Some(given) = self.given.get(&name) {
             return Some(given);
         }
@@ -543,32 +547,32 @@ impl Parsed {
 
     /// Returns the option's value or default; `None` if it has neither. For one that
     /// takes a file there is [`path`](Self::path).
-    pub fn text(&self, name: Name) -> Option<&str> {
+    pub fn text(&self, name: OptionName) -> Option<&str> {
         self.value(name).and_then(OsStr::to_str)
     }
 
     /// Returns the file that the option names, or its default; `None` if it has neither.
-    pub fn path(&self, name: Name) -> Option<&Path> {
+    pub fn path(&self, name: OptionName) -> Option<&Path> {
         self.value(name).map(Path::new)
     }
 
     /// Returns the files that these options name, of those that are given or have a default.
-    pub fn named(&self, options: &[Name]) -> Vec<Named<'_>> {
+    pub fn named(&self, options: &[OptionName]) -> Vec<NamedFile<'_>> {
         let named = options.iter().filter_map(|option| {
             let path = self.path(*option)?;
             let option = option.as_str();
-            Some(Named { option, path })
+            Some(NamedFile { option, path })
         });
         named.collect()
     }
 
     /// Returns a number's value or default; `None` if it has neither.
-    pub fn number(&self, name: Name) -> Option<u64> {
+    pub fn number(&self, name: OptionName) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
     }
 
     /// Returns the numbers of a list.
-    pub fn numbers<N: FromStr>(&self, name: Name) -> Vec<N> {
+    pub fn numbers<N: FromStr>(&self, name: OptionName) -> Vec<N> {
         let words = self.text(name).into_iter().flat_map(|all| all.split(','));
         words.filter_map(|word| word.parse().ok()).collect()
     }
@@ -578,7 +582,7 @@ impl Parsed {
     /// # Errors
     ///
     /// In words, with the option and the value.
-    pub fn check_distinct(&self, options: &[Name]) -> Result<(), String> {
+    pub fn check_distinct(&self, options: &[OptionName]) -> Result<(), String> {
         for option in options {
             let mut before = Vec::new();
             for value in self.text(*option).iter().flat_map(|all| all.split(',')) {
@@ -598,9 +602,10 @@ impl Parsed {
     /// # Errors
     ///
     /// In words, with both names and the third text of the pair, such as "exclude each other".
-    pub fn check_apart(&self, pairs: &[(Name, Name, &str)]) -> Result<(), String> {
-        let both =
-            |(one, other, _): &&(Name, Name, &str)| self.is_given(*one) && self.is_given(*other);
+    pub fn check_apart(&self, pairs: &[(OptionName, OptionName, &str)]) -> Result<(), String> {
+        let both = |(one, other, _): &&(OptionName, OptionName, &str)| {
+            self.is_given(*one) && self.is_given(*other)
+        };
         match pairs.iter().find(both) {
             Some((one, other, do_what)) => {
                 Err(format!("`--{one}` and `--{other}` {do_what}; give one"))
@@ -614,18 +619,18 @@ impl Parsed {
     /// # Errors
     ///
     /// The name of one that is, and what `why` says of it.
-    pub fn check_without(&self, names: &[Name], why: &str) -> Result<(), String> {
+    pub fn check_without(&self, names: &[OptionName], why: &str) -> Result<(), String> {
         let given = self.given_of(names);
         given.map_or(Ok(()), |name| Err(format!("`--{name}` {why}")))
     }
 
     /// Returns the first of these options that is given.
-    pub fn given_of(&self, names: &[Name]) -> Option<Name> {
+    pub fn given_of(&self, names: &[OptionName]) -> Option<OptionName> {
         names.iter().copied().find(|name| self.is_given(*name))
     }
 
     /// Returns a copy of the command line with another value of an option.
-    pub fn with(&self, name: Name, value: impl AsRef<OsStr>) -> Parsed {
+    pub fn with(&self, name: OptionName, value: impl AsRef<OsStr>) -> Arguments {
         let mut other = self.clone();
         other.given.insert(name, value.as_ref().into());
         other
@@ -641,9 +646,9 @@ impl Parsed {
     /// # Errors
     ///
     /// The question: there is none.
-    pub fn file(&self, question: &str) -> Result<Named<'_>, String> {
+    pub fn file(&self, question: &str) -> Result<NamedFile<'_>, String> {
         let path = self.files().next().ok_or(question)?;
-        Ok(Named { option: "", path })
+        Ok(NamedFile { option: "", path })
     }
 
     /// Returns the files that the positional words name.

@@ -14,20 +14,20 @@ static COMMAND: Command = Command {
 
 options! {
     /// Processors of the guest.
-    CORES: Takes::Number(1, 64), or "8";
+    CORES: OptionValue::Number(1, 64), or "8";
     /// Parallel subtasks.
-    SUBTASKS: Takes::Numbers(1, 14);
+    SUBTASKS: OptionValue::Numbers(1, 14);
     /// The meaning of time.
-    MODE: Takes::OneOf(&["kvm", "deterministic", "threads"]);
+    MODE: OptionValue::OneOf(&["kvm", "deterministic", "threads"]);
     /// Keep the log.
-    SERIAL: Takes::File("FILE");
+    SERIAL: OptionValue::File("FILE");
     /// Only this.
-    ONLY: Takes::Text("NAME");
+    ONLY: OptionValue::Text("NAME");
     /// Say less.
-    QUIET 'q': Takes::Nothing;
+    QUIET 'q': OptionValue::Nothing;
 }
 
-fn parsed(line: &str) -> Parsed {
+fn parsed(line: &str) -> Arguments {
     right(&COMMAND, line)
 }
 

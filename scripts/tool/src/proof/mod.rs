@@ -34,7 +34,7 @@ use crate::files;
 use crate::output::Table;
 use observed::OfDag;
 use views::json::Object;
-use views::record::{self, Committed};
+use views::record::{self, CommittedDags};
 use views::units::shown;
 
 /// One DAG of one commit.
@@ -54,7 +54,7 @@ pub struct ProofRow {
 /// # Errors
 ///
 /// In words: a DAG was committed and not run.
-pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<ProofRow>, String> {
+pub fn rows(commits: &[CommittedDags], observed: &[OfDag]) -> Result<Vec<ProofRow>, String> {
     let mut rows = Vec::new();
     for commit in commits {
         for (number, dag) in (0..).map(DagId).zip(&commit.told.dags) {
@@ -197,7 +197,7 @@ const PARTS: [&str; 5] = [
 pub type Slack = [Option<u64>; PARTS.len()];
 
 /// Splits the bound of a DAG of a commit into its parts.
-pub fn slack(commit: &Committed, dag: DagId) -> Slack {
+pub fn slack(commit: &CommittedDags, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let task_set =
             record::task_set(settings.scheduler(), CoreDivision::Undivided, &[], dags).ok()?;
@@ -252,7 +252,7 @@ pub fn slack(commit: &Committed, dag: DagId) -> Slack {
 /// # Errors
 ///
 /// In words: nothing was committed, or a file cannot be written.
-pub fn write(path: &Path, commits: &[Committed]) -> Result<String, String> {
+pub fn write(path: &Path, commits: &[CommittedDags]) -> Result<String, String> {
     let mut names = Vec::new();
     for commit in commits {
         let path = file(path, commit.number);

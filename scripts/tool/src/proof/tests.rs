@@ -117,7 +117,7 @@ fn what_is_of_one_of_several_files_or_commits_has_its_name() {
     assert!(table(&[row]).contains("\na.dag: demo  "));
     let path = std::env::temp_dir().join(format!("witness-{}", std::process::id()));
     let first = record(9).commits.remove(0);
-    let third = Committed {
+    let third = CommittedDags {
         number: 2,
         ..first.clone()
     };

@@ -54,10 +54,10 @@ const CHUNK_BYTES: usize = 1 << 20;
 pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> {
     let header = recording.header();
     let channels = channels(header);
-    let mut file = File {
+    let mut file = WrittenFile {
         out,
         length: 0,
-        chunk: Chunk::default(),
+        chunk: MessageChunk::default(),
         chunk_indexes: Vec::new(),
         counts: BTreeMap::new(),
         times: None,
@@ -147,7 +147,7 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
 
 /// The messages of one chunk.
 #[derive(Default)]
-struct Chunk {
+struct MessageChunk {
     records: Vec<u8>,
     /// For each channel, the times of its messages and their offsets in the chunk.
     index: BTreeMap<u16, Vec<(u64, u64)>>,
@@ -162,17 +162,17 @@ fn including(times: Times, time_ns: u64) -> Times {
 }
 
 /// The part of the file that is written.
-struct File<'o> {
+struct WrittenFile<'o> {
     out: &'o mut dyn Write,
     length: u64,
-    chunk: Chunk,
+    chunk: MessageChunk,
     /// The records with the positions of the chunks.
     chunk_indexes: Vec<Vec<u8>>,
     counts: BTreeMap<u16, u64>,
     times: Times,
 }
 
-impl File<'_> {
+impl WrittenFile<'_> {
     fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.length += bytes.len() as u64;
         self.out.write_all(bytes)
@@ -209,7 +209,7 @@ impl File<'_> {
 
     /// Writes the messages so far as a chunk, with its index.
     fn end_chunk(&mut self) -> io::Result<()> {
-        let Chunk { records, index } = std::mem::take(&mut self.chunk);
+        let MessageChunk { records, index } = std::mem::take(&mut self.chunk);
         // An empty chunk would have no times.
         if records.is_empty() {
             return Ok(());
@@ -298,7 +298,7 @@ pub(super) fn write_message(
     // Writing into a `String` cannot fail.
     let _ = write!(out, "{{\"job\":{job}");
     let mut input = Decoder::new(bytes);
-    let mut values = Values {
+    let mut values = ValueWriter {
         input: &mut input,
         out,
     };
@@ -377,12 +377,12 @@ fn named(fields: &[Field]) -> impl Iterator<Item = (&str, &Schema)> {
 }
 
 /// Writes values, one behind the other.
-struct Values<'v, 'b> {
+struct ValueWriter<'v, 'b> {
     input: &'v mut Decoder<'b>,
     out: &'v mut String,
 }
 
-impl Values<'_, '_> {
+impl ValueWriter<'_, '_> {
     /// Writes a field after others, if it has a value.
     fn write_field(&mut self, name: impl Display, schema: &Schema) -> Result<(), Malformed> {
         let before = self.out.len();

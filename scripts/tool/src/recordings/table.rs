@@ -22,14 +22,14 @@ use text::quoted;
 
 use super::name;
 use crate::files;
-use crate::options::Parsed;
+use crate::options::Arguments;
 
 /// Converts a table to a recording.
 #[allow(clippy::too_many_lines, reason = "one pass over a table")]
-pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> {
+pub(super) fn convert(file: &Path, options: &Arguments) -> Result<Vec<u8>, String> {
     let text = files::read_text(file)?;
     let place = files::shown_path(file);
-    let mut rows = Rows {
+    let mut rows = TableRows {
         text: &text,
         line: 0,
     };
@@ -42,7 +42,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
             "the table is empty; the first row names the columns".into(),
         )
     })?;
-    let columns = Columns::new(&titles, options)?;
+    let columns = ColumnRoles::new(&titles, options)?;
     if let Some(title) = twice(&titles, options) {
         let title = quoted(title);
         let why = format!("there are two columns {title}; rename one, or --ignore both");
@@ -151,7 +151,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
 
 /// The roles of the columns, by their numbers.
 #[derive(Default)]
-struct Columns {
+struct ColumnRoles {
     job: Option<usize>,
     release_ns: Option<usize>,
     at_ns: Option<usize>,
@@ -160,8 +160,8 @@ struct Columns {
     names: Vec<String>,
 }
 
-impl Columns {
-    fn new(titles: &[String], options: &Parsed) -> Result<Self, String> {
+impl ColumnRoles {
+    fn new(titles: &[String], options: &Arguments) -> Result<Self, String> {
         let ignored = ignored(options);
         let unknown = ignored
             .iter()
@@ -191,20 +191,20 @@ impl Columns {
 }
 
 /// Returns the names of the columns that are left out of the values.
-fn ignored(options: &Parsed) -> Vec<&str> {
+fn ignored(options: &Arguments) -> Vec<&str> {
     let all = options.text(name::IGNORE);
     all.map_or(Vec::new(), |all| all.split(',').collect())
 }
 
 /// Returns a name that two columns share, unless it is ignored.
-fn twice<'t>(titles: &'t [String], options: &Parsed) -> Option<&'t str> {
+fn twice<'t>(titles: &'t [String], options: &Arguments) -> Option<&'t str> {
     let (ignored, mut seen) = (ignored(options), BTreeSet::new());
     let mut used = (titles.iter().map(String::as_str)).filter(|title| !ignored.contains(title));
     used.find(|title| !seen.insert(*title))
 }
 
 /// Returns the type of the values.
-fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
+fn schema(columns: &ColumnRoles, options: &Arguments) -> Result<Schema, String> {
     let Some(text) = options.text(name::TYPE) else {
         let field = |name: &String| Field {
             name: name.clone(),
@@ -246,13 +246,13 @@ fn encode(part: &Schema, cell: &str, out: &mut Vec<u8>) -> Result<(), String> {
 }
 
 /// The rows of a table (RFC 4180).
-struct Rows<'t> {
+struct TableRows<'t> {
     text: &'t str,
     /// The line on which the latest row ended, counted from 1.
     line: usize,
 }
 
-impl Iterator for Rows<'_> {
+impl Iterator for TableRows<'_> {
     type Item = Result<Vec<String>, (usize, String)>;
 
     fn next(&mut self) -> Option<Self::Item> {

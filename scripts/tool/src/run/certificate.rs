@@ -8,14 +8,14 @@ use sched_dag::analysis::{AnalysisSettings, Overheads, answer, certify};
 use sched_dag::{CommitOptions, Policy, Preemption, SchedulerOptions};
 
 use super::name;
-use crate::options::Parsed;
+use crate::options::Arguments;
 
 /// Gives a set its certificate for a run with these words, if it needs and can have one, in place of
 /// one that is of other words or another set. Returns the number of states.
 pub(super) fn give(
     set: &mut Set,
     words: &[String],
-    options: &Parsed,
+    options: &Arguments,
     length: Length,
 ) -> Option<usize> {
     let cores = u32::try_from(options.number(name::CORES).unwrap_or(1)).ok()?;

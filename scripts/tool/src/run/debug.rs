@@ -22,14 +22,14 @@ use std::time::{Duration, Instant};
 
 use text::quoted;
 
-use super::handed::Handed;
+use super::handed::HandedFiles;
 use super::loading;
 use super::{RUN, check_files, choose_app};
 use crate::child;
 use crate::files;
 use crate::image;
 use crate::install;
-use crate::options::{Command, Name, Opt, Parsed, Refusal, did_you_mean};
+use crate::options::{Arguments, Command, Opt, OptionName, Refusal, did_you_mean};
 use crate::qemu::{Mode, Qemu};
 use crate::run_options::name;
 use crate::system;
@@ -70,19 +70,19 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 
 /// The options that `run` has not.
 mod own {
-    use crate::options::{Takes, options};
+    use crate::options::{OptionValue, options};
 
     options! {
         /// Where to stop, with commas between: a function, by the end of its path
         /// (control, attitude::control), or FILE:LINE (src/dags.rs:153).
-        BREAK: Takes::Text("PLACES"), or "kernel_main";
+        BREAK: OptionValue::Text("PLACES"), or "kernel_main";
         /// Have gdb do what this file says once it has stopped, and end; no person is asked.
-        COMMANDS: Takes::File("FILE");
+        COMMANDS: OptionValue::File("FILE");
     }
 }
 
 /// Returns an option of `run`, with another default if one is given.
-fn of_run(name: Name, default: Option<&'static str>) -> Opt {
+fn of_run(name: OptionName, default: Option<&'static str>) -> Opt {
     let option = RUN.options.iter().find(|option| option.name == name);
     let option = option.expect("`run` has each of them");
     Opt {
@@ -98,7 +98,7 @@ pub fn debug(words: &[OsString]) -> ExitCode {
 }
 
 /// Starts gdb in place of this process; returns only if something fails.
-fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
+fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
     let commands = own.path(own::name::COMMANDS);
@@ -112,7 +112,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let memory_mib = loading::choose_memory(&run, None)?;
     let program = loading::choose_program(&run)?;
     install::ensure(&install::GDB)?;
-    let handed = Handed::read(&run, None)?;
+    let handed = HandedFiles::read(&run, None)?;
     let mode = run.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let mut qemu = super::describe(&run, &program, mode, memory_mib, None);
@@ -143,7 +143,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
 
 /// Returns a command line of `run` with the options that both commands have: those given, and those
 /// whose defaults differ.
-fn as_run(own: &Parsed) -> Result<Parsed, Refusal> {
+fn as_run(own: &Arguments) -> Result<Arguments, Refusal> {
     let shared = DEBUG.options.iter().map(|option| option.name);
     let shared = shared.filter(|name| RUN.options.iter().any(|option| option.name == *name));
     let shared =
@@ -359,7 +359,7 @@ mod tests {
     use super::{choose, functions, is_line};
 
     const LISTED: &str = "\nFile apps/drone/src/attitude.rs:\n\
-        78:\tfn drone::attitude::control(*mut drone::attitude::Estimate) -> [f64; 3];\n\
+        78:\tfn drone::attitude::control(*mut drone::attitude::AttitudeEstimate) -> [f64; 3];\n\
         149:\tstatic fn drone::dags::register<(a, b)>(u8);\n\
         File kernel/src/a.rs:\n1:\tfn kernel::watch::control();\n";
 

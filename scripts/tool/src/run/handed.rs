@@ -14,29 +14,32 @@ use std::path::{Path, PathBuf};
 
 use text::{quoted, shown, visible};
 
-use crate::dag_file::Prepared;
-use crate::files::{self, Named, Temporary};
-use crate::options::{Parsed, Refusal};
+use crate::dag_file::PreparedFile;
+use crate::files::{self, NamedFile, TemporaryFile};
+use crate::options::{Arguments, Refusal};
 use crate::outcome::Outcome;
 use crate::proof::observed;
-use crate::qemu::{Network, Second};
+use crate::qemu::{Network, SecondPort};
 use crate::recordings;
 use crate::run_options::name;
 use crate::system;
 use crate::wire_script;
 
 /// Files on their way to the guest.
-pub(super) struct Handed {
+pub(super) struct HandedFiles {
     /// The guest's words with the parameters and the length of each part of the module, each after
     /// a blank.
     pub(super) words: String,
     /// The file of the module, if it has any content; removed when this value is dropped.
-    module: Temporary,
+    module: TemporaryFile,
 }
 
-impl Handed {
+impl HandedFiles {
     /// Reads the files that the options name, and writes the module.
-    pub(super) fn read(options: &Parsed, dags: Option<&Prepared>) -> Result<Handed, Refusal> {
+    pub(super) fn read(
+        options: &Arguments,
+        dags: Option<&PreparedFile>,
+    ) -> Result<HandedFiles, Refusal> {
         let read = |path: &Path| observed::read(path).map_err(Refusal::Usage);
         let text = options.path(name::WCETS).map(read).transpose()?;
         let text = text.unwrap_or_default();
@@ -57,7 +60,7 @@ impl Handed {
                 ("module", parts.concat())
             }
         };
-        let mut module = Temporary(None);
+        let mut module = TemporaryFile(None);
         if dags.is_some() || !is_empty {
             let path = system::new_log("module")?.with_extension(ending);
             module.0 = Some(path.clone());
@@ -74,7 +77,7 @@ impl Handed {
                 words += &format!(" {name}={}", part.len());
             }
         }
-        Ok(Handed { words, module })
+        Ok(HandedFiles { words, module })
     }
 
     /// Returns the module that was written.
@@ -85,7 +88,7 @@ impl Handed {
 
 /// Returns the bytes of the recording for the module; none if no replay is asked for, or on Linux,
 /// where the program reads the file itself.
-fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
+fn read_replayed(options: &Arguments) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path(name::REPLAY) else {
         return Ok(Vec::new());
     };
@@ -100,12 +103,12 @@ fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
 }
 
 /// Returns the word for the guest's parameters after a blank, if some are given.
-fn parameters(options: &Parsed) -> Result<String, Refusal> {
+fn parameters(options: &Arguments) -> Result<String, Refusal> {
     let mut parts = Vec::new();
     if let Some(path) = options.path(name::PARAMS) {
         let place = files::shown_path(path);
         let option = "params";
-        let bytes = files::read_named(&Named { option, path }).map_err(Refusal::Usage)?;
+        let bytes = files::read_named(&NamedFile { option, path }).map_err(Refusal::Usage)?;
         let text = String::from_utf8_lossy(&bytes);
         parts.extend(of_file(&text).map_err(|line| Refusal::Usage(format!("{place}:{line}")))?);
     }
@@ -150,12 +153,12 @@ fn pair(text: &str) -> Option<String> {
 const STREAM: &str = "-";
 
 /// Reports whether standard input goes to the port.
-pub(super) fn is_live(options: &Parsed) -> bool {
+pub(super) fn is_live(options: &Arguments) -> bool {
     options.path(name::INPUT) == Some(Path::new(STREAM))
 }
 
 /// Returns the file that `--input` names, if it names one.
-pub(super) fn input(options: &Parsed) -> Vec<Named<'_>> {
+pub(super) fn input(options: &Arguments) -> Vec<NamedFile<'_>> {
     match is_live(options) {
         true => Vec::new(),
         false => options.named(&[name::INPUT]),
@@ -163,7 +166,7 @@ pub(super) fn input(options: &Parsed) -> Vec<Named<'_>> {
 }
 
 /// Makes sure that `--input` and `--output` go with the other options.
-pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
+pub(super) fn check(options: &Arguments) -> Result<(), Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     if is_live(options) && options.is_given(name::CONSOLE) {
         return usage(
@@ -182,7 +185,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
 }
 
 /// Returns the script for the guest from the file that `--input` names; empty if it names none.
-fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
+fn script(options: &Arguments) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path(name::INPUT).filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
     };
@@ -211,16 +214,16 @@ fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
 }
 
 /// Returns the other end of the second serial port, if `--input` or `--output` is given.
-pub(super) fn second(options: &Parsed) -> Option<Second> {
+pub(super) fn second(options: &Arguments) -> Option<SecondPort> {
     let output = options.path(name::OUTPUT).map(PathBuf::from);
-    (output.is_some() || options.is_given(name::INPUT)).then(|| Second {
+    (output.is_some() || options.is_given(name::INPUT)).then(|| SecondPort {
         is_live: is_live(options),
         output,
     })
 }
 
 /// Returns the network, if `--net` is given.
-pub(super) fn network(options: &Parsed) -> Option<Network> {
+pub(super) fn network(options: &Arguments) -> Option<Network> {
     let words = options.text(name::NET)?.into();
     // Without the program by which a firmware would boot from the network.
     let card = match options.text(name::CARD) {
@@ -236,7 +239,7 @@ pub(super) fn network(options: &Parsed) -> Option<Network> {
 }
 
 /// Returns a warning if `--output` is given but the app has no wire, so that nothing was sent.
-pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
+pub(super) fn warning(options: &Arguments, outcome: &Outcome) -> Option<String> {
     let file = options.path(name::OUTPUT).map(files::shown_path)?;
     let has_wire = outcome.transcript.of_kind("wire").next().is_some();
     (!has_wire).then(|| format!("{file}: the app has connected no wire, and so it is empty"))
@@ -255,7 +258,7 @@ mod tests {
         let demo = workspace().join("apps/dag-file/examples/demo.dag");
         let options = right(&RUN, "--jobs 3").with(name::DAG, demo);
         let dags = prepare(&options).unwrap().unwrap();
-        let handed = Handed::read(&options, Some(&dags)).unwrap();
+        let handed = HandedFiles::read(&options, Some(&dags)).unwrap();
         let module = handed.module().unwrap();
         assert_eq!(fs::read_to_string(&module).unwrap(), dags.file.to_string());
         drop(handed);
@@ -299,7 +302,7 @@ mod tests {
             ("--input - --output b", Some((true, Some("b")))),
             ("--output b", Some((false, Some("b")))),
         ] {
-            let expected = expected.map(|(is_live, output)| Second {
+            let expected = expected.map(|(is_live, output)| SecondPort {
                 is_live,
                 output: output.map(Into::into),
             });

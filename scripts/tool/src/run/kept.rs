@@ -14,14 +14,14 @@ use std::path::{Path, PathBuf};
 
 use recording::{Chunk, Header, Recording, Writer};
 
-use super::page::Server;
-use super::screen::Screen;
-use super::{Booted, handed};
-use crate::files::{self, Temporary};
-use crate::options::{Name, Parsed, Refusal};
+use super::page::PageServer;
+use super::screen::LineOutputs;
+use super::{EndedRun, handed};
+use crate::files::{self, TemporaryFile};
+use crate::options::{Arguments, OptionName, Refusal};
 use crate::outcome::Outcome;
-use crate::page::{self, Content};
-use crate::qemu::Ending;
+use crate::page::{self, PageFiles};
+use crate::qemu::QemuEnd;
 use crate::recordings;
 use crate::run_options::name;
 use crate::system;
@@ -33,24 +33,24 @@ use views::record::Record;
 const PASSING: [&str; 3] = ["progress", "record", "status"];
 
 /// The options that name a file for the record.
-const FILES: [Name; 2] = [name::KEEP, name::TRACE];
+const FILES: [OptionName; 2] = [name::KEEP, name::TRACE];
 
 /// The buffer in KiB for values that wait for the background to send them.
 const ROOM_KIB: &str = "1024";
 
 /// The files that a boot keeps.
-pub(super) struct Kept {
+pub(super) struct KeptFiles {
     /// The file that takes the bytes as they arrive.
-    raw: Temporary,
+    raw: TemporaryFile,
     app: String,
     /// The guest's word for the wanted kind of record; `None`: none is wanted.
     word: Option<&'static str>,
     /// The server of the page, if one is wanted.
-    server: Option<&'static Server>,
+    server: Option<&'static PageServer>,
 }
 
 /// Returns the guest's word for the kind of record that the options want.
-pub(super) fn word(options: &Parsed) -> Option<&'static str> {
+pub(super) fn word(options: &Arguments) -> Option<&'static str> {
     // A full record has the events, too, so it prevails over the views.
     match options.given_of(&[name::KEEP, name::PAGE]) {
         Some(_) => Some("keep"),
@@ -60,16 +60,16 @@ pub(super) fn word(options: &Parsed) -> Option<&'static str> {
     }
 }
 
-impl Kept {
-    pub(super) fn new(options: &Parsed, app: &str) -> Result<Self, String> {
+impl KeptFiles {
+    pub(super) fn new(options: &Arguments, app: &str) -> Result<Self, String> {
         let path = system::new_log(app)?.with_extension("sent");
         let server = options.is_given(name::PAGE).then(|| {
-            let page = page::html(&Content::default(), true)?;
-            Server::start(page, &path)
+            let page = page::html(&PageFiles::default(), true)?;
+            PageServer::start(page, &path)
         });
         Ok(Self {
             server: server.transpose()?,
-            raw: Temporary(Some(path)),
+            raw: TemporaryFile(Some(path)),
             app: app.into(),
             word: word(options),
         })
@@ -81,7 +81,7 @@ impl Kept {
     }
 
     /// Says where the record can be read while the run goes on.
-    pub(super) fn introduce(&self, screen: &Screen) {
+    pub(super) fn introduce(&self, screen: &LineOutputs) {
         if let Some(server) = &self.server {
             // Not by the screen, for which `--quiet` holds: without the address it is of no use.
             eprintln!("page: http://127.0.0.1:{}/", server.port);
@@ -120,9 +120,13 @@ impl Kept {
     }
 
     /// Writes the record to the files that the options name. Returns lines that announce them.
-    pub(super) fn write(&self, options: &Parsed, outcome: &Outcome) -> Result<Vec<String>, String> {
+    pub(super) fn write(
+        &self,
+        options: &Arguments,
+        outcome: &Outcome,
+    ) -> Result<Vec<String>, String> {
         // A refused command line: nothing has run, and an older file must stay as it is.
-        if outcome.ending == Ending::Guest(Status::Usage) {
+        if outcome.ending == QemuEnd::Guest(Status::Usage) {
             return Ok(Vec::new());
         }
         // Bytes without being asked for are those of a crash.
@@ -145,7 +149,7 @@ impl Kept {
         let values = Recording::read(&bytes).is_ok_and(|of| of.count() > 0 && of.lost() == 0);
         let is_replayed = values && !options.is_given(name::DAG);
         let [check, trace, show] = ["check-trace", "trace", "recording"].map(system::script);
-        let announce = |(name, path): (Name, &Path)| {
+        let announce = |(name, path): (OptionName, &Path)| {
             files::write_named(name.as_str(), path, &bytes)?;
             let file = files::shown_path(path);
             let shown = format!("`{show} {file}` shows what is recorded");
@@ -295,12 +299,12 @@ fn but_for(bytes: &[u8]) -> String {
 /// Writes the files that the options want of a run, and announces them. Of a run that failed only
 /// the record is written, and views of the commit if a bound was exceeded.
 pub(super) fn write(
-    options: &Parsed,
-    kept: &Kept,
+    options: &Arguments,
+    kept: &KeptFiles,
     mut outcome: Outcome,
-    log: Log,
-    screen: Screen,
-) -> Result<Booted, Refusal> {
+    log: SerialLog,
+    screen: LineOutputs,
+) -> Result<EndedRun, Refusal> {
     kept.receive(&mut outcome)?;
     for line in kept.write(options, &outcome)? {
         screen.say(&line);
@@ -318,7 +322,7 @@ pub(super) fn write(
             "page: nobody has opened it; `--keep X`, then `{page} X` shows a run"
         ));
     }
-    Ok(Booted {
+    Ok(EndedRun {
         outcome,
         log,
         screen,
@@ -326,7 +330,7 @@ pub(super) fn write(
 }
 
 /// The serial log of a run.
-pub(super) struct Log {
+pub(super) struct SerialLog {
     pub(super) path: PathBuf,
     /// Whether the person has named it.
     stays: bool,
@@ -335,7 +339,7 @@ pub(super) struct Log {
 }
 
 /// Makes sure that the named log can be read back while it is written.
-pub(super) fn check(options: &Parsed) -> Result<(), String> {
+pub(super) fn check(options: &Arguments) -> Result<(), String> {
     let is_other = |path: &&Path| fs::metadata(path).is_ok_and(|data| !data.is_file());
     options
         .path(name::SERIAL)
@@ -349,13 +353,13 @@ pub(super) fn check(options: &Parsed) -> Result<(), String> {
         })
 }
 
-impl Log {
+impl SerialLog {
     /// Chooses the log's path. The file is made when the guest starts.
-    pub(super) fn choose(options: &Parsed, app: &str) -> Result<Log, String> {
+    pub(super) fn choose(options: &Arguments, app: &str) -> Result<SerialLog, String> {
         let named = options.path(name::SERIAL).map(Path::to_path_buf);
         let stays = named.is_some();
         let path = named.map_or_else(|| system::new_log(app), Ok)?;
-        Ok(Log {
+        Ok(SerialLog {
             before: fs::read(&path).ok(),
             path,
             stays,

@@ -2,22 +2,22 @@
 
 use std::path::PathBuf;
 
-use crate::dag_file::Prepared;
+use crate::dag_file::PreparedFile;
 use crate::files;
 use crate::install;
-use crate::options::{Parsed, Refusal};
+use crate::options::{Arguments, Refusal};
 use crate::qemu::{Loader, Machine, Mode, PROGRAM};
 use crate::run_options::name;
 use crate::system;
 
 /// Returns the loader that the options choose.
-pub(super) fn chosen(options: &Parsed) -> Loader {
+pub(super) fn chosen(options: &Arguments) -> Loader {
     let named = options.text(name::BOOT).and_then(Loader::from_name);
     named.unwrap_or(Loader::Pvh)
 }
 
 /// Returns what needs a PC, if the options ask for such a thing.
-fn needs_pc(options: &Parsed) -> Option<(&'static str, &'static str)> {
+fn needs_pc(options: &Arguments) -> Option<(&'static str, &'static str)> {
     let stick = ("no firmware that boots from a stick", "boot");
     let boots = chosen(options).needs_stick().then_some(stick);
     let device = ("no PCI, which `--device` needs", "device");
@@ -28,7 +28,7 @@ fn needs_pc(options: &Parsed) -> Option<(&'static str, &'static str)> {
 }
 
 /// Returns the board that the options choose, or what they need.
-pub(super) fn machine(options: &Parsed) -> Machine {
+pub(super) fn machine(options: &Arguments) -> Machine {
     if needs_pc(options).is_some() {
         return Machine::Q35;
     }
@@ -41,7 +41,7 @@ pub(super) fn machine(options: &Parsed) -> Machine {
 /// # Errors
 ///
 /// In words: it does not.
-pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> {
+pub(super) fn check(options: &Arguments, mode: Option<Mode>) -> Result<(), String> {
     let loader = chosen(options);
     let microvm = Machine::Microvm.name();
     // Only a board that the person has named: the default gives way.
@@ -71,7 +71,10 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
 
 /// Chooses the memory in MiB: the person's choice or the usual amount, in both cases enough for the
 /// stacks and tables of that many processors.
-pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
+pub(super) fn choose_memory(
+    options: &Arguments,
+    dags: Option<&PreparedFile>,
+) -> Result<u64, Refusal> {
     let cores = options.number(name::CORES).unwrap_or(1);
     let loader = chosen(options);
     let bytes = |name| {
@@ -107,7 +110,7 @@ pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result
 }
 
 /// Finds the QEMU to use; installs one if none is named and none is there.
-pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
+pub(super) fn choose_program(options: &Arguments) -> Result<PathBuf, Refusal> {
     if let Some(named) = options.path(name::QEMU) {
         return system::find_program(named).ok_or_else(|| {
             let place = files::shown_path(named);

@@ -16,9 +16,9 @@ use fass_dag_file::{DagFile, Length, Set};
 use super::several::{FOR_ONE_FILE, worst};
 use super::{certificate, name, on_linux, prepare, words};
 use crate::dag_file::translate;
-use crate::files::{self, Temporary};
+use crate::files::{self, TemporaryFile};
 use crate::image;
-use crate::options::{Parsed, Refusal};
+use crate::options::{Arguments, Refusal};
 use crate::program::{self, ProgramOrder};
 use crate::progress::Progress;
 use crate::system;
@@ -44,7 +44,7 @@ struct PartRows {
 const SHARE: usize = 16;
 
 /// Runs all sets of the files, and prints the table.
-pub(super) fn run(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
+pub(super) fn run(options: &Arguments, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let why = "is for one set; name a file of one with `--dag`";
     let apart = [&FOR_ONE_FILE[..], &[name::KEEP, name::JSON]].concat();
     let for_several = options.check_without(&apart, why);
@@ -84,7 +84,7 @@ pub(super) fn run(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refus
 
 /// Reads all files. Returns their sets, the words for the program, and the length of a run.
 fn read<'f>(
-    options: &Parsed,
+    options: &Arguments,
     files: &'f [PathBuf],
 ) -> Result<(Vec<Part<'f>>, Vec<String>, Length), Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files read");
@@ -113,7 +113,7 @@ fn read<'f>(
 /// may take `seconds`.
 fn run_share(
     program: &Path,
-    (words, options, length): (&[String], &Parsed, Length),
+    (words, options, length): (&[String], &Arguments, Length),
     seconds: u64,
     share: &[Part<'_>],
 ) -> Result<Vec<PartRows>, String> {
@@ -127,8 +127,8 @@ fn run_share(
     let mut ends = Vec::new();
     while ends.len() < texts.len() {
         let left = &texts[ends.len()..];
-        let log = Temporary(Some(system::new_log("dag-file")?));
-        let module = Temporary(Some(log.path().with_extension("dags")));
+        let log = TemporaryFile(Some(system::new_log("dag-file")?));
+        let module = TemporaryFile(Some(log.path().with_extension("dags")));
         files::write(module.path(), left.join("\x0c"))?;
         let mut word = OsString::from("module=");
         word.push(module.path());

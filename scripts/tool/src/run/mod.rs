@@ -27,20 +27,20 @@ use std::time::Duration;
 
 use text::quoted;
 
-use crate::child::Asked;
-use crate::dag_file::{self, Prepared};
+use crate::child::EndReason;
+use crate::dag_file::{self, PreparedFile};
 use crate::files;
 use crate::image;
 use crate::install;
 use crate::medium;
-use crate::options::{BY_PERSON, Name, Parsed, Refusal};
+use crate::options::{Arguments, BY_PERSON, OptionName, Refusal};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
-use crate::qemu::{Ending, Mode, Qemu};
+use crate::qemu::{Mode, Qemu, QemuEnd};
 use crate::run_options::{GUEST_WORDS, name};
-use handed::Handed;
-use kept::{Kept, Log};
-use screen::Screen;
+use handed::HandedFiles;
+use kept::{KeptFiles, SerialLog};
+use screen::LineOutputs;
 use views::protocol::{Status, Transcript};
 
 pub use crate::run_options::RUN;
@@ -48,7 +48,7 @@ pub use boot::boot;
 pub use debug::debug;
 
 /// Options that exclude each other in one run that is not observed.
-const APART: [(Name, Name, &str); 4] = [
+const APART: [(OptionName, OptionName, &str); 4] = [
     (
         name::DAG,
         name::MODULE,
@@ -64,7 +64,7 @@ pub fn run(words: &[OsString]) -> ExitCode {
     RUN.carry_out(words, attempt)
 }
 
-fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
+fn attempt(options: &Arguments) -> Result<ExitCode, Refusal> {
     // First: the default number of cores depends on the platform.
     let options = &on_linux::settle(options)?;
     if !options.is_given(name::REPLAY) {
@@ -105,12 +105,12 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
 }
 
 /// Reads the file that `--dag` names, if there is one.
-fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
+fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Refusal> {
     dag_file::prepare(options).map_err(|lines| Refusal::Usage(lines.join("\n")))
 }
 
 /// Gives the sets of a file certificates, and tells so.
-fn certified(options: &Parsed, mut dags: Prepared) -> Prepared {
+fn certified(options: &Arguments, mut dags: PreparedFile) -> PreparedFile {
     let words = words(options, Some(&dags), on_linux::own_words(options));
     for set in &mut dags.file.sets {
         let states = certificate::give(set, &words, options, dags.length);
@@ -124,7 +124,7 @@ fn certified(options: &Parsed, mut dags: Prepared) -> Prepared {
 }
 
 /// Makes sure of all files that the options name, before any is opened.
-fn check_files(options: &Parsed) -> Result<(), Refusal> {
+fn check_files(options: &Arguments) -> Result<(), Refusal> {
     handed::check(options)?;
     let names = [
         name::DAG,
@@ -144,14 +144,18 @@ fn check_files(options: &Parsed) -> Result<(), Refusal> {
 }
 
 /// A run that has ended in any way.
-struct Booted {
+struct EndedRun {
     outcome: Outcome,
-    log: Log,
-    screen: Screen,
+    log: SerialLog,
+    screen: LineOutputs,
 }
 
 /// Boots the app that the options name; `shows` says whether its lines are shown.
-fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Booted, Refusal> {
+fn boot_app(
+    options: &Arguments,
+    dags: Option<&PreparedFile>,
+    shows: bool,
+) -> Result<EndedRun, Refusal> {
     let app = choose_app(options, dags.is_some())?;
     if on_linux::is_asked_for(options) {
         return on_linux::run_app(options, &app, dags, shows);
@@ -163,8 +167,8 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     // May install packages, so it comes after the checks of the loader.
     install::ensure_loader(loading::chosen(options))?;
 
-    let handed = Handed::read(options, dags)?;
-    let kept = Kept::new(options, &app)?;
+    let handed = HandedFiles::read(options, dags)?;
+    let kept = KeptFiles::new(options, &app)?;
     let describe = |mode| {
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &handed.words;
@@ -179,7 +183,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     if longest.loader.needs_stick() {
         medium::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
     }
-    let log = Log::choose(options, &app)?;
+    let log = SerialLog::choose(options, &app)?;
     let image = match options.path(name::IMAGE) {
         Some(path) => path.into(),
         None => image::build(&app)?,
@@ -193,7 +197,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let (mode, why) = chosen?;
     let qemu = describe(mode);
     let limit = limit(options, dags);
-    let mut screen = Screen::new(options, &image);
+    let mut screen = LineOutputs::new(options, &image);
     introduce(&screen, &app, &qemu, why);
     kept.introduce(&screen);
     let show = |line: &str| {
@@ -212,7 +216,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
 
 /// Returns the app to run: the one that the options name (a given image must be of it), or else the
 /// one that the image names.
-fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
+fn choose_app(options: &Arguments, is_dag_file: bool) -> Result<String, Refusal> {
     let app = match is_dag_file {
         true => "dag-file",
         false => options.text(name::APP).unwrap_or_default(),
@@ -247,11 +251,11 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
 }
 
 fn describe(
-    options: &Parsed,
+    options: &Arguments,
     program: &Path,
     mode: Mode,
     memory_mib: u64,
-    dags: Option<&Prepared>,
+    dags: Option<&PreparedFile>,
 ) -> Qemu {
     let words = words(options, dags, screen::guest_words(options)).join(" ");
     // Emulated cores take much longer than their instructions say, and no budget is for that.
@@ -281,7 +285,7 @@ fn describe(
 
 /// Returns the guest's words: those of the options, then those of the platform, and last the
 /// person's own.
-fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<String> {
+fn words(options: &Arguments, dags: Option<&PreparedFile>, own: Vec<String>) -> Vec<String> {
     let mut words = Vec::new();
     for name in GUEST_WORDS.iter().copied() {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
@@ -296,7 +300,7 @@ fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<Str
 
 /// Returns the time limit: the person's, or two minutes and a second for each job, which is
 /// generous also where a job takes its real time. A DAG file states its own.
-fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
+fn limit(options: &Arguments, dags: Option<&PreparedFile>) -> Duration {
     let jobs = options.number(name::JOBS).unwrap_or(200);
     let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
     let seconds = options.number(name::TIMEOUT).unwrap_or(usual);
@@ -309,12 +313,12 @@ fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
 }
 
 /// Reports whether somebody sends while the guest runs.
-fn is_live(options: &Parsed) -> bool {
+fn is_live(options: &Arguments) -> bool {
     options.is_given(name::CONSOLE) || handed::is_live(options)
 }
 
 /// Prints the app, its guest, and how far the times can be trusted.
-fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
+fn introduce(screen: &LineOutputs, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
     screen.say(&format!(
         "mode {}, machine {}, booted by {}, {} cores, {} MiB of memory",
@@ -334,13 +338,13 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
 }
 
 /// Reports how a run has ended, and returns the exit code.
-fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitCode {
-    let Booted {
+fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments) -> ExitCode {
+    let EndedRun {
         outcome,
         log,
         screen,
     } = booted;
-    let by_person = outcome.asked == Some(Asked::ByPerson);
+    let by_person = outcome.asked == Some(EndReason::ByPerson);
     let Err(fault) = outcome.judge() else {
         let (how, code) = match by_person {
             true => ("ended by ctrl-C, in order,", ExitCode::from(BY_PERSON)),
@@ -383,12 +387,12 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         Err(_) => eprint!("{}", outcome.tail()),
     }
     let remedy = match outcome.ending {
-        Ending::TimedOut { .. } => format!(
+        QemuEnd::TimedOut { .. } => format!(
             "{}; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
              if it has a WCET or a budget",
             stalled(&outcome.transcript)
         ),
-        Ending::Guest(Status::Success) if matches!(outcome.asked, Some(Asked::ByLimit(_))) => {
+        QemuEnd::Guest(Status::Success) if matches!(outcome.asked, Some(EndReason::ByLimit(_))) => {
             "; `--timeout SECONDS` gives it longer".into()
         }
         _ => String::new(),
@@ -403,9 +407,9 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
 }
 
 /// Returns an error that stops a series of runs if a person has ended this one.
-fn go_on(booted: &Booted) -> Result<(), Refusal> {
+fn go_on(booted: &EndedRun) -> Result<(), Refusal> {
     match booted.outcome.asked {
-        Some(Asked::ByPerson) => Err(Refusal::ByPerson),
+        Some(EndReason::ByPerson) => Err(Refusal::ByPerson),
         _ => Ok(()),
     }
 }

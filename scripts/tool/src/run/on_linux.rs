@@ -7,21 +7,21 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::handed::{self, Handed};
-use super::kept::{self, Kept, Log};
-use super::screen::Screen;
-use super::{Booted, limit};
+use super::handed::{self, HandedFiles};
+use super::kept::{self, KeptFiles, SerialLog};
+use super::screen::LineOutputs;
+use super::{EndedRun, limit};
 
-use crate::dag_file::Prepared;
+use crate::dag_file::PreparedFile;
 use crate::debian::{Guest, GuestOrder};
 use crate::image;
-use crate::options::{Name, Parsed, Refusal};
+use crate::options::{Arguments, OptionName, Refusal};
 use crate::program;
-use crate::qemu::{self, Ending, Mode};
+use crate::qemu::{self, Mode, QemuEnd};
 use crate::run_options::name;
 
 /// Options that concern QEMU, its guest, or the bare-metal kernel alone.
-const FOREIGN: [Name; 10] = [
+const FOREIGN: [OptionName; 10] = [
     name::BOOT,
     name::DEVICE,
     name::NET,
@@ -35,7 +35,7 @@ const FOREIGN: [Name; 10] = [
 ];
 
 /// Options that `--on debian` cannot pass on to its guest, and options only for that guest.
-const NOT_IN_GUEST: [Name; 6] = [
+const NOT_IN_GUEST: [OptionName; 6] = [
     name::CONSOLE,
     name::INPUT,
     name::KEEP,
@@ -43,10 +43,10 @@ const NOT_IN_GUEST: [Name; 6] = [
     name::PAGE,
     name::REPLAY,
 ];
-const ONLY_IN_GUEST: [Name; 2] = [name::MODE, name::BUSY];
+const ONLY_IN_GUEST: [OptionName; 2] = [name::MODE, name::BUSY];
 
 /// Options that virtual time has no use for, besides those of the bare machine.
-const NOT_ON_HOST: [Name; 11] = [
+const NOT_ON_HOST: [OptionName; 11] = [
     name::BUSY,
     name::CONSOLE,
     name::IMAGE,
@@ -64,22 +64,22 @@ const NOT_ON_HOST: [Name; 11] = [
 const START: Duration = Duration::from_secs(120);
 
 /// Reports whether the options ask for Linux, or for a program of this computer at least.
-pub(super) fn is_asked_for(options: &Parsed) -> bool {
+pub(super) fn is_asked_for(options: &Arguments) -> bool {
     options.text(name::ON) != Some("machine")
 }
 
 /// Reports whether the options ask for virtual time.
-pub(super) fn is_on_host(options: &Parsed) -> bool {
+pub(super) fn is_on_host(options: &Arguments) -> bool {
     options.text(name::ON) == Some("host")
 }
 
 /// Reports whether that Linux runs as a guest, in QEMU.
-fn is_in_guest(options: &Parsed) -> bool {
+fn is_in_guest(options: &Arguments) -> bool {
     options.text(name::ON) == Some("debian")
 }
 
 /// Refuses options that Linux does not have, and settles the number of cores.
-pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
+pub(super) fn settle(options: &Arguments) -> Result<Arguments, Refusal> {
     if !is_asked_for(options) {
         // The reverse case: options of Linux on the bare machine.
         let why = "is for Linux; leave it out, or give `--on linux` or `--on debian`";
@@ -120,7 +120,7 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     Ok(options.with(name::CORES, usual.min(there).to_string()))
 }
 
-fn settle_host(options: &Parsed) -> Result<Parsed, String> {
+fn settle_host(options: &Arguments) -> Result<Arguments, String> {
     options.check_without(
         &NOT_ON_HOST,
         "is not for virtual time; leave it or `--on host` out",
@@ -139,22 +139,22 @@ const GUEST_CORES: &str = "4";
 /// Builds the app's program and runs it as the options say.
 #[allow(clippy::too_many_lines, reason = "the steps of a run, in order")]
 pub(super) fn run_app(
-    options: &Parsed,
+    options: &Arguments,
     app: &str,
-    dags: Option<&Prepared>,
+    dags: Option<&PreparedFile>,
     shows: bool,
-) -> Result<Booted, Refusal> {
+) -> Result<EndedRun, Refusal> {
     let given = options.path(name::IMAGE);
     if given.is_none() {
         image::check_linux(app).map_err(Refusal::Usage)?;
     }
-    let handed = Handed::read(options, dags)?;
+    let handed = HandedFiles::read(options, dags)?;
     let mut words: Vec<OsString> = super::words(options, dags, own_words(options))
         .iter()
         .map(OsString::from)
         .collect();
     words.extend(qemu::words(&handed.words));
-    let kept = Kept::new(options, app)?;
+    let kept = KeptFiles::new(options, app)?;
     let replayed = options.path(name::REPLAY).map(Path::to_path_buf);
     // As bytes: the name of a file need not be UTF-8.
     for (name, path) in [("module=", handed.module()), ("replay=", replayed)] {
@@ -172,13 +172,13 @@ pub(super) fn run_app(
         word.push(path);
         words.push(word);
     }
-    let log = Log::choose(options, app)?;
+    let log = SerialLog::choose(options, app)?;
     let image = match given {
         Some(path) => path.into(),
         None if is_on_host(options) => image::build_host()?,
         None => image::build_linux(app, None)?,
     };
-    let mut screen = Screen::new(options, &image);
+    let mut screen = LineOutputs::new(options, &image);
     let mode = options.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let guest = is_in_guest(options).then(|| {
@@ -238,7 +238,7 @@ pub(super) fn run_app(
     screen.wipe();
     let mut outcome = outcome?;
     // If Linux itself failed, the app's log is empty; the console of the guest tells why.
-    if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
+    if let (Some(guest), QemuEnd::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
     kept::write(options, &kept, outcome, log, screen)
@@ -246,10 +246,10 @@ pub(super) fn run_app(
 
 /// Prints which program is run and how far its times can be trusted.
 fn introduce(
-    screen: &Screen,
+    screen: &LineOutputs,
     app: &str,
     words: &[OsString],
-    options: &Parsed,
+    options: &Arguments,
     guest: Option<Mode>,
 ) {
     let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
@@ -284,7 +284,7 @@ fn meaning(mode: Mode) -> &'static str {
 }
 
 /// Returns the words that only a program of this computer gets.
-pub(super) fn own_words(options: &Parsed) -> Vec<String> {
+pub(super) fn own_words(options: &Arguments) -> Vec<String> {
     let mut words = Vec::new();
     for name in [name::CORES, name::MECHANISM, name::OUTPUT] {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));

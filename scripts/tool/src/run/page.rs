@@ -40,7 +40,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(10);
 const UNBROKEN: &str = "no thread panics with it";
 
 /// A server, which lives until the program ends.
-pub(super) struct Server {
+pub(super) struct PageServer {
     pub(super) port: u16,
     page: String,
     /// The file of the growing record.
@@ -52,18 +52,18 @@ pub(super) struct Server {
     taken: Mutex<(Option<Instant>, usize)>,
 }
 
-impl Server {
+impl PageServer {
     /// Serves a page, and the record in `raw`.
     ///
     /// # Errors
     ///
     /// In words: there is no port.
-    pub(super) fn start(page: String, raw: &Path) -> Result<&'static Server, String> {
+    pub(super) fn start(page: String, raw: &Path) -> Result<&'static PageServer, String> {
         let bound = TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
         let bound = bound.and_then(|listener| Ok((listener.local_addr()?.port(), listener)));
         let no_port = |why| format!("`--page` finds no port of 127.0.0.1: {why}");
         let (port, listener) = bound.map_err(no_port)?;
-        let server: &Server = Box::leak(Box::new(Server {
+        let server: &PageServer = Box::leak(Box::new(PageServer {
             port,
             page,
             raw: raw.into(),
@@ -172,7 +172,7 @@ mod tests {
     use std::fs;
 
     /// Asks a server; returns the head of the answer, and its content.
-    fn ask(server: &Server, request: &str) -> (String, Vec<u8>) {
+    fn ask(server: &PageServer, request: &str) -> (String, Vec<u8>) {
         let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, server.port)).unwrap();
         let request = request.replace("PORT", &server.port.to_string()) + "\n\n";
         stream.write_all(request.as_bytes()).unwrap();
@@ -198,7 +198,7 @@ GET /../Cargo.toml HTTP/1.1\nHost: localhost:PORT | 404 Not Found";
 
     #[test]
     fn only_requests_of_this_host_for_one_of_two_routes_are_answered() {
-        let server = Server::start("the page".into(), Path::new("no file")).unwrap();
+        let server = PageServer::start("the page".into(), Path::new("no file")).unwrap();
         for [request, status, expected] in rows(REQUESTS) {
             let (head, content) = ask(server, &request);
             let is_status = head.starts_with(&format!("HTTP/1.1 {status}\r\n"));
@@ -213,7 +213,7 @@ GET /../Cargo.toml HTTP/1.1\nHost: localhost:PORT | 404 Not Found";
 
     #[test]
     fn clients_that_say_nothing_take_no_more_than_their_share() {
-        let server = Server::start("the page".into(), Path::new("no file")).unwrap();
+        let server = PageServer::start("the page".into(), Path::new("no file")).unwrap();
         let connect = |_| TcpStream::connect((Ipv4Addr::LOCALHOST, server.port)).unwrap();
         let silent: Vec<TcpStream> = (0..4 * MOST_REQUESTS).map(connect).collect();
         // The others are refused for what they say: nothing.
@@ -224,7 +224,7 @@ GET /../Cargo.toml HTTP/1.1\nHost: localhost:PORT | 404 Not Found";
     #[test]
     fn a_record_is_served_while_it_grows_and_waited_for_until_it_is_taken() {
         let raw = crate::system::new_log("served").unwrap();
-        let server = Server::start(String::new(), &raw).unwrap();
+        let server = PageServer::start(String::new(), &raw).unwrap();
         let taken = || server.taken.lock().unwrap().1;
         let from = |byte: usize| {
             let request = format!("GET /record?from={byte} HTTP/1.1\nHost: localhost:PORT");

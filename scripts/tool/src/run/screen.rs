@@ -17,7 +17,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::handed;
-use crate::options::Parsed;
+use crate::options::Arguments;
 use crate::places;
 use crate::progress::Progress;
 use crate::run_options::name;
@@ -28,7 +28,7 @@ use views::protocol::{MachineLine, read_line};
 pub(super) const NOTHING: &str = "nothing";
 
 /// The destinations of each kind of line.
-pub(super) struct Screen {
+pub(super) struct LineOutputs {
     people: bool,
     machine: bool,
     quiet: bool,
@@ -41,9 +41,9 @@ pub(super) struct Screen {
     image: PathBuf,
 }
 
-impl Screen {
-    pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
-        Screen {
+impl LineOutputs {
+    pub(super) fn new(options: &Arguments, image: &Path) -> LineOutputs {
+        LineOutputs {
             people: !options.is_given(name::JSON),
             machine: options.text(name::QUIET) != Some(NOTHING)
                 && (options.is_given(name::JSON) || !options.is_given(name::CONSOLE)),
@@ -179,7 +179,7 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
 }
 
 /// Returns the guest's words that the screen needs.
-pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
+pub(super) fn guest_words(options: &Arguments) -> Vec<String> {
     let mut words = Vec::new();
     if options.is_given(name::CONSOLE) {
         words.push("console=on".into());
@@ -192,7 +192,7 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
 
 /// Reports whether the guest can be asked to end by ctrl-C: not if standard input feeds its second
 /// port, since QEMU has one standard input.
-pub(super) fn can_stop(options: &Parsed) -> bool {
+pub(super) fn can_stop(options: &Arguments) -> bool {
     let says_otherwise = options
         .text(name::APPEND)
         .is_some_and(|words| words.contains("console="));
@@ -200,7 +200,7 @@ pub(super) fn can_stop(options: &Parsed) -> bool {
 }
 
 /// Reports whether a person watches and does not type meanwhile.
-fn is_watched(options: &Parsed) -> bool {
+fn is_watched(options: &Arguments) -> bool {
     let is_silent = options
         .given_of(&[name::QUIET, name::JSON, name::GDB])
         .is_some();
@@ -212,7 +212,7 @@ fn is_watched(options: &Parsed) -> bool {
 /// later.
 ///
 /// Starts when the guest has written to `log`: before its serial port is set up, input is lost.
-pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
+pub(super) fn relay(options: &Arguments, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
     let is_read = options.is_given(name::CONSOLE) || handed::is_live(options);
     let farewell = match options.number(name::JOBS) {

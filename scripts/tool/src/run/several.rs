@@ -15,10 +15,10 @@ use std::process::ExitCode;
 use sched_dag::law::MeasuredCosts;
 
 use super::screen::NOTHING;
-use super::{Booted, RUN, boot_app, certified, check_files, conclude, go_on, prepare};
+use super::{EndedRun, RUN, boot_app, certified, check_files, conclude, go_on, prepare};
 use crate::dag_file::{ENDINGS, Format, states_overheads};
-use crate::files::{self, Temporary};
-use crate::options::{Name, Parsed, Refusal};
+use crate::files::{self, TemporaryFile};
+use crate::options::{Arguments, OptionName, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
@@ -34,7 +34,7 @@ use views::record::Record;
 type Measurement = Result<MeasuredCosts, String>;
 
 /// Runs the proof.
-pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
+pub(super) fn run(options: &Arguments) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
     let others = [name::CONSOLE, name::GDB, name::PAGE, name::PRINT_DAG];
     let alone = options.check_without(&others, why);
@@ -53,7 +53,7 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
 
 /// Proves the DAGs of each file, one after the other, and prints all in one table. A file that is
 /// refused or fails does not keep the others from being proven.
-pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
+pub(super) fn of_files(options: &Arguments, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files");
     let (mut rows, mut over) = (Vec::new(), 0);
     let (refused, failed) = each(files, |file| {
@@ -89,10 +89,10 @@ type Proven = (Vec<ProofRow>, ExitCode);
 
 /// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
 /// which has been reported.
-fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
+fn prove(options: &Arguments) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
     // The WCETs of the first run.
-    let own = Temporary(Some(log.with_extension("wcets")));
+    let own = TemporaryFile(Some(log.with_extension("wcets")));
     let Some(proving) = observe_first(options, own.path())? else {
         return Ok(None);
     };
@@ -112,7 +112,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
 
 /// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
 /// which the next run commits with the measurements; `None` if the run failed.
-fn observe_first(options: &Parsed, own: &Path) -> Result<Option<Parsed>, Refusal> {
+fn observe_first(options: &Arguments, own: &Path) -> Result<Option<Arguments>, Refusal> {
     let append = options.text(name::APPEND).unwrap_or_default();
     let measures = !states_overheads(append);
     if options.is_given(name::WCETS) && !measures {
@@ -143,7 +143,7 @@ fn observe_first(options: &Parsed, own: &Path) -> Result<Option<Parsed>, Refusal
     Ok(Some(next))
 }
 
-fn compare(booted: &Booted) -> Result<Vec<ProofRow>, String> {
+fn compare(booted: &EndedRun) -> Result<Vec<ProofRow>, String> {
     let record = booted.outcome.record()?;
     let mut all = Vec::new();
     observed::add(&mut all, &record)?;
@@ -152,7 +152,7 @@ fn compare(booted: &Booted) -> Result<Vec<ProofRow>, String> {
 
 /// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
 /// the overheads; `None` if a run failed, which has been reported.
-fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
+fn observe(options: &Arguments, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
     let observing = options.with(name::PROVE, OBSERVING);
     // Saturating, since a person's seed may be the largest `u64`.
     let first = options.number(name::SEED).unwrap_or(1);
@@ -192,13 +192,13 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
 const OBSERVING: &str = "observing";
 
 /// Prints the rows of a proof.
-fn say_all(options: &Parsed, rows: &[ProofRow]) {
+fn say_all(options: &Arguments, rows: &[ProofRow]) {
     let lines = rows.iter().map(ProofRow::line);
     say(options, &proof::table(rows), lines);
 }
 
 /// Prints a table for people and lines for programs, as the options want.
-fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
+fn say(options: &Arguments, table: &str, lines: impl Iterator<Item = String>) {
     if !options.is_given(name::JSON) {
         print!("{table}");
     }
@@ -209,14 +209,14 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
 
 /// Returns the word that keeps a run which only observes from judging bounds: its WCETs and
 /// overheads are still to be found.
-pub(super) fn bounds_word(options: &Parsed) -> Option<String> {
+pub(super) fn bounds_word(options: &Arguments) -> Option<String> {
     let observes = options.text(name::PROVE) == Some(OBSERVING);
     observes.then(|| "bounds=observe".into())
 }
 
 /// Reports a guest's refusal of a WCET file with the file's name and line; returns whether it was
 /// one.
-pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
+pub(super) fn refused(options: &Arguments, reason: &str) -> bool {
     let path = options.path(name::WCETS);
     match path.and_then(|path| observed::translate(reason, path)) {
         Some(line) => {
@@ -228,7 +228,7 @@ pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
 }
 
 /// Options that make sense for one file only.
-pub(super) const FOR_ONE_FILE: [Name; 8] = [
+pub(super) const FOR_ONE_FILE: [OptionName; 8] = [
     name::PRINT_DAG,
     name::GRAPH,
     name::TRACE,
@@ -241,7 +241,7 @@ pub(super) const FOR_ONE_FILE: [Name; 8] = [
 
 /// Runs all files. A refused or failed one does not keep the others from running;
 /// the exit code is that of the worst.
-pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
+pub(super) fn run_folder(options: &Arguments, folder: &Path) -> Result<ExitCode, Refusal> {
     let why = "is for one file; name one with `--dag`";
     let for_several = options.check_without(&FOR_ONE_FILE, why);
     for_several.map_err(Refusal::Usage)?;
@@ -321,7 +321,7 @@ pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
 }
 
 /// Returns the folder that `--dag` names, if it is one.
-pub(super) fn folder(options: &Parsed) -> Option<PathBuf> {
+pub(super) fn folder(options: &Arguments) -> Option<PathBuf> {
     let path = options.path(name::DAG)?;
     path.is_dir().then(|| path.to_path_buf())
 }
@@ -398,14 +398,14 @@ fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::qemu::Ending;
+    use crate::qemu::QemuEnd;
     use views::json::{self, Value};
 
     #[test]
     fn any_name_of_a_file_is_one_member_of_a_machine_line() {
         let serial = "{\"kind\":\"dag_run\",\"dag\":\"x\"}\n";
         let place = Path::new("the log");
-        let outcome = Outcome::of(Ending::Signal, serial.into(), place, place);
+        let outcome = Outcome::of(QemuEnd::Signal, serial.into(), place, place);
         for name in ["a.dag", "a\nb.dag", "\"\\.dag", "\u{1b}.dag"] {
             let all: Vec<String> = lines(Path::new(name), &outcome).collect();
             assert_eq!(all.concat().lines().count(), 1, "{all:?}");

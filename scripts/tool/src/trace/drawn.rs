@@ -5,20 +5,20 @@ use std::fs;
 use std::process::ExitCode;
 
 use views::links;
-use views::picture::{self, Asked, Window};
+use views::picture::{self, TimeWindow, WindowRequest};
 use views::record::tolerance_ns;
 use views::view::View;
 
 use super::{perfetto, read_files};
-use crate::files::{self, Named};
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::files::{self, NamedFile};
+use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 
 /// The table of `trace`.
 pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
     about: "Draws the traces of runs: for Perfetto's viewer, or as one picture.",
     positional: Some((
-        Takes::File("FILE..."),
+        OptionValue::File("FILE..."),
         "A record of runs, as `./scripts/run --trace FILE` and --keep write it, or a serial log; or \
          records of machines that send each other messages.",
     )),
@@ -34,22 +34,22 @@ line, or a file without a well-formed trace with events
 
 options! {
     /// Write to this file; else to standard output.
-    OUT 'o': Takes::File("FILE");
+    OUT 'o': OptionValue::File("FILE");
     /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
-    SVG: Takes::Nothing;
+    SVG: OptionValue::Nothing;
     /// How many times the longest period the picture shows.
-    PERIODS: Takes::Number(1, 1000), or "1";
+    PERIODS: OptionValue::Number(1, 1000), or "1";
     /// The picture begins at this time of the run, such as 20ms; else at 0, or where
     /// machines first hear of each other.
-    FROM: Takes::Text("TIME");
+    FROM: OptionValue::Text("TIME");
     /// It shows the jobs that are released before this time, whatever --periods says.
-    TO: Takes::Text("TIME");
+    TO: OptionValue::Text("TIME");
     /// Only these DAGs, with commas between; else all of them.
-    DAGS: Takes::Text("NAMES");
+    DAGS: OptionValue::Text("NAMES");
     /// Only the run of this number; else all of them, side by side from time 0.
-    RUN: Takes::Number(0, u64::MAX);
+    RUN: OptionValue::Number(0, u64::MAX);
     /// As for ./scripts/check-trace, whose breaches are shown as markers.
-    BOUND_US: Takes::Number(0, 1_000_000_000);
+    BOUND_US: OptionValue::Number(0, 1_000_000_000);
 }
 
 /// Runs the subcommand with the words after its name.
@@ -73,9 +73,9 @@ pub fn trace(words: &[OsString]) -> ExitCode {
 }
 
 /// Converts the runs that the options name.
-fn draw(options: &Parsed) -> Result<String, String> {
+fn draw(options: &Arguments) -> Result<String, String> {
     options.file("which file? name a record of a run")?;
-    let inputs = options.files().map(|path| Named { option: "", path });
+    let inputs = options.files().map(|path| NamedFile { option: "", path });
     files::check(&inputs.collect::<Vec<_>>(), &options.named(&[name::OUT]))?;
     let mut records = read_files(options)?;
     let joint = links::join(&records)?;
@@ -102,13 +102,13 @@ fn draw(options: &Parsed) -> Result<String, String> {
         // Without `--run` the first one: a picture has one axis of time.
         let run = runs.first().ok_or("the file has no run")?;
         let view = View::new(run);
-        let asked = Asked {
+        let asked = WindowRequest {
             from: options.text(name::FROM),
             to: options.text(name::TO),
             dags: options.text(name::DAGS),
             periods: options.number(name::PERIODS),
         };
-        return picture::draw(&view, Window::of(&view, &asked)?);
+        return picture::draw(&view, TimeWindow::of(&view, &asked)?);
     }
     // All runs of a file come from one boot, so one bound holds for all.
     let of_first = |run| tolerance_ns(run, options.number(name::BOUND_US));

@@ -16,7 +16,7 @@ use views::view::{SliceEnd, View};
 
 /// Converts runs, all from time 0. `bound_ns` is the tolerance for breaches.
 pub(super) fn convert(runs: &[Run], bound_ns: u64) -> String {
-    let mut output = Output(Vec::new());
+    let mut output = PerfettoOutput(Vec::new());
     for run in runs {
         let view = View::new(run);
         output.add_cores(&view);
@@ -40,9 +40,9 @@ pub(super) fn convert(runs: &[Run], bound_ns: u64) -> String {
 type Track = (usize, usize);
 
 /// The events that are written.
-struct Output(Vec<String>);
+struct PerfettoOutput(Vec<String>);
 
-impl Output {
+impl PerfettoOutput {
     fn add_cores(&mut self, view: &View<'_>) {
         let mut tracks = Vec::new();
         for (machine, cores) in view.run.cores() {

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use tool::child::{Child, Waited, bound_to_us};
+use tool::child::{Child, WaitEnd, bound_to_us};
 use tool::system::find_program;
 
 use crate::support::{call, folder};
@@ -45,7 +45,7 @@ fn opened(folder: &Path, files: &[&str], hash: &str) -> String {
     let mut child = Child::start(&mut command).expect("Chromium starts");
     let waited = child.wait(LIMIT, || true);
     let said = fs::read_to_string(said).expect("a file");
-    let is_well = matches!(waited, Waited::Ended(status) if status.success());
+    let is_well = matches!(waited, WaitEnd::Ended(status) if status.success());
     assert!(is_well, "{waited:?}: {said}");
 
     let shown = fs::read_to_string(shown).expect("UTF-8");

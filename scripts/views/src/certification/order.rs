@@ -39,7 +39,7 @@ struct Dispatch<'v> {
 }
 
 /// A start, or an end of a wait, of an instance with a core to keep.
-struct Begin {
+struct KeeperStart {
     key: Key,
     core: CoreId,
     /// The last event of the step from which on it may have been given the core.
@@ -59,7 +59,7 @@ pub(super) fn broken(view: &View<'_>) -> Option<String> {
     }
     begins.sort_by_key(|begin| begin.chosen);
     let (mut dispatch, mut begins) = (Dispatch::new(view), begins.iter().peekable());
-    let mut undecided: Vec<&Begin> = Vec::new();
+    let mut undecided: Vec<&KeeperStart> = Vec::new();
     for (at, event) in events.iter().enumerate() {
         dispatch.take(at, event);
         while let Some(begin) = begins.next_if(|begin| begin.chosen == at) {
@@ -120,7 +120,7 @@ impl<'v> Dispatch<'v> {
     }
 
     /// Returns what the event of a number begins, before it is taken.
-    fn begin(&self, events: &[Event], at: usize) -> Option<Begin> {
+    fn begin(&self, events: &[Event], at: usize) -> Option<KeeperStart> {
         let Event { what, core, .. } = events[at];
         let instance = events[at].instance()?;
         let begins = matches!(what, EventKind::Start | EventKind::Resume);
@@ -139,7 +139,7 @@ impl<'v> Dispatch<'v> {
             of && !event.what.is_of_machine()
         };
         let chosen = since + events[since + 1..at].iter().take_while(in_step).count();
-        Some(Begin {
+        Some(KeeperStart {
             key,
             core,
             chosen,
@@ -180,7 +180,7 @@ impl<'v> Dispatch<'v> {
 
     /// Returns the first instance that goes before one that is to begin, and for which there is no
     /// other core.
-    fn first(&self, begin: &Begin) -> Option<Key> {
+    fn first(&self, begin: &KeeperStart) -> Option<Key> {
         let Run {
             task_set, options, ..
         } = self.view.run;

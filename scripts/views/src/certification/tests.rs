@@ -10,7 +10,7 @@ use super::certify;
 use crate::findings::tests::change;
 use crate::findings::{Findings, check};
 use crate::made::{commit, event, lines_of, record_of};
-use crate::record::{Committed, Record, Run};
+use crate::record::{CommittedDags, Record, Run};
 
 /// The longest wait that breaks no rule.
 const BOUND_NS: u64 = 20;
@@ -69,7 +69,7 @@ fn run_of(events: &str) -> Run {
 /// Returns a run whose segments are charged 10 each, and whose bounds are proven.
 fn of_commit(mut commit: Commit, events: &str) -> Run {
     commit.charge_ns = Some(10);
-    let committed = Committed::new(0, commit.clone()).expect("they can be committed");
+    let committed = CommittedDags::new(0, commit.clone()).expect("they can be committed");
     let answer = analysis::answer(&committed.task_set, &committed.settings());
     for (dag, bound) in commit.dags.iter_mut().zip(answer.bounds) {
         dag.bound_ns = bound.map(|bound| bound.bound_ns);

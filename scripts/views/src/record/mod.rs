@@ -53,7 +53,7 @@ pub struct Record {
     /// The machine lines, as far as the record has them.
     pub lines: String,
     /// The commits, one after the other.
-    pub commits: Vec<Committed>,
+    pub commits: Vec<CommittedDags>,
     /// The runs. The last one may have died.
     pub runs: Vec<Run>,
     /// The times of each run that has ended, each with the index of its commit.
@@ -64,7 +64,7 @@ pub struct Record {
 
 /// Events of a run that is being read, by cluster.
 #[derive(Default)]
-struct Open {
+struct OpenRun {
     clusters: Vec<Vec<Event>>,
     /// The number of events lost so far.
     lost: u64,
@@ -174,7 +174,7 @@ impl Record {
             lines,
             ..Self::default()
         };
-        let mut open = Open::default();
+        let mut open = OpenRun::default();
         for chunk in recording.chunks() {
             match chunk {
                 Chunk::Header(_) | Chunk::Entry(_) => {}
@@ -183,7 +183,7 @@ impl Record {
                     return Err(format!("a commit within run {}", record.runs.len()));
                 }
                 Chunk::Commit(commit) => {
-                    let committed = Committed::new(record.commits.len(), commit)?;
+                    let committed = CommittedDags::new(record.commits.len(), commit)?;
                     record.commits.push(committed);
                 }
                 Chunk::Events(events) => {
@@ -217,7 +217,7 @@ impl Record {
         Ok(record)
     }
 
-    fn end_run(&mut self, mut open: Open, times: Option<&Times>) -> Result<(), String> {
+    fn end_run(&mut self, mut open: OpenRun, times: Option<&Times>) -> Result<(), String> {
         let number = self.runs.len() as u64;
         let Some(committed) = self.commits.last() else {
             return Err(format!("run {number} has no commit before it"));
@@ -259,7 +259,7 @@ impl Record {
     /// # Errors
     ///
     /// In words: the first bound that differs.
-    pub fn proven(&self) -> Result<&[Committed], String> {
+    pub fn proven(&self) -> Result<&[CommittedDags], String> {
         let mut commits = self.commits.iter();
         commits.try_for_each(|commit| commit.check_bounds().map(|_| ()))?;
         Ok(&self.commits)
@@ -271,8 +271,8 @@ impl Record {
     }
 }
 
-impl Open {
-    fn add(&mut self, events: &Events<'_>, committed: &Committed) -> Result<(), String> {
+impl OpenRun {
+    fn add(&mut self, events: &Events<'_>, committed: &CommittedDags) -> Result<(), String> {
         let (cluster, task_set) = (usize::from(events.cluster), &committed.task_set);
         let clusters = task_set.clusters().count();
         if cluster >= clusters {
@@ -343,7 +343,7 @@ fn in_order(run: &Run) -> Result<(), CoreId> {
 
 /// DAGs that were committed together, and their bounds.
 #[derive(Clone, Debug, Default)]
-pub struct Committed {
+pub struct CommittedDags {
     /// Its number within the boot, from 0.
     pub number: usize,
     /// The commit as the record has it.
@@ -354,7 +354,7 @@ pub struct Committed {
     pub task_set: TaskSet,
 }
 
-impl Committed {
+impl CommittedDags {
     /// Makes the model, as a commit does.
     ///
     /// # Errors
@@ -595,7 +595,7 @@ pub struct Run {
     /// Its number within the boot, from 0.
     pub number: u64,
     /// Its commit; of a run that joins several, that of the first machine.
-    pub commit: Arc<Committed>,
+    pub commit: Arc<CommittedDags>,
     /// How it was scheduled.
     pub options: SchedulerOptions,
     /// The tolerance for late decisions if none is given, in nanoseconds.

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use faults::crimes::{Crime, Unpunished};
-use faults::{JOBS, PERIOD, Policy, doomed, doomed_at_leisure, healthy};
+use faults::{FaultPolicy, JOBS, PERIOD, doomed, doomed_at_leisure, healthy};
 use kernel::{AppError, Machine, json};
 
 /// An attack, by its name, and whether it has a budget, of 6 ms.
@@ -65,7 +65,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.accept_faults(); // here they are what is wanted
     for (name, crime, is_limited) in attacks {
         let attacker = match is_limited {
-            true => doomed(crime, Policy::End),
+            true => doomed(crime, FaultPolicy::End),
             false => doomed_at_leisure(crime),
         };
         finish_create_dags(&[healthy(), attacker])?;

@@ -7,7 +7,7 @@ use std::ffi::OsString;
 use std::fs;
 
 use fass::{Policy, finish_create_dags};
-use gait::{DAG, Sample, TOPIC, Walk, build};
+use gait::{DAG, Sample, TOPIC, WalkOrientations, build};
 use harness::file::File;
 use recording::{Recordable, Recording};
 use tool::system::workspace;
@@ -51,7 +51,7 @@ impl Walked {
 }
 
 /// Walks in virtual time.
-fn walk(recording: &Recording<'static>, cores: u32, policy: Policy) -> Walk {
+fn walk(recording: &Recording<'static>, cores: u32, policy: Policy) -> WalkOrientations {
     let machine = VirtualTime::new().cores(cores).policy(policy);
     let (dag, walk) = build(recording).expect("it has the samples");
     let commit = finish_create_dags(&[dag]).expect("the DAG is proven");

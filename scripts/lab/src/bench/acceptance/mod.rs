@@ -74,7 +74,7 @@ impl AcceptanceCounts {
 
 /// Sets of one kind.
 #[derive(Debug)]
-struct Point {
+struct AcceptancePoint {
     cores: u32,
     deadlines: Deadlines,
     /// The utilization in percent of the cores.
@@ -110,11 +110,11 @@ pub(super) fn measure(
 }
 
 /// Returns the points in the order of their cores, deadlines and utilizations, nothing counted yet.
-fn points(cores: &[u32], has_ceiling: bool) -> Vec<Point> {
+fn points(cores: &[u32], has_ceiling: bool) -> Vec<AcceptancePoint> {
     let mut points = Vec::new();
     for &cores in cores {
         for deadlines in Deadlines::ALL {
-            points.extend(PERCENTS.step_by(STEP).map(|percent| Point {
+            points.extend(PERCENTS.step_by(STEP).map(|percent| AcceptancePoint {
                 cores,
                 deadlines,
                 percent,
@@ -125,7 +125,7 @@ fn points(cores: &[u32], has_ceiling: bool) -> Vec<Point> {
     points
 }
 
-impl Point {
+impl AcceptancePoint {
     /// Draws sets and counts them. They depend on the seed and on the kind of the point, not on what
     /// other points there are.
     fn count(&mut self, generator: Generator, sets: u64, seed: u64) {
@@ -152,7 +152,7 @@ impl Point {
 }
 
 /// Returns a row for each point: numbers of sets.
-fn csv(points: &[Point]) -> String {
+fn csv(points: &[AcceptancePoint]) -> String {
     let methods = points[0].counts.columns(|name| format!(",{name}"));
     let mut text = format!("cores,deadlines,utilization,sets{methods}\n");
     for point in points {
@@ -170,7 +170,7 @@ fn csv(points: &[Point]) -> String {
 }
 
 /// Returns a row for each point: shares of the sets.
-fn table(points: &[Point]) -> String {
+fn table(points: &[AcceptancePoint]) -> String {
     let title = "random sets accepted, in percent\n";
     let methods = points[0].counts.columns(|name| format!("|{name}:12"));
     let mut table = Table::new(title, &format!("cores:5|deadlines:13|U / m:7{methods}"));
@@ -239,7 +239,7 @@ mod tests {
     const LENT: usize = 4;
 
     /// Points of 2 and 4 cores with counts of their own, of 200 sets.
-    fn counted() -> Vec<Point> {
+    fn counted() -> Vec<AcceptancePoint> {
         let mut points = points(&[2, 4], true);
         for (nth, point) in (0..).zip(&mut points) {
             point.counts.sets = 200;

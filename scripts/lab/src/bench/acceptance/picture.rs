@@ -6,7 +6,7 @@
 
 use super::methods::METHODS;
 use super::sets::Deadlines;
-use super::{PERCENTS, Point};
+use super::{AcceptancePoint, PERCENTS};
 use views::svg::Svg;
 
 /// The size of a panel's field of curves.
@@ -38,7 +38,7 @@ const ELSEWHERE: &str = "stroke=\"#c1121f\" stroke-width=\"2.2\" stroke-dasharra
 
 /// Draws points, which are in the order of their cores, deadlines and utilizations, and a method that
 /// was measured elsewhere.
-pub(super) fn draw(points: &[Point], told: &Told) -> String {
+pub(super) fn draw(points: &[AcceptancePoint], told: &Told) -> String {
     let mut svg = Svg::default();
     let sets = points.first().map_or(0, |point| point.counts.sets);
     let title = format!("Random sets of DAGs that a method accepts, of {sets} a point");
@@ -48,7 +48,7 @@ pub(super) fn draw(points: &[Point], told: &Told) -> String {
         .map_or(0, |point| point.counts.accepted.len());
     legend(&mut svg, methods, told);
     let kinds = Deadlines::ALL.len() as u64;
-    let kind = |point: &Point| (point.cores, point.deadlines);
+    let kind = |point: &AcceptancePoint| (point.cores, point.deadlines);
     let curves: Vec<_> = points
         .chunk_by(|one, other| kind(one) == kind(other))
         .collect();
@@ -79,7 +79,7 @@ fn legend(svg: &mut Svg, methods: usize, told: &Told) {
 }
 
 /// Draws the axes and curves of a panel at a place, by columns and rows.
-fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point], told: &Told) {
+fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[AcceptancePoint], told: &Told) {
     let (left, top) = (CORNER.0 + column * STEP.0, CORNER.1 + row * STEP.1);
     let (right, bottom) = (left + FIELD.0, top + FIELD.1);
     let x = |percent: u64| left + (percent - ENDS.0) * FIELD.0 / (ENDS.1 - ENDS.0);
@@ -98,7 +98,7 @@ fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point], told: &Told)
     }
     let axes = format!("M{left} {top} V{bottom} H{right}");
     svg.path(&axes, "fill=\"none\" stroke=\"#333333\"");
-    if let Some(Point {
+    if let Some(AcceptancePoint {
         cores, deadlines, ..
     }) = curve.first()
     {
@@ -110,7 +110,7 @@ fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point], told: &Told)
     let others = (0..methods).filter(|method| *method != LOWEST);
     for method in [LOWEST].into_iter().chain(others) {
         let ends = curve.iter().map(
-            |Point {
+            |AcceptancePoint {
                  percent, counts, ..
              }| {
                 format!(

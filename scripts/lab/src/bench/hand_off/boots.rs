@@ -39,7 +39,7 @@ pub(super) enum Kind {
 
 /// One boot, and its part of the measurement.
 #[derive(Clone, Debug)]
-pub(super) struct Boot {
+pub(super) struct HandOffBoot {
     kind: Kind,
     pub(super) cores: u64,
     memory_mib: u64,
@@ -47,7 +47,7 @@ pub(super) struct Boot {
 }
 
 /// Returns the boots of a complete measurement in a mode.
-pub(super) fn of_mode(mode: Mode) -> Vec<Boot> {
+pub(super) fn of_mode(mode: Mode) -> Vec<HandOffBoot> {
     let all = [
         (Kind::Figures, 1, "part=hand-off"),
         (Kind::Recorded, 1, "test=values keep=1024"),
@@ -60,7 +60,7 @@ pub(super) fn of_mode(mode: Mode) -> Vec<Boot> {
     // Figures of time need a core of the host for each of the guest's.
     let boots = boots.filter(|&(_, cores, _)| is_counted || cores < MANY);
     boots
-        .map(|(kind, cores, words)| Boot::new(kind, cores, MOST_SUBTASKS, words))
+        .map(|(kind, cores, words)| HandOffBoot::new(kind, cores, MOST_SUBTASKS, words))
         .collect()
 }
 
@@ -70,7 +70,7 @@ pub(super) fn machine_line(figure: &Figure, mode: Mode) -> String {
     figure.json(begun.text("mode", mode.name()))
 }
 
-impl Boot {
+impl HandOffBoot {
     /// Describes a boot with DAGs of up to `subtasks` subtasks. Each needs a stack, each core two,
     /// and the kernel sets a quarter of the memory aside for stacks.
     pub(super) fn new(kind: Kind, cores: u64, subtasks: u64, words: impl Into<String>) -> Self {
@@ -152,7 +152,7 @@ const MOST_GROWTH_PERCENT: u64 = 3;
 ///
 /// In words: a guest failed, or an instance costs more than it may.
 pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
-    let count = |sizes: &[u64], boot: &dyn Fn(u64) -> Boot| {
+    let count = |sizes: &[u64], boot: &dyn Fn(u64) -> HandOffBoot| {
         let counted = sizes.iter().map(|&size| {
             let figures = boot(size).measure(Mode::Deterministic, image)?;
             for figure in &figures {
@@ -163,18 +163,18 @@ pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
         counted.collect::<Result<Vec<_>, String>>()
     };
     let by_cores = count(&[1, 2, 4, 8, 16, 32, 64], &|cores| {
-        Boot::new(Kind::Figures, cores, MOST_SUBTASKS, WORKLOADS)
+        HandOffBoot::new(Kind::Figures, cores, MOST_SUBTASKS, WORKLOADS)
     })?;
     let by_subtasks = count(&[10, 100, 1000, 10_000], &|subtasks| {
         let words = format!("part=workloads chain=2 branches=2 layered={subtasks}");
-        Boot::new(Kind::Figures, 1, subtasks, words)
+        HandOffBoot::new(Kind::Figures, 1, subtasks, words)
     })?;
     let by_clusters = count(&[1, 2, 4, 8, 16], &|clusters| {
         let sizes = (0..clusters).map(|_| CORES_OF_A_CLUSTER.to_string());
         let sizes: Vec<String> = sizes.collect();
         let words = format!("test=cluster_scale jobs=200 clusters={}", sizes.join(","));
         let (cores, subtasks) = (clusters * CORES_OF_A_CLUSTER, clusters * OF_A_CLUSTER);
-        Boot::new(Kind::Divided, cores, subtasks, words)
+        HandOffBoot::new(Kind::Divided, cores, subtasks, words)
     })?;
     println!("medians of the instructions that all cores together executed:");
     print!("{}", table("cores", BY_CORES, &by_cores));

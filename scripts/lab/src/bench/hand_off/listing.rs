@@ -10,10 +10,10 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use super::boots::{Boot, Kind, LIMIT};
+use super::boots::{HandOffBoot, Kind, LIMIT};
 use crate::bench::code::{self, Frames};
 use tool::places::Frame;
-use tool::qemu::{Ending, Mode};
+use tool::qemu::{Mode, QemuEnd};
 use tool::{files, system};
 use views::protocol::Status;
 
@@ -46,7 +46,7 @@ pub(super) fn list(image: &Path, file: &Path) -> Result<(), String> {
 fn executed(image: &Path) -> Result<Vec<u64>, String> {
     // Few jobs, as every instruction is logged.
     let words = "part=workloads jobs=5 chain=64 branches=1 layered=3";
-    let mut qemu = Boot::new(Kind::Figures, 1, 64, words).qemu(Mode::Deterministic);
+    let mut qemu = HandOffBoot::new(Kind::Figures, 1, 64, words).qemu(Mode::Deterministic);
     qemu.logs_instructions = true;
     let serial = system::new_log("listing")?;
     let mut running = qemu.start(image, &serial)?;
@@ -58,7 +58,7 @@ fn executed(image: &Path) -> Result<Vec<u64>, String> {
         let followed = running.follow(LIMIT, &mut |_| ());
         followed.map(|(ending, _)| (ending, reader.join().unwrap_or_default()))
     })?;
-    if ending != Ending::Guest(Status::Success) {
+    if ending != QemuEnd::Guest(Status::Success) {
         let (said, log) = (running.complaints(), serial.display());
         return Err(format!("{ending} {said}; its serial log is {log}"));
     }

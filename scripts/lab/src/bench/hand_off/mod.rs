@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use super::baseline::{self, Baseline};
 use super::frame::{Figure, by_plan};
 use tool::files;
-use tool::options::{Command, Name, Parsed, Takes, options};
+use tool::options::{Arguments, Command, OptionName, OptionValue, options};
 use tool::progress::Progress;
 use tool::qemu::Mode;
 use tool::{image, install, probe};
@@ -36,16 +36,16 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 
 options! {
     /// The unit of what is counted: instructions (deterministic), time (kvm, threads), or both.
-    MODE: Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
+    MODE: OptionValue::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
     /// Compare the instructions with the baseline; one that grew is a failure.
-    COMPARE: Takes::Nothing;
+    COMPARE: OptionValue::Nothing;
     /// Write the instructions into the baseline, tests/baselines/hand-off.json.
-    SAVE_BASELINE: Takes::Nothing;
+    SAVE_BASELINE: OptionValue::Nothing;
     /// Instead, count what the workloads cost on more cores and with more subtasks.
-    SCALE: Takes::Nothing;
+    SCALE: OptionValue::Nothing;
     /// Instead, log each instruction of one hop, count them by parts of the code, and write
     /// them to FILE. Needs objdump and addr2line (binutils).
-    LISTING: Takes::File("FILE");
+    LISTING: OptionValue::File("FILE");
 }
 
 const BASELINE: Baseline = Baseline {
@@ -73,7 +73,7 @@ impl HandOffPlan {
     /// # Errors
     ///
     /// The options exclude each other: one line that says why.
-    fn new(options: &Parsed) -> Result<Self, String> {
+    fn new(options: &Arguments) -> Result<Self, String> {
         let all = [
             name::LISTING,
             name::SCALE,
@@ -82,7 +82,7 @@ impl HandOffPlan {
             name::MODE,
         ];
         let given = all.into_iter().filter(|name| options.is_given(*name));
-        let given: Vec<&str> = given.map(Name::as_str).collect();
+        let given: Vec<&str> = given.map(OptionName::as_str).collect();
         let mode = options.text(name::MODE).and_then(Mode::from_name);
         match given[..] {
             [own @ ("listing" | "scale"), other, ..] => Err(format!(

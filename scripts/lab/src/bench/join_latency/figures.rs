@@ -10,10 +10,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use join_latency::{Joined, Samples, Span};
+use join_latency::{CompletedJoin, ExecutionSpan, RunSamples};
 use sched_dag::law::Distribution;
 
-use super::{Condition, Setting};
+use super::{JoinCondition, MachineSetting};
 use tool::output::Table;
 use views::json::{Object, Value};
 use views::protocol::Transcript;
@@ -76,23 +76,23 @@ pub(super) fn write(
 }
 
 /// Reads the output of [`write()`]; `None` if the statement differs or anything is damaged.
-pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<Samples> {
+pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<RunSamples> {
     let mut lines = text.lines();
     let is_its_own = lines.next()?.strip_prefix("# ")? == statement && lines.next()? == COLUMNS;
     // Without its last line end the file was cut off.
     if !is_its_own || !text.ends_with('\n') {
         return None;
     }
-    let mut samples = Samples {
+    let mut samples = RunSamples {
         parallel: vec![Vec::new(); subtasks],
-        ..Samples::default()
+        ..RunSamples::default()
     };
     for line in lines {
         let cells: Vec<&str> = line.split(',').collect();
         let [what, subtask, _, ready_ns, start_ns, finish_ns, joined] = cells[..] else {
             return None;
         };
-        let span = Span {
+        let span = ExecutionSpan {
             start_ns: start_ns.parse().ok()?,
             finish_ns: finish_ns.parse().ok()?,
         };
@@ -102,7 +102,7 @@ pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<Sampl
                 .indices
                 .extend(joined.collect::<Option<Vec<u64>>>()?);
             let ready_ns = ready_ns.parse().ok()?;
-            samples.joins.push(Joined { ready_ns, span });
+            samples.joins.push(CompletedJoin { ready_ns, span });
         } else {
             match subtask.parse::<usize>().ok()? {
                 0 => samples.source.push(span),
@@ -142,7 +142,7 @@ pub(super) struct ConditionFigures {
 
 impl ConditionFigures {
     /// Computes the figures of one condition.
-    pub(super) fn of(samples: &Samples) -> Self {
+    pub(super) fn of(samples: &RunSamples) -> Self {
         let covering = samples.covering_joins();
         let published = |join: usize| {
             let topics = samples.parallel.iter().zip(samples.indices_of(join));
@@ -212,7 +212,7 @@ impl ConditionFigures {
 }
 
 /// The conditions measured so far, in the order of the plan.
-type MeasuredConditions = [(Condition, ConditionFigures)];
+type MeasuredConditions = [(JoinCondition, ConditionFigures)];
 
 /// Returns each sample of each metric as a line of a table.
 pub(super) fn samples_csv(measured: &MeasuredConditions) -> String {
@@ -234,8 +234,10 @@ pub(super) fn samples_csv(measured: &MeasuredConditions) -> String {
 
 /// Returns the pooled figures of all seeds for each policy and N, in the order of the plan, each
 /// with its first condition. Conditions not measured yet are left out.
-fn pooled(measured: &MeasuredConditions) -> impl Iterator<Item = (Condition, ConditionFigures)> {
-    let of = |condition: &Condition| (condition.subtasks, condition.policy);
+fn pooled(
+    measured: &MeasuredConditions,
+) -> impl Iterator<Item = (JoinCondition, ConditionFigures)> {
+    let of = |condition: &JoinCondition| (condition.subtasks, condition.policy);
     let alike = measured.chunk_by(move |(one, _), (other, _)| of(one) == of(other));
     alike.map(|seeds| {
         let mut sum = ConditionFigures::default();
@@ -245,7 +247,7 @@ fn pooled(measured: &MeasuredConditions) -> impl Iterator<Item = (Condition, Con
 }
 
 /// Returns the summary, with a line for each policy and N.
-pub(super) fn summary_json(setting: &Setting<'_>, measured: &MeasuredConditions) -> String {
+pub(super) fn summary_json(setting: &MachineSetting<'_>, measured: &MeasuredConditions) -> String {
     let plan = setting.plan;
     let results = pooled(measured).map(|(condition, figures)| result_json(condition, &figures));
     let results = results.collect::<Vec<_>>().join(",\n");
@@ -266,7 +268,7 @@ pub(super) fn summary_json(setting: &Setting<'_>, measured: &MeasuredConditions)
     summary.into_text() + "\n"
 }
 
-fn result_json(condition: Condition, figures: &ConditionFigures) -> String {
+fn result_json(condition: JoinCondition, figures: &ConditionFigures) -> String {
     let result = Object::new().text("policy", &condition.policy.to_string());
     let mut result = result.number("subtasks", condition.subtasks as u64);
     for (name, count) in COUNTS.iter().zip(figures.counts) {
@@ -351,17 +353,17 @@ mod tests {
     }
 
     /// Two parallel subtasks, three jobs; the only join has jobs 1 and 2.
-    fn samples() -> Samples {
+    fn samples() -> RunSamples {
         let [first, second, third] = [0, PERIOD_NS + 10, 2 * PERIOD_NS + 10];
-        let span = |start_ns, finish_ns| Span {
+        let span = |start_ns, finish_ns| ExecutionSpan {
             start_ns,
             finish_ns,
         };
         let taking = |ns| [1, second, third].map(|start_ns| span(start_ns, start_ns + ns));
-        Samples {
+        RunSamples {
             source: [first, PERIOD_NS, third].map(|ns| span(ns, ns + 1)).into(),
             parallel: vec![taking(5).into(), taking(9).into()],
-            joins: vec![Joined {
+            joins: vec![CompletedJoin {
                 ready_ns: third + 20,
                 span: span(third + 21, third + 30),
             }],

@@ -24,7 +24,7 @@ use text::quoted;
 use super::frame::{by_plan, draw, judged};
 use figures::ConditionFigures;
 use tool::files;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Arguments, Command, OptionValue, options};
 use tool::program::ProgramOrder;
 use tool::progress::Progress;
 use tool::qemu::{Mode, PROGRAM, Qemu};
@@ -39,7 +39,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 
 /// Measures the missing conditions, and writes all results.
 fn measure_all(plan: &JoinPlan) -> Result<(), String> {
-    let (setting, why) = Setting::new(plan)?;
+    let (setting, why) = MachineSetting::new(plan)?;
     let (conditions, jobs, cores) = (plan.conditions.len(), plan.jobs, plan.cores);
     let (mode, version) = (setting.mode_name(), &setting.version);
     println!("{conditions} conditions of {jobs} jobs; mode {mode}, {cores} cores; {version}");
@@ -116,23 +116,23 @@ exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command lin
 options! {
     /// The folder for all results; what is there already is not measured again. If not given,
     /// target/join-latency, or target/join-latency-on-linux.
-    OUT 'o': Takes::File("DIR");
+    OUT 'o': OptionValue::File("DIR");
     /// Jobs of each condition.
-    JOBS: Takes::Number(1, 100_000), or "2000";
+    JOBS: OptionValue::Number(1, 100_000), or "2000";
     /// Parallel subtasks N; a condition has two processors more than the largest.
-    SUBTASKS: Takes::Numbers(1, 16), or "2,4,6";
+    SUBTASKS: OptionValue::Numbers(1, 16), or "2,4,6";
     /// The policies: fass, exact, approximate-MS with the longest interval.
-    POLICIES: Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+    POLICIES: OptionValue::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
     /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
     /// every policy.
-    REPEAT: Takes::Number(1, 1000), or "1";
+    REPEAT: OptionValue::Number(1, 1000), or "1";
     /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
     /// there are fewer.
-    ON: Takes::OneOf(&["machine", "linux"]), or "machine";
+    ON: OptionValue::OneOf(&["machine", "linux"]), or "machine";
     /// Queue size of the synchronizers.
-    QUEUE: Takes::Number(1, 100_000), or "1000";
+    QUEUE: OptionValue::Number(1, 100_000), or "1000";
     /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
-    MODE: Takes::OneOf(Mode::NAMES);
+    MODE: OptionValue::OneOf(Mode::NAMES);
 }
 
 /// The settings that all conditions share, and the conditions.
@@ -140,7 +140,7 @@ options! {
 struct JoinPlan {
     out: PathBuf,
     /// For each N all policies, for each of them all seeds.
-    conditions: Vec<Condition>,
+    conditions: Vec<JoinCondition>,
     seeds: Vec<u64>,
     jobs: u64,
     queue: u64,
@@ -158,7 +158,7 @@ impl JoinPlan {
     /// # Errors
     ///
     /// One line with the reason: the options contradict each other.
-    fn new(options: &Parsed) -> Result<JoinPlan, String> {
+    fn new(options: &Arguments) -> Result<JoinPlan, String> {
         let on_linux = options.text(name::ON) == Some("linux");
         if on_linux {
             let why = "is for guests; leave it or `--on linux` out";
@@ -173,7 +173,7 @@ impl JoinPlan {
         let of_size = |&subtasks: &usize| {
             let seeds = &seeds;
             let of_policy = move |&policy: &Policy| {
-                seeds.iter().map(move |&seed| Condition {
+                seeds.iter().map(move |&seed| JoinCondition {
                     policy,
                     subtasks,
                     seed,
@@ -262,13 +262,13 @@ impl fmt::Display for Policy {
 
 /// The measurement of one boot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Condition {
+struct JoinCondition {
     policy: Policy,
     subtasks: usize,
     seed: u64,
 }
 
-impl Condition {
+impl JoinCondition {
     /// Returns the name of its file, without the ending.
     fn file_stem(&self) -> String {
         format!("{}-n{}-seed{}", self.policy, self.subtasks, self.seed)
@@ -290,7 +290,7 @@ impl Condition {
     }
 }
 
-impl fmt::Display for Condition {
+impl fmt::Display for JoinCondition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (policy, subtasks) = (self.policy.title(), self.subtasks);
         write!(f, "{policy}, N = {subtasks}, seed {}", self.seed)
@@ -301,7 +301,7 @@ impl fmt::Display for Condition {
 const MOST_BOOTS: usize = 6;
 
 /// The machine for all conditions, and its versions, for the summary.
-struct Setting<'p> {
+struct MachineSetting<'p> {
     plan: &'p JoinPlan,
     /// The mode of the guests; `None`: programs of this computer.
     mode: Option<Mode>,
@@ -314,7 +314,7 @@ struct Setting<'p> {
     commit: String,
 }
 
-impl<'p> Setting<'p> {
+impl<'p> MachineSetting<'p> {
     /// Builds the program, settles the mode, and returns the reason for the mode.
     ///
     /// # Errors
@@ -361,7 +361,7 @@ impl<'p> Setting<'p> {
     }
 
     /// Returns a statement of everything that a condition's times depend on.
-    fn statement(&self, condition: &Condition) -> String {
+    fn statement(&self, condition: &JoinCondition) -> String {
         let (version, checksum) = (&self.version, &self.checksum);
         let Some(mode) = self.mode else {
             let words = self.linux_words(condition);
@@ -375,13 +375,13 @@ impl<'p> Setting<'p> {
     }
 
     /// Returns the words of a condition's program on Linux.
-    fn linux_words(&self, condition: &Condition) -> String {
+    fn linux_words(&self, condition: &JoinCondition) -> String {
         let words = condition.guest_words(self.plan.jobs, self.plan.queue);
         format!("cores={} share=on {words}", self.plan.cores)
     }
 
     /// Describes the guest of a condition.
-    fn qemu(&self, condition: &Condition, mode: Mode) -> Qemu {
+    fn qemu(&self, condition: &JoinCondition, mode: Mode) -> Qemu {
         let words = condition.guest_words(self.plan.jobs, self.plan.queue);
         Qemu {
             mode,
@@ -398,7 +398,7 @@ impl<'p> Setting<'p> {
     /// Two boots agree because the kernel removes the host's influence from counted time (its
     /// `machine::counted_time`). That depends on the implementation of QEMU 7.2, so it is checked
     /// wherever figures are made.
-    fn measure(&self, condition: &Condition) -> Result<String, String> {
+    fn measure(&self, condition: &JoinCondition) -> Result<String, String> {
         // Real times never repeat, so a second boot could not confirm them.
         let is_sure = self.mode != Some(Mode::Deterministic);
         let mut seen = Vec::new();
@@ -419,7 +419,7 @@ impl<'p> Setting<'p> {
         Ok(seen.swap_remove(0))
     }
 
-    fn boot_once(&self, condition: &Condition) -> Result<String, String> {
+    fn boot_once(&self, condition: &JoinCondition) -> Result<String, String> {
         let jobs = self.plan.jobs;
         let limit = Duration::from_secs(120 + jobs);
         let run = |log: &Path| {

@@ -14,10 +14,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Instant;
 
-use hand_off::{Pen, Stamps, Tick, commit, empty};
+use hand_off::{BodyStamps, StampPen, Tick, commit, empty};
 use sched_dag::Policy;
 
-use super::{Figure, MeasuredGraph, NativeRow, PERIOD, Rounds, machine, nanoseconds, run_jobs};
+use super::{Figure, MeasuredGraph, NativeRow, PERIOD, RoundTimes, machine, nanoseconds, run_jobs};
 
 const WORKLOAD: &str = "join of 2 us";
 
@@ -26,7 +26,7 @@ const WORK_NS: u64 = 2_000;
 
 /// Measures `jobs` jobs, the clock, and the least cost of a message between cores.
 pub(super) fn join(jobs: u64) -> Result<Vec<NativeRow>, String> {
-    let mut stamps = Stamps::default();
+    let mut stamps = BodyStamps::default();
     let functions = [0, WORK_NS, WORK_NS, 0].map(|work_ns| body(work_ns, stamps.pen(jobs)));
     let machine = machine(Policy::StaticPriority, 2)?;
     let functions = vec![vec![functions.into()]];
@@ -67,7 +67,7 @@ pub(super) fn join(jobs: u64) -> Result<Vec<NativeRow>, String> {
 
 /// Returns a body that computes for `work_ns` by reading the clock, and stamps its first and its
 /// last reading.
-fn body(work_ns: u64, mut pen: Pen) -> Tick {
+fn body(work_ns: u64, mut pen: StampPen) -> Tick {
     Box::new(move |_| {
         let begun_ns = fass::now_ns();
         pen.put(begun_ns);
@@ -189,7 +189,7 @@ fn pass(graph: MeasuredGraph, windows: usize, clusters: u32) -> Result<Vec<u64>,
     let jobs_a_round = jobs_a_round(graph);
     let rounds = (windows.div_ceil(PASSES) + 2 * WINDOW) as u64;
     let jobs = jobs_a_round * rounds + 1;
-    let marks: Vec<Rounds> = (0..clusters).map(|_| Rounds::default()).collect();
+    let marks: Vec<RoundTimes> = (0..clusters).map(|_| RoundTimes::default()).collect();
     let mut machine = machine(Policy::StaticPriority, clusters)?;
     if clusters > 1 {
         machine = machine.with(|terms| terms.divide(&vec![1; clusters as usize]));
@@ -198,7 +198,7 @@ fn pass(graph: MeasuredGraph, windows: usize, clusters: u32) -> Result<Vec<u64>,
     let functions = sources.map(|source| empty(graph.shape, graph.dags, source));
     commit(graph.shape, jobs, PERIOD, functions.collect());
     run_jobs(&machine, jobs).map_err(|why| format!("{}: {why}", graph.name))?;
-    let times_ns: Vec<_> = marks.iter().map(Rounds::times_ns).collect();
+    let times_ns: Vec<_> = marks.iter().map(RoundTimes::times_ns).collect();
     Ok(of_windows(&times_ns))
 }
 

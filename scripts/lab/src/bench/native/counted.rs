@@ -16,7 +16,7 @@ use super::{MeasuredGraph, jobs_a_round};
 use crate::bench::baseline::Baseline;
 use crate::bench::frame::Figure;
 use hand_off::Shape;
-use tool::progress::Lasting;
+use tool::progress::ProgressNote;
 use tool::{image, system};
 
 pub(super) const BASELINE: Baseline = Baseline {
@@ -34,7 +34,7 @@ const ROUNDS: u64 = 5;
 /// In words: the program cannot be built, or Valgrind failed.
 pub(super) fn count(graphs: &[MeasuredGraph]) -> Result<Vec<Figure>, String> {
     let program = image::build_target("hand-off", "release", ["--example", "rounds"], None)?;
-    let _lasting = Lasting::new("counting instructions");
+    let _lasting = ProgressNote::new("counting instructions");
     let place = system::new_log("callgrind")?;
     let counted = graphs
         .iter()

@@ -31,7 +31,7 @@ use text::quoted;
 use super::baseline;
 use super::frame::{Figure, by_plan};
 use tool::install;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Arguments, Command, OptionValue, options};
 use tool::output::Table;
 use tool::progress::Progress;
 use tool::qemu::Mode;
@@ -58,18 +58,18 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or a run did not comp
 
 options! {
     /// How many rounds of about 20,000 instances each figure has.
-    ROUNDS: Takes::Number(10, 100_000), or "300";
+    ROUNDS: OptionValue::Number(10, 100_000), or "300";
     /// The jobs whose joins across cores are measured.
-    JOBS: Takes::Number(100, 10_000_000), or "20000";
+    JOBS: OptionValue::Number(100, 10_000_000), or "20000";
     /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
     /// layered-1000, dags-1000, join, clusters; all.
-    ONLY: Takes::Text("NAMES");
+    ONLY: OptionValue::Text("NAMES");
     /// Instead, count the instructions of `closures, static` on one worker. Needs Valgrind.
-    INSTRUCTIONS: Takes::Nothing;
+    INSTRUCTIONS: OptionValue::Nothing;
     /// Count them, and compare with the baseline; one that grew is a failure.
-    COMPARE: Takes::Nothing;
+    COMPARE: OptionValue::Nothing;
     /// Count them, and write them into the baseline, tests/baselines/native.json.
-    SAVE_BASELINE: Takes::Nothing;
+    SAVE_BASELINE: OptionValue::Nothing;
 }
 
 /// The name of the workload of joins across cores.
@@ -101,7 +101,7 @@ struct NativePlan {
 const WORKERS: [u32; 2] = [1, 2];
 
 impl NativePlan {
-    fn read(options: &Parsed) -> Result<Self, String> {
+    fn read(options: &Arguments) -> Result<Self, String> {
         options.check_distinct(&[name::ONLY])?;
         let names = MeasuredGraph::ALL.iter().map(|graph| graph.name);
         let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
@@ -248,7 +248,7 @@ const INSTANCES_A_ROUND: usize = 20_000;
 
 /// The way in which the bodies are run.
 #[derive(Clone, Copy)]
-enum Runner {
+enum BodyRunner {
     /// A loop over the functions.
     Floor,
     /// The scheduler, with functions without values.
@@ -257,7 +257,7 @@ enum Runner {
     Typed,
 }
 
-impl Runner {
+impl BodyRunner {
     const fn name(self) -> &'static str {
         match self {
             Self::Floor => "floor",
@@ -293,20 +293,21 @@ fn throughput(
     }
     let (step, steps) = graph.steps;
     let per = jobs_a_round(graph) * steps;
-    let of_runner = |(&(runner, workers), samples): (&(Runner, u32), Vec<u64>)| {
+    let of_runner = |(&(runner, workers), samples): (&(BodyRunner, u32), Vec<u64>)| {
         let what = (u64::from(workers), graph.name, step);
         (Figure::new(what, per, samples), runner.name())
     };
     Ok(runners.iter().zip(samples).map(of_runner).collect())
 }
 
-fn runners(graph: MeasuredGraph) -> Vec<(Runner, u32)> {
-    let mut runners = vec![(Runner::Floor, 1)];
+fn runners(graph: MeasuredGraph) -> Vec<(BodyRunner, u32)> {
+    let mut runners = vec![(BodyRunner::Floor, 1)];
     for workers in WORKERS {
         let (ranked, by_deadline) = (Policy::StaticPriority, Policy::Edf);
         let policies = [(ranked, "closures, static"), (by_deadline, "closures, edf")];
-        runners.extend(policies.map(|(policy, name)| (Runner::Closures(policy, name), workers)));
-        runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
+        runners
+            .extend(policies.map(|(policy, name)| (BodyRunner::Closures(policy, name), workers)));
+        runners.extend(graph.has_values().then_some((BodyRunner::Typed, workers)));
     }
     runners
 }
@@ -318,27 +319,27 @@ fn jobs_a_round(graph: MeasuredGraph) -> u64 {
 /// Runs the rounds, after some to warm up, and returns the time of each in nanoseconds.
 fn pass(
     graph: MeasuredGraph,
-    runner: Runner,
+    runner: BodyRunner,
     workers: u32,
     rounds: usize,
 ) -> Result<Vec<u64>, String> {
     let jobs_a_round = jobs_a_round(graph);
     // One job more: the last round needs an end.
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
-    let marks = Rounds::default();
+    let marks = RoundTimes::default();
     let mut functions = empty(graph.shape, graph.dags, marks.source(jobs_a_round));
     match runner {
-        Runner::Floor => {
+        BodyRunner::Floor => {
             for job in 0..jobs {
                 functions.iter_mut().flatten().for_each(|tick| tick(job));
             }
         }
-        Runner::Closures(policy, _) => {
+        BodyRunner::Closures(policy, _) => {
             let machine = machine(policy, workers)?;
             commit(graph.shape, jobs, PERIOD, vec![functions]);
             run_jobs(&machine, jobs)?;
         }
-        Runner::Typed => {
+        BodyRunner::Typed => {
             let machine = machine(Policy::StaticPriority, workers)?;
             commit_typed(graph, jobs, marks.source(jobs_a_round));
             run_jobs(&machine, jobs)?;
@@ -410,9 +411,9 @@ fn nanoseconds(time: Duration) -> u64 {
 
 /// The times at which rounds begin and end, in nanoseconds since the first one.
 #[derive(Clone, Debug, Default)]
-struct Rounds(Arc<Mutex<Vec<u64>>>);
+struct RoundTimes(Arc<Mutex<Vec<u64>>>);
 
-impl Rounds {
+impl RoundTimes {
     /// Returns the times.
     fn times_ns(&self) -> Vec<u64> {
         let times_ns = self.0.lock();
