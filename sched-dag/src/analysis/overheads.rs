@@ -1,27 +1,28 @@
-//! Overheads: the time that the platform adds to executions.
+//! Overheads: the time added to executions by the platform.
 //!
-//! The tests know execution times only. Measured costs of the platform are
-//! charged to the WCET of each subtask, once for each of its segments:
+//! The tests know execution times only. Measured costs of the platform are charged to the WCET of
+//! each subtask, once for each of its segments:
 //!
-//! - two context switches, into the instance and out of it;
-//! - one dispatch, the scheduler's own work at its start or finish;
-//! - if instances can be preempted, one inter-processor interrupt: an instance
-//!   preempts at most one other, when it becomes ready, so the one that
-//!   preempts is charged. The switches back to the preempted instance are the
-//!   preempting one's second switch.
+//! - two context switches, into the instance and out of the instance;
+//! - one dispatch, the scheduler's own work at the instance's start or finish;
+//! - where instances can be preempted, one inter-processor interrupt. An instance preempts at most
+//!   one other, when it becomes ready, so the preempting instance pays. Its second switch is the
+//!   switch back to the preempted instance.
 //!
-//! An entry of a table may [move](Overheads::of_a_move_ns) a member to an idle core, which goes on
-//! there at once. That is no charge of an instance, but a term of the bounds in `lent_cores`.
+//! An entry of a table may [move](Overheads::of_a_move_ns) a member to an idle core, where the
+//! member goes on at once. No instance is charged for a move; the bounds in `lent_cores` have a
+//! term instead.
 //!
-//! These are of a step in which few instances become ready. For each one that does, `ready` is
-//! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
+//! These charges are for a step with few instances becoming ready. Each further ready instance
+//! makes a step longer by `ready`, and any instance may be delayed; `workload` has the term of the
+//! bounds.
 //!
-//! A *device* interrupts one core, and its driver keeps it from interrupting again too soon. An
-//! instance is charged nothing for that: `workload` has that term, too.
+//! A *device* interrupts one core, and its driver keeps the device from interrupting again too
+//! soon. No instance is charged for device interrupts; `workload` has their term, too.
 //!
-//! Not covered: timer interrupts, caches refilled after a preemption, bus
-//! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for
-//! the charges, and the step of it that is not proven.
+//! Not covered: timer interrupts, caches refilled after a preemption, bus contention. Measure WCETs
+//! with all of them included. `docs/proving.md` gives the argument for the charges, and names its
+//! unproven step.
 
 use alloc::string::{String, ToString};
 
@@ -29,15 +30,16 @@ use crate::law::MeasuredCosts;
 use crate::policy::Preemption;
 use crate::task_set::Dag;
 
-/// Makes the terms: what each is of, and how often a segment is charged it, in any case and besides
-/// where instances can be preempted; and how often a move takes it.
+/// Defines the terms of [`Overheads`], each with the number of times a segment is charged: always,
+/// and in addition where instances can be preempted. The last number says how often a move is
+/// charged.
 macro_rules! overheads {
     ($(
         $(#[doc = $doc:literal])+
         $term:ident = $word:literal, segment $always:literal + $preemptive:literal, move $moved:literal;
     )+) => {
-        // Of a recording, which has the sums of a segment and of a move, the latter is read as a
-        // part of the former.
+        // A recording has the sum for a segment and the sum for a move, and a reader takes the
+        // latter as part of the former.
         $(const _: () = assert!($moved <= $always + $preemptive, $word);)+
 
         /// Measured costs, each a worst case; all 0 by default.
@@ -55,17 +57,17 @@ macro_rules! overheads {
             /// No overheads.
             pub const NONE: Self = Self { $($term: 0),+ };
 
-            /// Makes them of the numbers that state them.
+            /// Makes overheads from the numbers of their terms.
             pub const fn of_terms_ns([$($term),+]: [u64; Self::WORDS.len()]) -> Self {
                 Self { $($term),+ }
             }
 
-            /// Returns the numbers that state them.
+            /// Returns the numbers of the terms.
             pub const fn terms_ns(&self) -> [u64; Self::WORDS.len()] {
                 [$(self.$term),+]
             }
 
-            /// Returns these as text, with commas between.
+            /// Returns the numbers as text, separated by commas.
             pub fn stated(&self) -> String {
                 self.terms_ns().map(|ns| ns.to_string()).join(",")
             }
@@ -81,25 +83,24 @@ overheads! {
     /// From the request for an inter-processor interrupt to the first
     /// instruction of its handler, in nanoseconds.
     interrupt_ns = "interrupt", segment 0 + 1, move 1;
-    /// By how much a step is longer for each instance that becomes ready in it, in
-    /// nanoseconds.
+    /// The time added to a step for each instance becoming ready, in nanoseconds.
     ready_ns = "readiness", segment 0 + 0, move 0;
-    /// The longest interrupt of a device, with all that its core does for it, in nanoseconds; 0:
-    /// there is no device.
+    /// The longest interrupt of a device, with all work of its core for the device, in nanoseconds;
+    /// 0: no device.
     device_ns = "device interrupt", segment 0 + 0, move 0;
     /// The least time between the beginnings of two such interrupts, in nanoseconds.
     device_distance_ns = "device distance", segment 0 + 0, move 0;
 }
 
-/// Where overheads are from.
+/// The origin of overheads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum OverheadSource {
-    /// Someone states them, or nobody: then they are 0.
+    /// Stated by someone; 0 if nobody states them.
     #[default]
     Stated,
-    /// They are the longest that were measured, and a margin.
+    /// The longest costs measured, with a margin.
     Measured {
-        /// How many instances were dispatched meanwhile.
+        /// The number of instances dispatched during the measurement.
         dispatches: u64,
         /// The margin, in hundredths.
         margin_percent: u32,
@@ -107,20 +108,20 @@ pub enum OverheadSource {
 }
 
 impl Overheads {
-    /// Returns the charges for costs that were measured, with a margin in per cent.
+    /// Returns the charges for measured costs, with a margin in per cent.
     ///
-    /// - As *dispatch*, the lateness of an instance's release and once the longest time owed:
-    ///   that passes before its own first instruction.
-    /// - As *interrupt*, where instances are preempted, once more the longest time owed: before
-    ///   the next instruction of the one that it has preempted. It has preempted one at most,
-    ///   when it became ready, and so each resumption has one that pays for it. That one is
-    ///   more urgent than what it preempts, so a bound counts it as interference there.
-    /// - As *ready*, where in one of the steps `at_once` instances became ready, that part of the
-    ///   longest time owed: what each of them took cannot be more. With 0 nothing is: where
-    ///   the costs are of a run of the DAGs themselves, they include their longest steps.
+    /// - *Dispatch*: the lateness of an instance's release plus once the longest time owed, the
+    ///   time before the instance's first instruction.
+    /// - *Interrupt*, where instances are preempted: once more the longest time owed, the time
+    ///   before the next instruction of the preempted instance. An instance preempts at most one
+    ///   other, when it becomes ready, so every resumption has a payer. The payer is more urgent
+    ///   than the preempted instance, so a bound counts the charge there as interference.
+    /// - *Ready*, if `at_once` instances became ready in one of the steps: the longest time owed
+    ///   divided by `at_once`, because none of them can have taken more. With `at_once` 0 the term
+    ///   is 0: costs measured in a run of the DAGs themselves include their longest steps.
     ///
-    /// Work of the platform that interrupts a running instance, a timer's or another core's, is
-    /// within that call's time, as it is observed.
+    /// Work of the platform interrupting a running instance, such as a timer's or another core's,
+    /// counts within the observed time of the interrupted call.
     #[must_use]
     pub const fn measured(costs: &MeasuredCosts, margin_percent: u32, at_once: u64) -> Self {
         let percent = 100 + margin_percent as u64;
@@ -133,12 +134,12 @@ impl Overheads {
                 0 => 0,
                 _ => owed_ns.div_ceil(at_once),
             },
-            // The longest time owed has all others in it.
+            // The longest time owed contains all other costs.
             ..Self::NONE
         }
     }
 
-    /// Returns the charge of each segment, or `None` if that overflows.
+    /// Returns the charge of each segment, or `None` on overflow.
     pub fn of_an_instance_ns(&self, preemption: Preemption) -> Option<u64> {
         self.sum_ns(usize::from(preemption == Preemption::Enabled))
     }
@@ -150,8 +151,8 @@ impl Overheads {
         })
     }
 
-    /// Returns how long it takes to go on with an instance on another core of its group, since an
-    /// entry of a table takes its core.
+    /// Returns the time needed to go on with an instance on another core of its group, after an
+    /// entry of a table has taken its core.
     pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
         match preemption {
             Preemption::Enabled => self.sum_ns(2).unwrap_or(u64::MAX),
@@ -159,7 +160,7 @@ impl Overheads {
         }
     }
 
-    /// Returns how long the device's interrupts keep its core at most, within a time.
+    /// Returns the most time the device's interrupts keep its core, within a time in nanoseconds.
     pub const fn of_device_ns(&self, within_ns: u64) -> u64 {
         match within_ns.checked_div(self.device_distance_ns) {
             Some(whole) => whole.saturating_add(1).saturating_mul(self.device_ns),
@@ -172,12 +173,13 @@ impl Overheads {
         self.device_ns == 0 || self.device_ns < self.device_distance_ns
     }
 
-    /// Returns them in a cluster with these DAGs, whose subtasks may enter sections of locks, on a
-    /// machine of so many cores in all.
+    /// Returns the overheads in a cluster of these DAGs, with subtasks able to enter sections of
+    /// locks, on a machine of `cores` cores in all.
     ///
-    /// An instance that is given a core may find another one there that is in a section: once at
-    /// its start and, paid for by the one that has preempted it, once when it goes on. If it is
-    /// preempted while it waits for a section, it waits for its turn anew. `docs/proving.md` has the
+    /// An instance given a core may find another instance there inside a section: once at its
+    /// start, and once when it goes on after a preemption, paid for by the preempting instance. An
+    /// instance preempted while waiting for a section gives up its turn and waits anew.
+    /// `docs/proving.md` has the argument.
     /// argument.
     pub fn among(self, dags: &mut dyn Iterator<Item = &Dag>, cores: u32) -> Self {
         let (mut longest_ns, mut turn_ns) = (0, 0);

@@ -1,70 +1,66 @@
 //! Workload: how much one DAG can execute in a window, whatever else runs.
 //!
-//! A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo,
-//! "Schedulability Analysis of Conditional Parallel Task Graphs in Multicore
-//! Systems", IEEE Trans. Computers 66(2), 2017, doi:10.1109/TC.2016.2584064
-//! (first at ECRTS 2015). With `p` cores at most at an instant, in any window
-//! of length `L`, while every job is complete within `R` of its release:
+//! A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, "Schedulability
+//! Analysis of Conditional Parallel Task Graphs in Multicore Systems", IEEE Trans. Computers 66(2),
+//! 2017, doi:10.1109/TC.2016.2584064 (first at ECRTS 2015). Let the DAG use `p` cores at most at
+//! any instant, and let every job complete within `R` of its release. Then in any window of length
+//! `L`:
 //!
-//! - `V = min(volume, p R)`, the most that one job can execute so,
-//! - `A = p (L + R) - V`, never below 0,
-//! - `W(L) = min(p L, (A / (p T)) V + min(V, A mod (p T)))`.
+//! - `V = min(volume, p R)` is the most work of one job,
+//! - `A = p (L + R) - V`, never below 0, is an area,
+//! - `W(L) = min(p L, (A / (p T)) V + min(V, A mod (p T)))` is the workload.
 //!
-//! Under EDF, with respect to a job of relative deadline `D_k`, only jobs with
-//! a deadline no later count:
+//! Under EDF, against a job of relative deadline `D_k`, only jobs with a deadline no later count:
 //!
 //! - `N = max(0, (D_k - D) / T + 1)` (floor),
 //! - `WE = N V + min(V, p max(0, D_k - N T - (D - R)))`,
 //!
-//! which is the second line above with `A = p (D_k - D + R)`, if that is not below 0: so what
-//! counts in a window is that line with the smaller of both areas.
+//! `WE` equals the sum in `W` taken at the area `A = p (D_k - D + R)`, if not negative. So the work
+//! in a window is the same sum at the smaller of the two areas.
 //!
-//! Where sinks have deadlines of their own, `D` is the least of them and may be less than
-//! `R`: a job counts as soon as one of its subtasks may win, and then as a whole. The
-//! job before the `N` whole ones then ends `R - D` after its least deadline, which is
-//! what the same expression says with `D - R` below 0.
+//! If sinks have deadlines of their own, `D` is the least of them and may be less than `R`: a job
+//! counts as a whole as soon as any of its subtasks may win. The job before the `N` whole jobs then
+//! ends `R - D` after its least deadline. The same expression covers the case, with a negative
+//! `D - R`.
 //!
-//! The paper has `p = m`. A smaller `p`, as the width of the DAG or the cores that
-//! count, is a refinement of our own: the worst case packs each job into a rectangle
-//! as wide as the job can be. The same holds for a part of a DAG, such as a chain,
-//! whose volume is its own and for which `p = 1`. It needs jobs that do not overlap, `R <= T`.
-//! Jobs that do are dealt out in turn
-//! to `k = ceil(R / T)` *lanes*: within a lane the period is `k T >= R`, so
-//! nothing overlaps, and the DAG's workload is at most `k` times a lane's, and
-//! at most `min(m, k p) L`.
+//! The paper has `p = m`. A smaller `p`, the width of the DAG or the number of cores counted, is
+//! our own refinement: the worst case packs each job into a rectangle as wide as the job can be.
+//! The same holds for a part of a DAG, such as a chain, with the volume of the part and, for a
+//! chain, `p = 1`. The form needs jobs without overlap, `R <= T`. Overlapping jobs are dealt out in
+//! turn to `k = ceil(R / T)` *lanes*. Within a lane the period is `k T >= R`, so nothing overlaps.
+//! The DAG's workload is then at most `k` times a lane's, and at most `min(m, k p) L`.
 //!
 //! Trap: the closed form overshoots `p L` for short windows; hence the cap.
 //!
-//! # Bursts: what steps take in which many instances become ready, whatever their ranks
+//! # Bursts: long steps of the scheduler, with many instances becoming ready
 //!
-//! Each instance is charged for a step in which few instances become ready (`overheads`).
-//! For each of them it is longer by `ready` at most, and as long as it lasts it may keep the
-//! cores from any instance, a more urgent one too. So in a window of length `L` some core is lost,
-//! beyond the charges, for no longer than
+//! Each instance is charged for a step with few instances becoming ready (`overheads`). Each
+//! further instance makes a step longer by `ready` at most, and a long step may keep the cores from
+//! any instance, even a more urgent instance. So in a window of length `L` the time in which any
+//! core is lost, beyond the charges, is at most
 //!
 //! `E(L) = sum over all DAGs on them of ((L + late + carry) / T + 1) burst` (floor)
 //!
-//! with two bursts a job: `ready` for each source, with `carry = 0`, and `ready` for all that
-//! one completion makes ready beyond [`WIDE`], and for each wait, with `carry = D`, until which
-//! jobs complete. Steps
-//! follow one another, and each loss counts in one of them. A release that waits
-//! for steps before its own is late, at most by `late = charge + E(late)` with `late = 0` on
-//! the right.
+//! with two bursts a job. The first is `ready` for each source, with `carry = 0`. The second is
+//! `ready` for each instance beyond [`WIDE`] made ready by one completion, and for each wait, with
+//! `carry = D`, since jobs complete until `D`. Steps follow one another, and each loss counts in a
+//! single step. A release waiting for earlier steps is late by at most `late = charge + E(late)`,
+//! with `late = 0` on the right.
 //!
-//! A DAG may *fall behind*, as none of its bounds is known: with `k` jobs in flight, `k` of them are
-//! complete in the window besides those that it releases, so `carry = k T`. Where releases wait
-//! for room, one completion releases `k` at most. If that makes no more ready than [`WIDE`], it is
-//! charged as any other; else [`OverrunPolicy::Abort`] and signals let `k` wait, so that both bursts
-//! have one `k T` more, and with [`OverrunPolicy::Queue`] there is no end to them.
+//! A DAG without a known bound may *fall behind*. With `k` jobs in flight, up to `k` of them may
+//! complete in the window besides the jobs released in the window, so `carry = k T`. Where releases
+//! wait for room, one completion releases `k` jobs at most. If the completion makes no more than
+//! [`WIDE`] instances ready, and the DAG has no second burst, the ordinary charges cover them.
+//! Otherwise both bursts grow by one `k T` where `k` releases can wait ([`OverrunPolicy::Abort`]
+//! and signals), and have no limit with [`OverrunPolicy::Queue`].
 //!
-//! In the equations all cores are busy for so long. The workloads of the DAGs do not grow by
-//! it.
+//! In the equations all cores are busy for `E`. The workloads of the DAGs stay the same.
 //!
-//! A *device* has a burst as well: its interrupt keeps one core for `C` at most, and the next one
-//! begins `d` later or more, so `T = d`, `carry = 0` and the burst is `C`. Whatever stands still
-//! meanwhile may be of any core: an instance, a section and its turn, a release, the scheduler's
-//! step. All that the other terms say holds in the rest of the window. With `C >= d` no equation
-//! has a solution.
+//! A *device* has a burst as well: its interrupt keeps one core for `C` at most, and the next
+//! interrupt begins at least `d` later, so `T = d`, `carry = 0` and the burst is `C`. Meanwhile
+//! anything on any core may stand still: an instance, a section and the turn for a section, a
+//! release, a step of the scheduler. In the rest of the window all other terms hold. With `C >= d`
+//! no equation has a solution.
 
 use alloc::vec::Vec;
 
@@ -74,39 +70,38 @@ use crate::ids::SubtaskId;
 use crate::policy::OverrunPolicy;
 use crate::task_set::Dag;
 
-/// A DAG, or a part of one, that may execute next to the DAG under analysis.
+/// A DAG, or a part of a DAG, executing next to the DAG under analysis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InterferingWorkload {
-    /// The most that one job executes.
+    /// The most work of one job.
     volume: u128,
     /// The period of a lane.
     period: u128,
     response: u128,
-    /// The most cores that one job uses at an instant.
+    /// The most cores used by one job at an instant.
     parallelism: u128,
-    /// The sequences into which jobs that overlap are dealt out.
+    /// The number of sequences into which overlapping jobs are dealt out.
     lanes: u128,
-    /// The most cores that all jobs use at an instant.
+    /// The most cores used by all jobs at an instant.
     cap: u128,
-    /// No window holds more, whatever its length (EDF's `WE`).
+    /// The most work in any window, whatever its length (EDF's `WE`).
     ceiling: Option<u128>,
 }
 
-/// A workload at one window length, and how it goes on from there.
+/// A workload at one window length, and its growth from there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WorkloadSegment {
     /// The workload.
     pub(super) value: u128,
-    /// By how much it grows at least for each further nanosecond of window...
+    /// The least growth for each further nanosecond of window...
     pub(super) slope: u128,
     /// ...for this many nanoseconds, at least 1; `None`: without end.
     pub(super) span: Option<u128>,
 }
 
 impl InterferingWorkload {
-    /// Describes a part of `volume_ns` of a task whose jobs are complete within
-    /// `response_ns`, with at most `parallelism` cores a job and `cores < 2^32` cores for
-    /// all jobs.
+    /// Describes a part of `volume_ns` of a task with jobs complete within `response_ns`. One job
+    /// uses at most `parallelism` cores, and all jobs together at most `cores < 2^32` cores.
     pub(super) fn new(
         task: &Task,
         volume_ns: u64,
@@ -127,16 +122,16 @@ impl InterferingWorkload {
         }
     }
 
-    /// Adds the limit that EDF gives with respect to a job of relative deadline
-    /// `deadline_ns`; `own_deadline_ns` is the least of this task's.
+    /// Adds EDF's limit on work competing with a job of relative deadline `deadline_ns`;
+    /// `own_deadline_ns` is the least deadline of this task.
     ///
-    /// Only for tasks whose jobs do not overlap.
+    /// Only for tasks without overlapping jobs.
     pub(super) fn by_deadlines(mut self, own_deadline_ns: u64, deadline_ns: u64) -> Self {
         self.ceiling = Some(self.due(own_deadline_ns, deadline_ns));
         self
     }
 
-    /// Returns that limit.
+    /// Returns the limit of [`by_deadlines`](Self::by_deadlines).
     fn due(&self, own_deadline_ns: u64, deadline_ns: u64) -> u128 {
         let (own, other) = (u128::from(own_deadline_ns), u128::from(deadline_ns));
         let time = (other + self.response).checked_sub(own);
@@ -145,8 +140,8 @@ impl InterferingWorkload {
 
     /// Returns the workload in a window.
     ///
-    /// Nothing overflows: times are below 2^64 and parallelism below 2^32, so
-    /// every area is below 2^98; the one larger product saturates.
+    /// Nothing overflows: times are below 2^64 and parallelism below 2^32, so every area is below
+    /// 2^98; the only larger product saturates.
     pub(super) fn at(&self, window_ns: u64) -> WorkloadSegment {
         let body = self.lane(u128::from(window_ns)).times(self.lanes);
         let piece = body.least(self.over(window_ns));
@@ -166,12 +161,13 @@ impl InterferingWorkload {
         }
     }
 
-    /// Returns what of the workload of a window fits into the shorter time of which a job waits.
+    /// Returns the part of a window's workload that fits into the time for which a job waits, a
+    /// shorter time than the window.
     pub(super) fn within(&self, (window_ns, waiting_ns): (u64, u64)) -> WorkloadSegment {
         self.at(window_ns).least(self.over(waiting_ns))
     }
 
-    /// Returns the work that all cores of the jobs could execute in a time.
+    /// Returns the most work all cores of the jobs could execute in a time.
     pub(super) fn over(&self, time_ns: u64) -> WorkloadSegment {
         WorkloadSegment::new(self.cap * u128::from(time_ns), self.cap, None)
     }
@@ -183,7 +179,7 @@ impl InterferingWorkload {
         self.packed(area - self.volume)
     }
 
-    /// Returns the executed part of an area that has one job a period, packed to its beginning.
+    /// Returns the executed part of an area holding one job a period, packed to its beginning.
     fn packed(&self, area: u128) -> WorkloadSegment {
         let pitch = self.parallelism * self.period;
         let (jobs, rest) = (area / pitch, area % pitch);
@@ -207,7 +203,7 @@ impl WorkloadSegment {
         Self { value, slope, span }
     }
 
-    /// Returns the smaller of two pieces, as far as it surely stays so.
+    /// Returns the smaller of two pieces, as far as certain to remain the smaller.
     pub(super) fn least(self, other: Self) -> Self {
         if self.value <= other.value {
             self.below(other)
@@ -229,8 +225,8 @@ impl WorkloadSegment {
         }
     }
 
-    /// Returns how much longer `cores` cores must execute at least, after some time, until they
-    /// have executed this much; `None`: they have.
+    /// Returns the least further time for which `cores` cores must execute, after some time, until
+    /// this much work is done; `None`: done already.
     pub(super) fn lacks(self, cores: u128, time: u128) -> Option<u128> {
         let gap = self.value.saturating_sub(cores * time);
         if gap == 0 {
@@ -241,12 +237,12 @@ impl WorkloadSegment {
             None | Some(0) => whole_piece,
             Some(closing) => gap.div_ceil(closing).min(whole_piece),
         };
-        // The workload never falls, so what is missing now has to be executed in any case.
+        // The workload never falls, so the work missing now has to be executed in any case.
         Some(ahead.max(gap.div_ceil(cores)))
     }
 
-    /// Returns the lower of two lines to the right of here; of equal values that with the smaller
-    /// slope.
+    /// Returns the lower of two lines to the right of here; of equal values, the line with the
+    /// smaller slope.
     pub(super) fn lower(self, other: Self) -> Self {
         match (self.value, self.slope) <= (other.value, other.slope) {
             true => self.until(other),
@@ -254,12 +250,13 @@ impl WorkloadSegment {
         }
     }
 
-    /// Returns this piece as far as it surely stays below a higher one.
+    /// Returns this piece as far as certain to stay below a higher piece.
     fn below(self, higher: Self) -> Self {
         self.until(higher).or_one_flat_step()
     }
 
-    /// Returns that, with an end at once if a higher one is met within 1 ns.
+    /// As [`below`](Self::below), but may be empty: ends at once if the higher piece is met within
+    /// 1 ns.
     fn until(self, higher: Self) -> Self {
         let until = match self.slope.checked_sub(higher.slope) {
             None | Some(0) => u128::MAX,
@@ -279,8 +276,8 @@ impl WorkloadSegment {
         }
     }
 
-    /// Replaces an empty piece by a step of 1 ns without growth: never more
-    /// than the workload, which never falls.
+    /// Replaces an empty piece by a step of 1 ns without growth. The step never exceeds the
+    /// workload, which never falls.
     fn or_one_flat_step(self) -> Self {
         if self.span == Some(0) {
             Self {
@@ -294,14 +291,14 @@ impl WorkloadSegment {
     }
 }
 
-/// The most that one completion makes ready, for which each instance is charged already.
+/// The most instances made ready by one completion for which the charges already pay.
 const WIDE: usize = 16;
 
-/// The most evaluations of a sum, which then counts as endless.
+/// The most evaluations of a sum; beyond, the sum counts as endless.
 const STEP_LIMIT: u32 = 1024;
 
-/// Returns how many releases of a DAG may wait for room at most, by the jobs that it may have in
-/// flight; `None`: any number.
+/// Returns how many releases of a DAG may wait for room, in units of its limit on jobs in flight;
+/// `None`: any number.
 pub(super) const fn waiting_rooms(dag: &Dag) -> Option<u128> {
     match dag.overrun() {
         OverrunPolicy::Skip => Some(0),
@@ -311,21 +308,22 @@ pub(super) const fn waiting_rooms(dag: &Dag) -> Option<u128> {
     }
 }
 
-/// The bursts of the DAGs that share cores.
+/// The bursts of the DAGs sharing cores.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct WorkloadBursts {
-    /// How late a release is at most.
+    /// The greatest lateness of a release.
     pub(super) late_ns: u64,
-    /// How long it takes to go on with an instance on another core.
+    /// The time needed to go on with an instance on another core.
     pub(super) move_ns: u64,
-    /// The place of the first DAG that falls behind and may have any number of them.
+    /// The place of the first DAG with an unlimited number of bursts, because it may fall behind.
     pub(super) endless: Option<usize>,
-    /// `T`, `carry` and `burst`.
+    /// `T`, `carry` and `burst` of each.
     repeated: Vec<[u128; 3]>,
 }
 
 impl WorkloadBursts {
-    /// Returns those of DAGs, be they analysable or not, each with whether it may fall behind.
+    /// Returns the bursts of DAGs, analysable or not; each flag tells whether the DAG may fall
+    /// behind.
     pub(super) fn of<'a>(
         dags: impl Iterator<Item = (&'a Dag, bool)>,
         settings: &AnalysisSettings,
@@ -360,12 +358,12 @@ impl WorkloadBursts {
             }
         }
         let has_long_steps = !bursts.repeated.is_empty();
-        // Without a distance there is no end to it, as with the least one.
+        // Without a distance the losses have no end, as with the least distance.
         let distance_ns = overheads.device_distance_ns.max(1);
         bursts.add(distance_ns.into(), 0, overheads.device_ns.into());
         let charge_ns = overheads.of_an_instance_ns(settings.preemption);
         let late_ns = charge_ns.and_then(|charge_ns| bursts.after(charge_ns));
-        // If lateness has no end, each window counts as full of bursts, and nothing is proven.
+        // With endless lateness each window counts as full of bursts, and nothing is proven.
         bursts.late_ns = match late_ns.filter(|_| bursts.endless.is_none()) {
             _ if !has_long_steps => 0,
             late_ns => late_ns.unwrap_or(u64::MAX),
@@ -373,7 +371,7 @@ impl WorkloadBursts {
         bursts
     }
 
-    /// Adds one of each period, for jobs that may have been released a time `carry` before.
+    /// Adds a burst of each period, for jobs released up to a time `carry` before.
     pub(super) fn add(&mut self, period: u128, carry: u128, takes: u128) {
         let same = |other: &&mut [u128; 3]| other[..2] == [period, carry];
         match self.repeated.iter_mut().find(same) {
@@ -383,7 +381,7 @@ impl WorkloadBursts {
         }
     }
 
-    /// Reports whether no step is long.
+    /// Reports whether all steps are short.
     pub(super) const fn are_none(&self) -> bool {
         self.late_ns == 0
     }
@@ -398,7 +396,7 @@ impl WorkloadBursts {
         takes.fold(0, u128::saturating_add)
     }
 
-    /// Returns the time that so many cores lose in a window.
+    /// Returns the time lost by so many cores in a window.
     pub(super) fn on(&self, cores: usize, window_ns: u64) -> WorkloadSegment {
         let time = u128::from(window_ns) + u128::from(self.late_ns);
         let spans = self.repeated.iter();
@@ -407,7 +405,7 @@ impl WorkloadBursts {
         WorkloadSegment::new(value, 0, spans.min())
     }
 
-    /// Returns the time after which so much time is left besides the losses.
+    /// Returns the least window with this much time left besides the losses.
     pub(super) fn after(&self, time_ns: u64) -> Option<u64> {
         let mut window_ns = time_ns;
         for _ in 0..STEP_LIMIT {
