@@ -1,32 +1,33 @@
-//! Lending: the cores of a commit divided among DAGs, some with a table on cores of their own,
-//! others on what these leave.
+//! Lending: divides the cores of a commit among DAGs. Some DAGs get a table on cores of their own;
+//! the others share the time left.
 //!
-//! A DAG is *heavy* if its volume exceeds the time until its deadline or the next release, so that no
-//! core alone is enough for it, else *light*. There are seven [attempts](LendingAttempt), and the
-//! first that proves a bound for every DAG is taken. In the first one all DAGs share all cores. In
-//! the next four:
+//! A DAG is *heavy* if its volume exceeds the time until its deadline or the next release, too much
+//! for a single core; otherwise it is *light*. There are seven [attempts](LendingAttempt), and the
+//! first attempt to prove a bound for every DAG wins. In the first attempt all DAGs share all
+//! cores. In the next four:
 //!
-//! - *Owners*: the heavy DAGs, the one with the least slack `D - length` first, take the first cores
-//!   that are left, each the least number on which its [list schedule](ListSchedule) ends by its
-//!   deadline: a table of one DAG. One for which too few are left is *late*.
-//! - *Members*: the late DAGs and then the light ones are placed one by one: on the first core on
-//!   which it is proven with all that are there; else in the first group of several cores; else on
-//!   cores that are in no group yet, the least busy ones first, as few as prove it.
+//! - *Owners*: heavy DAGs take the first free cores, in order of ascending slack `D - length`. Each
+//!   gets a table of one DAG, on the fewest cores on which its [list schedule](ListSchedule) ends
+//!   by its deadline. A DAG left with too few cores is *late*.
+//! - *Members*: the late DAGs and then the light DAGs are placed one by one. A DAG goes to the
+//!   first core that proves it together with all DAGs already there; otherwise to the first group
+//!   of several cores with the same property; otherwise to the fewest cores outside any group that
+//!   prove it, the least busy cores first.
 //!
-//! In two of these the owners' lists are squeezed before that. In the last two attempts as many
-//! periodic DAGs as a lap has room for are a *family*, which gets one table (`table_making`); heavy
-//! ones of the rest are owners, on the last cores, and all others members. The family has as few
-//! cores less as members need, if they need any.
+//! Two of the four squeeze the owners' lists before placing members. In the last two attempts as
+//! many periodic DAGs as fit into a lap form a *family*, with one table (`table_making`). Heavy
+//! DAGs outside the family are owners, on the last cores, and all others are members. The family
+//! gives up cores only if members find no place otherwise, and as few as possible.
 //!
-//! A member that is placed lowers nobody's bound but those of its own group, which depend on the
-//! supplies of the group's cores ([`CoreSupply`]) and on its members only.
+//! A new member lowers nobody's bound outside its own group. Bounds in a group depend only on its
+//! members and on the supplies of its cores ([`CoreSupply`]).
 //!
-//! Guaranteed: every job of every DAG responds within its bound, if the plan is enforced: tables by
-//! T1 to T3, members on the cores of their group by deadline (ties by position) and below the
-//! entries of tables. See `docs/bounds.md`, "Tables".
+//! Guaranteed: every job of every DAG responds within its bound if the plan is enforced, with
+//! tables by rules T1 to T3, and members on the cores of their group by deadline (ties by
+//! position), below the entries of tables. See `docs/bounds.md`, "Tables".
 //!
-//! Not guaranteed: that a set which is not proven misses a deadline, or that no other division
-//! would prove it. DAGs that wait are not covered.
+//! Not guaranteed: an unproven set need not miss a deadline, and some other division might prove
+//! the set. DAGs with waits are not covered.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -48,22 +49,22 @@ use crate::task_set::TaskSet;
 /// DAGs with a table on cores of their own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoreOwner {
-    /// The positions of the DAGs: a heavy one, or a family.
+    /// The positions of the DAGs: a single heavy DAG, or a family.
     pub dags: Vec<usize>,
-    /// The first of the cores, which follow one another.
+    /// The first of the owner's consecutive cores.
     pub first_core: usize,
-    /// The number of cores, not all of which need have a list.
+    /// The number of cores. Some of them may have no list.
     pub cores: usize,
-    /// The table, on cores that are counted from 0 of all.
+    /// The table. Its core numbers count from 0 of all cores.
     pub table: Table,
-    /// The number of tries that it took.
+    /// The number of tries needed to make the table.
     pub tries: u32,
 }
 
-/// Cores that DAGs share, with what owners leave of them.
+/// Cores shared by DAGs, as far as owners leave time there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LentGroup {
-    /// The cores; where they are several and not all, those that are least busy first.
+    /// The cores; a group of several but not all cores lists the least busy core first.
     pub cores: Vec<usize>,
     /// The positions of the DAGs with their response-time bounds in nanoseconds, the most urgent
     /// first: by deadline, ties by position.
@@ -73,11 +74,11 @@ pub struct LentGroup {
 /// A division of cores under which every DAG has a bound.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LendingPlan {
-    /// The attempt that found it.
+    /// The successful attempt.
     pub attempt: LendingAttempt,
     /// The owners, in the order of their cores.
     pub owners: Vec<CoreOwner>,
-    /// The groups, in the order in which they were made; each DAG is an owner or in one of them.
+    /// The groups, in the order of creation; each DAG is an owner or in one of the groups.
     pub groups: Vec<LentGroup>,
 }
 
@@ -86,12 +87,13 @@ pub struct LendingPlan {
 pub struct LendingAnswer {
     /// The plan; `None`: no attempt proved all DAGs.
     pub plan: Option<LendingPlan>,
-    /// For each attempt that failed, why, and the position of the DAG, if there is a first one.
+    /// For each failed attempt, the reason, and the position of the first DAG to fail, if there is
+    /// one.
     pub failed: Vec<(Option<usize>, AttemptFailure)>,
 }
 
 impl LendingPlan {
-    /// Returns the first attempt of DAGs that another analysis has to prove.
+    /// Returns the plan of the first attempt, for DAGs to be proven by another analysis.
     pub(super) fn whole(dags: usize, cores: usize) -> Self {
         let mut group = LentGroup::of((0..cores).collect());
         group.members = (0..dags).map(|dag| (dag, u64::MAX)).collect();
@@ -102,9 +104,10 @@ impl LendingPlan {
         }
     }
 
-    /// Divides the cores of a task set so: cores that owners and groups connect are a cluster.
+    /// Divides the cores of a task set as planned. Cores connected by owners and groups become a
+    /// cluster.
     ///
-    /// Cores are counted anew, those of a cluster in a row; cores that nobody uses come last.
+    /// Cores are renumbered, those of a cluster in a row; unused cores come last.
     pub(super) fn divide(&self, task_set: &mut TaskSet, tasks: &[&Task]) {
         let clusters = self.clusters();
         let place = |core: usize| {
@@ -186,8 +189,8 @@ impl LendingPlan {
         clusters
     }
 
-    /// Returns how much of the time of some cores, in hundredths, is left by their owners and by
-    /// the members of groups on them.
+    /// Returns the share of time on some cores, in hundredths, left by their owners and by the
+    /// members of groups on them.
     fn left_percent(&self, cores: &[usize], tasks: &[&Task]) -> u32 {
         let of_list = |core: &usize| {
             let owns = |owner: &&CoreOwner| owner.own_cores().contains(core);
@@ -203,7 +206,7 @@ impl LendingPlan {
             let shared = own.filter(|core| cores.contains(core)).count() as u64;
             let members = group.members.iter().map(|&(dag, _)| tasks[dag]);
             let load = members.map(|task| parts_per_million(task.volume_ns(), task.period_ns()));
-            // Members take from their cores alike.
+            // Members load all cores of their group alike.
             let load = load.fold(0, u64::saturating_add).saturating_mul(shared);
             taken = taken.saturating_add(load.div_ceil(group.cores.len() as u64));
         }
@@ -213,19 +216,19 @@ impl LendingPlan {
     }
 }
 
-/// The terms of a division besides the DAGs.
+/// The conditions of a division, besides the DAGs.
 pub(super) struct LendingTerms<'b> {
     pub(super) bursts: &'b WorkloadBursts,
-    /// The most entries in a lap; 0: there may be no table of several DAGs.
+    /// The most entries in a lap; 0: no table of several DAGs is allowed.
     pub(super) entry_limit: usize,
     /// Whether DAGs may share cores, by static priorities.
     pub(super) has_members: bool,
 }
 
-/// Divides cores among DAGs by the analysis of tables in `docs/bounds.md`; a table of several DAGs
-/// has a number of entries at most ([`ENTRY_LIMIT`](crate::ENTRY_LIMIT) where a commit makes it).
+/// Divides cores among DAGs by the analysis of tables in `docs/bounds.md`. A table of several DAGs
+/// has at most `entry_limit` entries; a commit passes [`ENTRY_LIMIT`](crate::ENTRY_LIMIT).
 ///
-/// `None` if it does not apply: there is no core, or a subtask waits.
+/// Returns `None` if the analysis does not apply: without cores, or with waiting subtasks.
 #[must_use]
 pub fn lend(tasks: &[&Task], cores: u32, entry_limit: usize) -> Option<LendingAnswer> {
     let terms = LendingTerms {
@@ -236,11 +239,11 @@ pub fn lend(tasks: &[&Task], cores: u32, entry_limit: usize) -> Option<LendingAn
     terms.lend(tasks, cores)
 }
 
-/// Why an attempt failed, of which DAG.
+/// Why an attempt failed, and for which DAG.
 type Failed = (Option<usize>, AttemptFailure);
 
 impl LendingTerms<'_> {
-    /// As [`lend`].
+    /// Does the same as the function [`lend`].
     pub(super) fn lend(&self, tasks: &[&Task], cores: u32) -> Option<LendingAnswer> {
         if cores == 0 || tasks.iter().any(|task| task.has_waits()) {
             return None;
@@ -261,7 +264,7 @@ impl LendingTerms<'_> {
                     (owners, late) = self.own_cores(tasks, &all, 0..count)
                 }
                 LendingAttempt::SqueezedByDensity => self.squeeze(tasks, &mut owners),
-                // The owners of the attempt before, and none at first.
+                // Otherwise keep the owners of the attempt before; the first attempt has none.
                 _ => {}
             }
             let placed = match attempt {
@@ -299,7 +302,7 @@ impl LendingTerms<'_> {
         Some(LendingAnswer { plan: None, failed })
     }
 
-    /// Makes the table of a family, and places the DAGs that are not in it.
+    /// Makes the table of a family, and places the DAGs outside the family.
     fn with_family(
         &self,
         family: &mut TableFamily<'_>,
@@ -316,12 +319,13 @@ impl LendingTerms<'_> {
         if let Some(&dag) = rest.iter().find(|&&dag| !may_be_member(tasks[dag])) {
             return Err((Some(dag), AttemptFailure::Member));
         }
+        // The family needs at least one core, so the heavy DAGs may not take the last.
         let (mut heavy, late) = self.own_cores(&tasks, &rest, 0..cores - 1);
         rest.retain(|&dag| heavy.iter().all(|owner| owner.dag != dag));
         if let Some(&dag) = rest.first().filter(|_| !self.has_members) {
             return Err((Some(dag), AttemptFailure::Member));
         }
-        // The table has the first cores.
+        // The table gets the first cores.
         let owned = heavy.iter().map(|owner| owner.schedule.cores.len());
         let left = cores - owned.sum::<usize>();
         heavy.iter_mut().for_each(|owner| owner.first_core += left);
@@ -351,7 +355,8 @@ impl LendingTerms<'_> {
         Err((first_failure, AttemptFailure::Place))
     }
 
-    /// Gives heavy DAGs of these cores of their own, and returns those for which too few are left.
+    /// Gives heavy DAGs of these cores of their own, and returns the DAGs for which too few cores
+    /// are left.
     fn own_cores<'t>(
         &self,
         tasks: &[&'t Task],
@@ -366,6 +371,7 @@ impl LendingTerms<'_> {
         let (mut owners, mut late, mut first_core) = (Vec::new(), Vec::new(), cores.start);
         for dag in heavy {
             let (task, (_, limit_ns)) = (tasks[dag], late_and_limit_ns(self.bursts, tasks[dag]));
+            // Fewer cores cannot execute the volume within the limit.
             let least = task.volume_ns().div_ceil(limit_ns.max(1));
             let least = usize::try_from(least).unwrap_or(usize::MAX);
             let most = task.subtask_count().min(cores.end - first_core);
@@ -424,7 +430,7 @@ impl CoreOwner {
 }
 
 impl LendingAttempt {
-    /// All attempts, in their order.
+    /// All attempts, in order.
     pub const ALL: [Self; 7] = [
         Self::Whole,
         Self::ByDensity,
@@ -435,7 +441,7 @@ impl LendingAttempt {
         Self::Lazy,
     ];
 
-    /// Returns the light ones of some DAGs in the order in which they are placed.
+    /// Returns the light DAGs among some DAGs, in the order of placement.
     fn light(self, tasks: &[&Task], dags: &[usize]) -> Vec<usize> {
         let light = dags.iter().copied().filter(|&dag| !is_heavy(tasks[dag]));
         let mut light: Vec<usize> = light.collect();
@@ -452,19 +458,20 @@ fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.within_ns()
 }
 
-/// Returns by how much an owner's subtasks are late at most, and when its lists have to end for that.
+/// Returns how late an owner's subtasks may be, and the latest end of its lists to make up for the
+/// lateness; both in nanoseconds.
 pub(super) fn late_and_limit_ns(bursts: &WorkloadBursts, task: &Task) -> (u64, u64) {
     let within_ns = task.within_ns();
     let late_ns = u64::try_from(bursts.during(within_ns.into())).unwrap_or(u64::MAX);
     (late_ns, within_ns.saturating_sub(late_ns))
 }
 
-/// Members on what the tables leave, as far as they are placed.
+/// Members placed so far, on the time left by tables.
 struct MemberPlacing<'a> {
     members: &'a [MemberTask<'a>],
     supplies: Vec<CoreSupply>,
     groups: Vec<LentGroup>,
-    /// How often equations may be evaluated yet.
+    /// The number of evaluations of equations left.
     steps: u32,
 }
 
@@ -477,7 +484,7 @@ impl<'a> MemberPlacing<'a> {
     ) -> Self {
         let mut supplies = vec![CoreSupply::FREE; cores];
         let of_tables: usize = owners.iter().map(|owner| owner.dags.len()).sum();
-        // Without members nobody asks what is left.
+        // Without members nobody asks for supplies.
         for owner in owners.iter().filter(|_| of_tables < members.len()) {
             let (late_ns, _) = late_and_limit_ns(bursts, members[owner.dags[0]].task);
             for list in &owner.table.lists {
@@ -494,7 +501,7 @@ impl<'a> MemberPlacing<'a> {
         }
     }
 
-    /// Places all DAGs in one group of all cores, or returns the most urgent one without a bound.
+    /// Places all DAGs in one group of all cores, or returns the most urgent DAG without a bound.
     fn share_all(&mut self) -> Result<(), usize> {
         let mut group = LentGroup::of((0..self.supplies.len()).collect());
         let members = self.members;
@@ -506,7 +513,7 @@ impl<'a> MemberPlacing<'a> {
         Ok(())
     }
 
-    /// Places DAGs one after the other, or returns the first for which there is no place.
+    /// Places DAGs one after the other, or returns the first DAG without a place.
     fn place_all(&mut self, mut dags: impl Iterator<Item = usize>) -> Result<(), usize> {
         dags.find(|&dag| !self.place(dag)).map_or(Ok(()), Err)
     }
@@ -515,7 +522,7 @@ impl<'a> MemberPlacing<'a> {
         self.place_on_one(dag) || self.place_in_group(dag) || self.place_in_new_group(dag)
     }
 
-    /// Places a DAG on the first core that is in no larger group and on which it is proven.
+    /// Places a DAG on the first core that proves it and belongs to no larger group.
     fn place_on_one(&mut self, dag: usize) -> bool {
         (0..self.supplies.len()).any(|core| match self.group_of(core) {
             None => self.add_group(vec![core], dag),
@@ -523,16 +530,15 @@ impl<'a> MemberPlacing<'a> {
         })
     }
 
-    /// Places a DAG in the first group of several cores in which it is proven.
+    /// Places a DAG in the first group of several cores that proves it.
     fn place_in_group(&mut self, dag: usize) -> bool {
         (0..self.groups.len()).any(|place| {
-            // A core that is alone was tried before.
+            // Groups of a single core were tried before.
             self.groups[place].cores.len() > 1 && self.extend_group(place, dag)
         })
     }
 
-    /// Places a DAG on the fewest cores that are in no group and on which it is proven, the least
-    /// busy first.
+    /// Places a DAG on the fewest cores that prove it, outside any group and the least busy first.
     fn place_in_new_group(&mut self, dag: usize) -> bool {
         let task = self.members[dag].task;
         let (deadline_ns, length_ns) = (task.within_ns(), task.length_ns());
@@ -541,7 +547,7 @@ impl<'a> MemberPlacing<'a> {
             .filter(|&core| self.group_of(core).is_none())
             .collect();
         sort_by_key(&mut free, busy_ns);
-        // A core that supplies no more than the length interferes by as much as it adds.
+        // A core with a supply no larger than the length adds as much interference as capacity.
         let adds = |&&core: &&usize| deadline_ns - busy_ns(core) > length_ns;
         let count = free.iter().take_while(adds).count();
         (2..=count).any(|count| self.add_group(free[..count].to_vec(), dag))
@@ -552,19 +558,19 @@ impl<'a> MemberPlacing<'a> {
         groups.position(|group| group.cores.contains(&core))
     }
 
-    /// Makes a group with one member if that is proven in it.
+    /// Makes a group with one member if the member is proven there.
     fn add_group(&mut self, cores: Vec<usize>, dag: usize) -> bool {
         let group = self.join(LentGroup::of(cores), dag);
         group.map(|group| self.groups.push(group)).is_some()
     }
 
-    /// Adds a member to a group if all of them are proven then.
+    /// Adds a member to a group if all members are still proven.
     fn extend_group(&mut self, place: usize, dag: usize) -> bool {
         let group = self.join(self.groups[place].clone(), dag);
         group.map(|group| self.groups[place] = group).is_some()
     }
 
-    /// Returns a group with one more member if all of them are proven in it.
+    /// Returns the group with one more member if all members are proven then.
     fn join(&mut self, mut group: LentGroup, dag: usize) -> Option<LentGroup> {
         let members = self.members;
         let urgency = |dag: usize| (members[dag].task.within_ns(), dag);
@@ -573,7 +579,7 @@ impl<'a> MemberPlacing<'a> {
         group.members.insert(place, (dag, 0));
         let cores = group.cores.iter().map(|&core| &self.supplies[core]);
         let cores: Vec<&CoreSupply> = cores.collect();
-        // More urgent members keep their bounds.
+        // More urgent members keep their bounds: new members rank below and cannot delay them.
         let (above, changed) = group.members.split_at_mut(place);
         let above = above.iter().map(|&(other, ns)| (&members[other], ns));
         let mut above: Vec<(&MemberTask<'_>, u64)> = above.collect();

@@ -1,35 +1,37 @@
-//! Cores that are lent: the time that a table takes from them, and response times in the rest.
+//! Lent cores: the time a table takes from its cores, and response times in the rest.
 //!
-//! On the cores of a table nothing wins over its entries. What these leave is *lent* to a *group*:
-//! some cores, and DAGs that are its *members*, the more urgent first by deadline. On cores of a group
-//! on which no entry executes, ready subtasks of its members do. Proofs are in `docs/bounds.md`,
-//! "Tables"; here in short.
+//! On the cores of a table nothing wins over its entries. The time left is *lent* to a *group*:
+//! some cores, and DAGs as *members*, ordered by deadline, the more urgent first. A group's core
+//! executes ready subtasks of members while no entry executes there. This is a summary;
+//! `docs/bounds.md`, "Tables", has the proofs.
 //!
-//! *Busy time.* Let `t` be the begin of a stretch without idle time in the table. Of the entries that
-//! start at `t` or later, let all that are released by `t` be there at once, and the others at their
-//! releases. A core that is never idle with work executes as much of that in the `r` after `t` as the
-//! table does in no such window more: `busy(r)` is the most over all `t`. It is not what the table
-//! executes, since an entry that ends early brings later ones forward. So `r - busy(r)` is the core's
-//! supply bound function (I. Shin, I. Lee, RTSS 2003).
+//! *Busy time.* Let a stretch without idle time in the table begin at `t`. Take the entries with a
+//! start at `t` or later: suppose all entries released by `t` are there at once, and the others
+//! arrive at their releases. `busy(r)` is the most work, over all `t`, that a core never idle with
+//! work pending executes of these entries in the `r` after `t`. The table executes no more in any
+//! window of length `r`. Its own idle times would give no bound, because an entry that ends early
+//! brings later entries forward. So `r - busy(r)` is the core's supply bound function (I. Shin, I.
+//! Lee, RTSS 2003).
 //!
-//! *One core.* A member is a sequence of its volume there. Its response time is the least `r` with
-//! `r >= volume + sum of (r / T_h) volume_h (ceiling) + busy(r)`, over the more urgent members h.
+//! *One core.* There a member is one sequence with its volume. Its response time is the least `r`
+//! with `r >= volume + sum of (r / T_h) volume_h (ceiling) + busy(r)`, over the more urgent members
+//! h.
 //!
-//! *Several cores.* The form of `multi_path`, with each core of the group as one more that
-//! interferes, on one core at a time. `r` is proven on `q` cores if for some `j < q`
+//! *Several cores.* The form of `multi_path` applies, and each core of the group adds its table as
+//! interference on one core at a time. `r` is proven on `q` cores if for some `j < q`
 //!
 //! - `(q - j) x >= B_j + sum of busy(r) + sum of W_h(r)`, or
 //! - `(q - j) x >= max(1, B_j) + sum of min(busy(r), x) + sum of W_h(r) clipped to x`.
 //!
-//! *Long steps* (bursts, in `workload`) take `E(r)` from every core. The entries of a table of one DAG
-//! are late by as much then, so `t` is; and `E(r)`, or `(q - j) E(r)`, is added on the right. So is,
-//! on several cores, the time for going on elsewhere with what an entry finds on its core.
+//! *Long steps* (bursts, in `workload`) take `E(r)` from every core. The entries of a table of one
+//! DAG are then late by as much, and `t` with them; `E(r)`, or `(q - j) E(r)`, is added on the
+//! right. On several cores the right side also contains the time for moving members away from cores
+//! claimed by entries.
 //!
-//! Assumes: a table that is right, members of which a job is complete by the next release, subtasks
-//! that can be preempted and do not wait, and bounds that all more urgent members keep. Members
-//! may be sporadic.
+//! Assumes: a right table; members with each job complete by the next release; preemptible subtasks
+//! without waits; and bounds kept by all more urgent members. Members may be sporadic.
 //!
-//! Traps: entries that are under way or overdue when the window begins; and `max(1, ..)`, as in
+//! Traps: entries under way or overdue when the window begins; and `max(1, ..)`, as in
 //! `multi_path`.
 
 use alloc::vec::Vec;
@@ -41,28 +43,30 @@ use crate::ids::{DagId, to_u32};
 use crate::order::sorted;
 use crate::table::{CoreList, Table};
 
-/// The time that one core supplies besides the entries of its table.
+/// The time supplied by one core besides the entries of its table.
 ///
-/// See "Tables" in `docs/bounds.md`. In a window that begins with a stretch of the table the
-/// core is busy without a break at first; from `full_ns` on, the busy time repeats by laps. Within
-/// one it is the most of all *ramps*: `w - idle`, up to `top`.
+/// See "Tables" in `docs/bounds.md`. In a window starting with a stretch of the table, the core is
+/// at first busy without a break. From `full_ns` on, the busy time repeats by laps. Within a lap it
+/// is the maximum of all *ramps*: `w - idle`, up to `top`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoreSupply {
     lap_ns: u64,
     /// The work of one lap.
     work_ns: u64,
     full_ns: u64,
-    /// The idle time in a window, and the most work; both ascending.
+    /// For each ramp, the idle time in a window and the most work; both ascending.
     ramps: Vec<(u64, u64)>,
-    /// The number of entries in a lap, and for how long one may have been released as it starts.
+    /// The number of entries in a lap.
     starts: usize,
+    /// The longest time from an entry's release to its start, with its charge and lateness, in
+    /// nanoseconds.
     waiting_ns: u64,
 }
 
 /// An entry, with its WCET alone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SuppliedEntry {
-    /// From the beginning of the lap on; negative: before that.
+    /// Relative to the beginning of the lap; negative: before the lap.
     pub(super) release_ns: i64,
     pub(super) start_ns: u64,
     pub(super) wcet_ns: u64,
@@ -79,8 +83,8 @@ impl CoreSupply {
         waiting_ns: 0,
     };
 
-    /// Describes the core of a list of a table, whose entries are late by so much at most; the
-    /// tasks are by DAG.
+    /// Describes the core of a list of a table, with entries late by at most `late_ns`; `task`
+    /// returns the task of a DAG.
     pub fn of_list<'a>(
         table: &Table,
         list: &CoreList,
@@ -99,13 +103,13 @@ impl CoreSupply {
         Self::of(table.lap_ns, &entries.collect::<Vec<_>>(), late_ns)
     }
 
-    /// Describes a core with a list, in its order.
+    /// Describes a core from its list, in the order of starts.
     pub(super) fn of(lap_ns: u64, list: &[SuppliedEntry], late_ns: u64) -> Self {
         let waits = |of: &SuppliedEntry| {
             let before_ns = of.release_ns.saturating_neg();
             of.start_ns.saturating_add_signed(before_ns)
         };
-        // A start is late by no more than its charge, which the WCET has.
+        // A start is late by no more than its charge, already part of the WCET.
         let until_late = |of: &SuppliedEntry| waits(of) + of.wcet_ns;
         let waiting_ns = list.iter().map(until_late).max().unwrap_or(0);
         let mut supply = Self {
@@ -115,7 +119,7 @@ impl CoreSupply {
             waiting_ns: waiting_ns.saturating_add(late_ns),
             ..Self::FREE
         };
-        // No sum of these times overflows.
+        // Below these limits no sum of the times overflows.
         let times_ns = [lap_ns, supply.work_ns, supply.waiting_ns];
         let is_small = times_ns.iter().all(|&ns| ns < 1 << 60);
         if !is_small || supply.work_ns >= lap_ns && !list.is_empty() {
@@ -131,7 +135,7 @@ impl CoreSupply {
         let mut idle_at: Vec<(u64, u64)> = Vec::new();
         for start_ns in stretches(lap_ns, list) {
             let origin_ns = start_ns + late_ns;
-            // What has been released and not begun, of all laps.
+            // All work released and not begun, over all laps.
             let open = |of: &SuppliedEntry| {
                 let laps = (origin_ns + waits(of) + lap_ns - of.start_ns) / lap_ns;
                 of.wcet_ns * laps.saturating_sub(u64::from(of.start_ns < start_ns))
@@ -148,8 +152,8 @@ impl CoreSupply {
         supply
     }
 
-    /// Returns how long a core is busy from a time of the lap on, with so much work at once and what
-    /// arrives later.
+    /// Returns how long a core stays busy from a time of the lap on, with `open_ns` of work at once
+    /// and later arrivals.
     fn until_idle_ns(&self, arrivals: &[(u64, u64)], origin_ns: u64, open_ns: u64) -> u64 {
         let gain_ns = self.lap_ns - self.work_ns;
         // At the end of the lap, after all arrivals.
@@ -158,13 +162,13 @@ impl CoreSupply {
         let mut gaps = Vec::new();
         let first = arrivals.partition_point(|&(ns, _)| ns <= origin_ns);
         for (ns, wcet_ns) in arrivals[first..].iter().chain(&arrivals[..first]) {
-            // In the lap that ends with the origin.
+            // In the lap ending with the origin.
             let after_ns = (ns + self.lap_ns - origin_ns - 1) % self.lap_ns + 1;
             room_ns = room_ns.max(after_ns.saturating_sub(came_ns));
             gaps.push((after_ns, came_ns));
             came_ns += wcet_ns;
         }
-        // Each lap without a gap leaves less work to the next by the table's idle time.
+        // Each lap without a gap leaves the next lap less work, by the table's idle time.
         let laps = open_ns.saturating_sub(room_ns).div_ceil(gain_ns);
         let left_ns = open_ns - laps * gain_ns;
         let is_idle = |&&(after_ns, came_ns): &&(u64, u64)| left_ns + came_ns <= after_ns;
@@ -172,7 +176,7 @@ impl CoreSupply {
         laps * self.lap_ns + left_ns + gap.map_or(came_ns, |&(_, came_ns)| came_ns)
     }
 
-    /// Adds the ramps of a window that begins at a time of the lap, for the lap from `full_ns` on.
+    /// Adds the ramps of a window starting at a time of the lap, for the lap from `full_ns` on.
     fn add_ramps(&mut self, arrivals: &[(u64, u64)], origin_ns: u64, busy_ns: u64) {
         let laps = (self.full_ns - busy_ns) / self.lap_ns;
         let (mut now_ns, mut done_ns) =
@@ -197,7 +201,7 @@ impl CoreSupply {
         }
     }
 
-    /// Adds a ramp if no other is as high everywhere, and removes those below.
+    /// Adds a ramp unless another ramp is as high everywhere, and removes the ramps below.
     fn offer(&mut self, idle_ns: u64, top_ns: u64) {
         let end = self.ramps.partition_point(|ramp| ramp.0 <= idle_ns);
         if end > 0 && self.ramps[end - 1].1 >= top_ns {
@@ -208,13 +212,13 @@ impl CoreSupply {
         self.ramps.splice(first..first + below, [(idle_ns, top_ns)]);
     }
 
-    /// Returns the most time that the table executes on this core in any window of a length, both
-    /// in nanoseconds; never more than the length, 0 without a table.
+    /// Returns the most time the table executes on this core in any window of a length, both in
+    /// nanoseconds. The result never exceeds the length, and is 0 without a table.
     pub fn busy_ns(&self, window_ns: u64) -> u64 {
         self.busiest(window_ns).0
     }
 
-    /// Returns that time, and by how much it grows at once with the window, one for one.
+    /// Returns the busy time, and for how long it keeps growing with the window, one for one.
     fn busiest(&self, window_ns: u64) -> (u64, u64) {
         let Some(after_ns) = window_ns.checked_sub(self.full_ns) else {
             return (window_ns, self.full_ns - window_ns);
@@ -233,13 +237,13 @@ impl CoreSupply {
         (laps * self.work_ns + busy_ns, more_ns)
     }
 
-    /// Adds the time that it takes members to go on with another core, as entries take this one.
+    /// Adds the time members need to go on with another core when entries take this core.
     fn add_moves(&self, bursts: &mut WorkloadBursts) {
         let takes = self.starts as u128 * u128::from(bursts.move_ns);
         bursts.add(self.lap_ns.into(), self.waiting_ns.into(), takes);
     }
 
-    /// Returns the busy time as work of one core, as far as it surely grows.
+    /// Returns the busy time as work of one core, as far as its growth is certain.
     fn at(&self, window_ns: u64) -> WorkloadSegment {
         let (value, more) = self.busiest(window_ns);
         let span = (more > 0).then_some(more.into());
@@ -247,12 +251,12 @@ impl CoreSupply {
     }
 }
 
-/// Returns where the stretches without idle time begin that a list makes in its lap.
+/// Returns the begins of the stretches without idle time made by a list in its lap.
 fn stretches(lap_ns: u64, list: &[SuppliedEntry]) -> Vec<u64> {
     let mut begins = Vec::new();
-    // A lap later, so that none of these is negative.
+    // Shifted by a lap, so the times are never negative.
     let mut end_ns = 0;
-    // The second time, what goes on from the lap before is known.
+    // In the second pass the carry-over from the lap before is known.
     for _ in 0..2 {
         begins.clear();
         for of in list {
@@ -267,7 +271,7 @@ fn stretches(lap_ns: u64, list: &[SuppliedEntry]) -> Vec<u64> {
     begins
 }
 
-/// Returns a part of a period in millionths, rounded up; no more than `u64::MAX`.
+/// Returns a part of a period in millionths, rounded up; at most `u64::MAX`.
 pub(super) fn parts_per_million(work_ns: u64, period_ns: u64) -> u64 {
     let parts = (u128::from(work_ns) * 1_000_000).div_ceil(u128::from(period_ns));
     u64::try_from(parts).unwrap_or(u64::MAX)
@@ -276,15 +280,15 @@ pub(super) fn parts_per_million(work_ns: u64, period_ns: u64) -> u64 {
 /// A DAG as a member of groups.
 pub(super) struct MemberTask<'a> {
     pub(super) task: &'a Task,
-    /// The most cores that one job can use, as far as there are any.
+    /// The most cores one job can use, out of those available.
     parallelism: u64,
     /// The most work of 1, 2, .. disjoint chains.
     pub(super) covers: Vec<u64>,
     bursts: &'a WorkloadBursts,
 }
 
-/// How many terms of equations may be evaluated in one attempt, one for each core and member; a
-/// member that needs more is not proven. Ordinary sets need hundreds or thousands.
+/// The most terms of equations evaluated in one attempt, one term for each core and member. A
+/// member in need of more is not proven. Ordinary sets need hundreds or thousands.
 pub(super) const STEP_LIMIT: u32 = 1 << 16;
 
 impl<'a> MemberTask<'a> {
@@ -298,15 +302,15 @@ impl<'a> MemberTask<'a> {
         }
     }
 
-    /// Returns the response-time bound on these cores, among more urgent members, each with its
-    /// own; `None` if it is not within the deadline.
+    /// Returns the response-time bound on these cores among more urgent members, each with its own
+    /// bound; `None`: the bound exceeds the deadline, or the steps ran out.
     pub(super) fn respond(
         &self,
         cores: &[&CoreSupply],
         above: &[(&Self, u64)],
         steps: &mut u32,
     ) -> Option<u64> {
-        // No response is shorter, and from there on all that is to be executed only grows.
+        // No response is shorter, and from there on all work to be executed only grows.
         let mut window_ns = match cores {
             [_] => self.task.volume_ns(),
             _ => self.task.length_ns(),
@@ -326,7 +330,7 @@ impl<'a> MemberTask<'a> {
         None
     }
 
-    /// Returns how much longer a window has to be at least on one core; `None`: it is enough.
+    /// Returns how much longer a window has to be at least on one core; `None`: long enough.
     fn on_one(&self, core: &CoreSupply, above: &[(&Self, u64)], window_ns: u64) -> Option<u128> {
         let steady = |work_ns: u64, jobs: u64| {
             WorkloadSegment::new(u128::from(work_ns) * u128::from(jobs), 0, None)
@@ -341,8 +345,8 @@ impl<'a> MemberTask<'a> {
         all.lacks(1, window_ns.into())
     }
 
-    /// Returns how much longer a window of at least the length has to be at least on several
-    /// cores, by the best form; `None`: it is enough.
+    /// Returns how much longer a window, no shorter than the length, has to be at least on several
+    /// cores, by the best form; `None`: long enough.
     fn on_several(
         &self,
         cores: &[&CoreSupply],
@@ -359,7 +363,7 @@ impl<'a> MemberTask<'a> {
         lacks.min().flatten()
     }
 
-    /// Returns the forms of the equation on several cores, for a window.
+    /// Returns the forms of the equation on several cores for a window.
     pub(super) fn forms<'c>(
         &'c self,
         cores: &'c [&CoreSupply],
@@ -409,8 +413,8 @@ pub(super) struct LentForm {
     /// The number of cores beside the chains.
     pub(super) free: usize,
     pub(super) is_clipped: bool,
-    /// The work beside the chains, that of owners and of each more urgent member, and the time that
-    /// long steps take.
+    /// The work beside the chains, the work of owners and of each more urgent member, and the time
+    /// taken by long steps.
     pub(super) works: Vec<WorkloadSegment>,
 }
 

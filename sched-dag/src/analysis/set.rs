@@ -1,24 +1,22 @@
-//! Several DAGs on one set of cores: their response-time equations together.
+//! Several DAGs on one set of cores: their response-time equations, solved together.
 //!
-//! DAG `i` *may outrank* DAG `k` if some instance of `i` may win a core that an
-//! instance of `k` waits for. The bound of `k` then depends on the bound of
-//! `i`. If priorities do not interleave this goes one way, from the highest
-//! down; if they do, or under EDF, it goes round in circles. Both are solved
-//! alike: start from the bounds of jobs alone, raise one DAG's after the other until
-//! nothing changes.
-//! All functions are monotone, so that ends in the least solution of all.
+//! DAG `i` *may outrank* DAG `k` if some instance of `i` may win a core from a waiting instance of
+//! `k`. The bound of `k` then depends on the bound of `i`. If priorities do not interleave, the
+//! dependency goes one way, from the highest priority down. If they do, or under EDF, there are
+//! circles. Both cases have the same solution: start from the bounds of jobs alone, and raise one
+//! DAG's bound after the other until nothing changes. All functions are monotone, so the iteration
+//! ends in the least solution.
 //!
-//! Why circles are sound: look at the first job ever to exceed its bound, at
-//! the instant when it does. Until then every job kept to its bound, which is
-//! all that the workloads in its equation assume; so its equation holds, and
-//! it did not exceed its bound.
+//! Why circles are sound: look at the first job ever to exceed its bound, at the instant of excess.
+//! Until then every job kept to its bound, and the workloads in the job's equation assume no more.
+//! So the equation holds, and the job did not exceed its bound: a contradiction.
 //!
-//! A DAG that fails takes those with it that it may outrank, since their
-//! workloads would rest on a bound that does not exist; others keep theirs.
+//! A failing DAG makes every DAG fail that it may outrank, because their workloads would rest on a
+//! missing bound. Other DAGs keep their bounds.
 //!
-//! [`multi_path_fp`] and [`multi_path_edf`] take or refuse a set at once, as the literature
-//! compares
-//! tests; a commit asks [`answer()`](super::answer()), which judges each DAG on its own account.
+//! [`multi_path_fp`] and [`multi_path_edf`] accept or refuse a set as a whole, the way the
+//! literature compares tests. A commit asks [`answer()`](super::answer()), which judges each DAG
+//! separately.
 
 use alloc::vec::Vec;
 
@@ -29,37 +27,37 @@ use super::task::Task;
 use super::waiting::{Rounding, with_blocking};
 use super::workload::{InterferingWorkload, WorkloadBursts};
 
-/// DAGs with what enters their equations.
+/// DAGs with all inputs of their equations.
 #[derive(Clone)]
 pub(super) struct EquationSet<'a> {
     pub(super) tasks: &'a [&'a Task],
     pub(super) cores: u32,
-    /// By DAG, how many of them its equations count.
+    /// By DAG, the number of cores counted in its equations.
     counted: Vec<u32>,
     pub(super) shapes: Vec<GraphSummary>,
     pub(super) figures: Vec<PipelineTerms>,
-    /// Whether only jobs with deadlines no later count (EDF), where no jobs overlap.
+    /// Whether only jobs with deadlines no later count (EDF), for jobs without overlap.
     pub(super) deadlines_limit: bool,
-    /// Whether each subtask keeps its core, so that lower-ranked ones may block.
+    /// Whether each subtask keeps its core, so that lower-ranked subtasks may block.
     pub(super) keep_cores: bool,
     /// Which interference counts.
     pub(super) clip: InterferenceBound,
     pub(super) bursts: WorkloadBursts,
     pub(super) rounding: Rounding,
-    /// Whether the forms are those of subtasks that wait; see [`Self::has_waits`].
+    /// Whether the equations have the forms for waiting subtasks; see [`Self::has_waits`].
     pub(super) is_of_waits: bool,
-    /// By DAG, whether waits enter its equations; empty: of none.
+    /// By DAG, whether waits enter its equations; empty: no DAG's.
     with_waits: Vec<bool>,
 }
 
-/// The bounds of one DAG of a set, as far as they are solved.
+/// The bounds of the DAGs of a set, as far as solved.
 #[derive(Debug)]
 pub(super) struct DagSolution {
-    /// The response-time bound by DAG, `None` if not proven.
+    /// The response-time bound by DAG; `None`: not proven.
     pub(super) responses: Vec<Option<u64>>,
-    /// The DAG that failed first, on its own account.
+    /// The first DAG to fail by itself.
     pub(super) first_failing: Option<(usize, SolverFailure)>,
-    /// Why a DAG has no response time, by DAG.
+    /// By DAG, why it has no response time.
     pub(super) failures: Vec<Option<BoundFailure>>,
 }
 
@@ -68,9 +66,9 @@ pub(super) struct DagSolution {
 pub(super) enum BoundFailure {
     /// Its own equation has no usable solution.
     Own(SolverFailure),
-    /// This DAG may outrank it and has no bound itself.
+    /// Another DAG without a bound may outrank it.
     Other(usize),
-    /// Jobs of a DAG that may outrank it may overlap, and waits enter.
+    /// A DAG that may outrank it has overlapping jobs, and waits enter the equation.
     Overlapping,
 }
 
@@ -85,7 +83,7 @@ impl DagSolution {
 }
 
 impl<'a> EquationSet<'a> {
-    /// Describes DAGs that are preemptive and whose older jobs win.
+    /// Describes preemptive DAGs, with older jobs winning over younger.
     pub(super) fn new(tasks: &'a [&'a Task], cores: u32) -> Self {
         let shapes: Vec<GraphSummary> = tasks
             .iter()
@@ -110,7 +108,7 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Solves the equations of DAGs that are given from the highest priority to the lowest.
+    /// Solves the equations of DAGs listed from the highest priority to the lowest.
     pub(super) fn in_order(&self) -> Option<Vec<u64>> {
         let order: Vec<usize> = (0..self.tasks.len()).collect();
         let none = alloc::vec![None; order.len()];
@@ -118,11 +116,11 @@ impl<'a> EquationSet<'a> {
         solution.responses.into_iter().collect()
     }
 
-    /// Counts fewer cores in the equations of a DAG.
+    /// Counts only `cores` cores in the equations of a DAG.
     pub(super) fn count_on(&mut self, dag: usize, cores: u32) {
         let own = GraphSummary::of(self.tasks[dag], cores);
         let shape = &mut self.shapes[dag];
-        // What it executes next to others may be on all cores.
+        // Next to other DAGs, though, the DAG may execute on all cores.
         (shape.covers, shape.left) = (own.covers, own.left);
         self.counted[dag] = cores;
     }
@@ -132,8 +130,8 @@ impl<'a> EquationSet<'a> {
         self.is_of_waits
     }
 
-    /// Accepts no response time beyond a period of those DAGs that waits enter: the forms with
-    /// waits are of jobs that do not overlap.
+    /// Accepts no response time beyond a period for the DAGs marked in `with_waits`: the forms for
+    /// waits need jobs without overlap.
     pub(super) fn forbid_overlap(&mut self, with_waits: Vec<bool>) {
         for (figures, _) in (self.figures.iter_mut().zip(&with_waits)).filter(|(_, with)| **with) {
             figures.allow_in_flight(1);
@@ -141,13 +139,13 @@ impl<'a> EquationSet<'a> {
         self.with_waits = with_waits;
     }
 
-    /// Reports whether a DAG's subtasks wait, or those of a DAG that may delay it.
+    /// Reports whether subtasks wait in a DAG, or in another DAG able to delay it.
     pub(super) fn waits_enter(&self, dag: usize) -> bool {
         self.has_waits() && self.with_waits.get(dag) == Some(&true)
     }
 
-    /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority
-    /// first is fastest. Bounds that are known already stay.
+    /// Solves the equations, visiting the DAGs in `order`. Any order will do, but the highest
+    /// priority first is fastest. Known bounds stay.
     pub(super) fn solve(
         &self,
         known: &[Option<u64>],
@@ -161,15 +159,15 @@ impl<'a> EquationSet<'a> {
             first_failing: None,
             failures: alloc::vec![None; self.tasks.len()],
         };
-        // Where waits enter, a job that alone takes longer than it may has no bound. It fails first, and
-        // not one that would have to wait for it.
+        // With waits, a job too long even when alone has no bound. It must fail first, before any
+        // DAG that would have to wait for it.
         for &dag in order {
             let limit_ns = self.figures[dag].limit_ns();
             if self.waits_enter(dag) && solution.responses[dag] > Some(limit_ns) {
                 solution.fail(dag, BoundFailure::Own(SolverFailure::BeyondDeadline));
             }
         }
-        // However the set is built, the commit ends: what is not solved in time is not proven.
+        // The budget ends every commit, however the set is built: an unsolved set is not proven.
         let mut steps = EvaluationBudget::of(self.tasks.len());
         let mut is_done = false;
         // Upwards from the least responses: the least fixed point of all equations together.
@@ -186,12 +184,13 @@ impl<'a> EquationSet<'a> {
                         Err(failure) => solution.fail(dag, failure),
                     }
                 }
-                // A response that has grown may delay all others, so everything is looked at again.
+                // A grown response may delay all other DAGs, so another round must visit
+                // everything.
                 is_done &= solution.responses[dag] == before;
             }
         }
-        // The budget is spent on the way up. From the deadlines down each round is a bound, so the
-        // last whole one can be had.
+        // The way up has spent the budget. On the way down from the deadlines each round is a
+        // bound, so the last whole round can be used.
         if let Some((_, SolverFailure::Limit)) = solution.first_failing
             && let Some(coarse) = self.down_from_deadlines(known, may_outrank)
         {
@@ -202,8 +201,8 @@ impl<'a> EquationSet<'a> {
         solution
     }
 
-    /// Returns the least response time of a DAG among others, if it is at least `start_ns`, or which
-    /// failure keeps it from one.
+    /// Returns the least response time of a DAG among others, searching from `start_ns` upwards, or
+    /// the failure in the way.
     fn respond(
         &self,
         dag: usize,
@@ -218,8 +217,8 @@ impl<'a> EquationSet<'a> {
         let apart = delays(equations.limit_ns)?;
         let solved = steps.spend(dag, |steps| equations.solve(&apart, start_ns, steps));
         match solved {
-            // Where jobs may overlap, the equation for several jobs in flight may still find a
-            // bound.
+            // Jobs that may overlap may still have a bound by the equation for several jobs in
+            // flight.
             Err(SolverFailure::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
                 let together = delays(overlapping)?;
                 steps.spend(dag, |steps| figures.solve(&together, start_ns, steps))
@@ -229,7 +228,7 @@ impl<'a> EquationSet<'a> {
         .map_err(BoundFailure::Own)
     }
 
-    /// Returns the equations of a DAG's jobs one at a time.
+    /// Returns the equations for a DAG's jobs one at a time.
     pub(super) fn equations(&self, dag: usize) -> MultiPathEquations<'_> {
         let figures = &self.figures[dag];
         MultiPathEquations {
@@ -243,16 +242,16 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Returns the bound of a job alone, below which no solution lies: from
-    /// there on the workloads only grow.
+    /// Returns the bound of a job alone. No solution lies below, and from there on the workloads
+    /// only grow.
     fn start(&self, dag: usize) -> Option<u64> {
         let left = &self.shapes[dag].left;
         alone(self.tasks[dag], left, self.counted[dag], self.rounding)
     }
 
-    /// Tries the deadlines as bounds: if each equation holds with the others'
-    /// deadlines, then the least solution lies below, however slowly one
-    /// comes near it. From there it goes down, as long as steps are left.
+    /// Tries the deadlines as bounds. If each equation holds with the others' deadlines, the least
+    /// solution lies below, however slow the approach from below. From the deadlines the iteration
+    /// goes down, as long as steps are left.
     pub(super) fn down_from_deadlines(
         &self,
         known: &[Option<u64>],
@@ -273,7 +272,7 @@ impl<'a> EquationSet<'a> {
                     .ok()
             });
             match lower.collect::<Option<Vec<u64>>>() {
-                // The bounds of the last whole round hold; a tighter one was not found in time.
+                // The bounds of the last whole round hold; no tighter bounds were found in time.
                 None if has_round => return Some(bounds),
                 None => return None,
                 Some(lower) if lower == bounds => return Some(bounds),
@@ -283,7 +282,7 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Returns the sources of delay of a DAG's jobs that have such a bound, as
+    /// Returns the sources of delay for a DAG's jobs of the given bound, as
     /// [`delays`](Self::delays) does.
     pub(super) fn delays_of_job(
         &self,
@@ -296,12 +295,12 @@ impl<'a> EquationSet<'a> {
         self.delays(dag, (bound_ns, deadline_ns), responses, may_outrank)
     }
 
-    /// Returns the sources of delay of a DAG's work that is due at a relative deadline, its job or
-    /// one sink of it, where jobs have such a bound; or the first DAG that may outrank it and has no
-    /// bound that is of use.
+    /// Returns the sources of delay for a DAG's work due at a relative deadline, either its job or
+    /// one of its sinks, given the bound of its jobs. Fails with the first DAG that may outrank it
+    /// and has no usable bound.
     ///
-    /// A DAG that may outrank this one counts with its jobs that are due by then, where that
-    /// is a limit, and else in full. A DAG that does not count in full may block.
+    /// Where deadlines limit the interference, a DAG counts only with its jobs due by then;
+    /// otherwise in full. A DAG that does not count in full may block.
     pub(super) fn delays(
         &self,
         dag: usize,
@@ -324,8 +323,8 @@ impl<'a> EquationSet<'a> {
                 }
                 others.push(self.other(dag, other, response, limit_ns));
             }
-            // What outranks is in the interference already, except under EDF, where a later job of
-            // it may block.
+            // A DAG that outranks this DAG is in the interference already. Under EDF, however, a
+            // later job of the other DAG may block.
             if self.keep_cores && (limit_ns.is_some() || !outranks) {
                 blocking_ns.extend_from_slice(&self.shapes[other].largest_ns);
             }
@@ -333,7 +332,7 @@ impl<'a> EquationSet<'a> {
         Ok(self.delays_by(dag, others, &blocking_ns))
     }
 
-    /// Returns the sources of delay of a DAG: workloads, and longest segments that may block it.
+    /// Returns the sources of delay of a DAG: workloads, and the longest segments able to block it.
     fn delays_by(
         &self,
         dag: usize,
@@ -353,7 +352,7 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Describes what a DAG with a response-time bound may execute next to another one.
+    /// Describes the work a DAG with a response-time bound may execute next to another DAG.
     fn other(
         &self,
         dag: usize,
@@ -371,8 +370,8 @@ impl<'a> EquationSet<'a> {
     }
 }
 
-/// How often equations may be evaluated yet. A DAG takes the shared steps first and then its
-/// own, so that one which comes near its solution slowly takes no other's bound away.
+/// The number of evaluations of equations left. A DAG takes shared steps first and then its own, so
+/// a DAG with slow convergence takes away no other's bound.
 pub(super) struct EvaluationBudget {
     shared: u64,
     /// By DAG.
@@ -387,28 +386,28 @@ impl EvaluationBudget {
         }
     }
 
-    /// Lets a DAG take steps from those that it may.
+    /// Lets a DAG spend its available steps.
     pub(super) fn spend<T>(&mut self, dag: usize, work: impl FnOnce(&mut u64) -> T) -> T {
         let own = self.own[dag];
-        // Each DAG has steps of its own, so that one with slow equations leaves the others theirs.
+        // Steps of its own for each DAG: a DAG with slow equations leaves the others theirs.
         let mut left = self.shared + own;
         let result = work(&mut left);
-        // The shared ones are spent first.
+        // The shared steps are spent first.
         self.own[dag] = left.min(own);
         self.shared = left - self.own[dag];
         result
     }
 }
 
-/// Reports whether there are cores and every DAG has `D <= T`.
+/// Reports whether there are cores, and `D <= T` for every DAG.
 pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
     let one = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
     cores > 0 && tasks.iter().all(one)
 }
 
-/// Bounds the response times under global fixed priorities, the DAGs given from the highest
-/// priority to the lowest; also of jobs that overlap. `None` if there is no core, or a DAG has no
-/// bound within its deadline.
+/// Bounds the response times under global fixed priorities, also of overlapping jobs. The DAGs come
+/// from the highest priority to the lowest. Returns `None` without cores, or if a DAG has no bound
+/// within its deadline.
 #[must_use]
 pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
     let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
@@ -419,9 +418,9 @@ pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Op
     set.in_order()
 }
 
-/// Bounds the response times under global EDF, in the order given: down from the
-/// deadlines, so it accepts a little less than [`answer()`](super::answer()). `None` if a DAG has
-/// `D > T`, or no bound within its deadline.
+/// Bounds the response times under global EDF, in the order given. The iteration goes down from the
+/// deadlines and therefore accepts a little less than [`answer()`](super::answer()). Returns `None`
+/// without cores, or if a DAG has `D > T` or no bound within its deadline.
 #[must_use]
 pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
     let mut set = constrained(tasks, cores).then(|| EquationSet::new(tasks, cores))?;
