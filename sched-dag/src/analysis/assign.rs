@@ -1,31 +1,33 @@
-//! The commit's own clusters: cores that heavy DAGs own and lend, or cores of its own for each DAG
-//! that needs several and single cores for the others.
+//! The commit's own clusters: heavy DAGs own cores and lend the rest, or each DAG in need of
+//! several cores gets cores of its own and the others share single cores.
 //!
-//! Under static priorities the cores are divided as [`lend`](super::lend()) does, if that proves all
-//! DAGs. Else this is federated scheduling (the papers are named below); under other policies
-//! that comes first, and a table for all DAGs where it proves less. A DAG is *heavy* if a job of it is more work than one core does by its deadline, or
-//! by the next release if that comes first, or if subtasks of it wait; it gets a cluster of as many
-//! cores as its multi-path bound needs, or of fewer with a table. The others are *light*: clusters
-//! of one core each take them, the densest first, each where the sum of densities is least (worst
-//! fit), so that what room there is, is left on every core. A core takes light DAGs up to a sum of
-//! 1, which is enough for EDF and no proof for static priorities. Where that leaves a DAG without
-//! cores, all DAGs share all of them if that proves each. Whatever is assigned, the analysis of each
-//! cluster has the last word.
+//! Under static priorities the cores are divided by [`lend`](super::lend()) if the result proves
+//! all DAGs. Otherwise this is federated scheduling (papers below). Under other policies federated
+//! scheduling comes first, and a table for all DAGs comes second, if federated scheduling does not
+//! prove all.
+//!
+//! A DAG is *heavy* if a job is more work than one core does by its deadline, or by the next
+//! release if earlier, or if subtasks wait. It gets a cluster of as many cores as its multi-path
+//! bound needs, or of fewer with a table. The other DAGs are *light*. Clusters of one core each
+//! take them, the densest first, each on the core with the least sum of densities (worst fit), so
+//! every core keeps some room. A core takes light DAGs up to a sum of 1: enough for EDF, but no
+//! proof for static priorities. If a DAG ends up without cores, all DAGs share all cores, provided
+//! such sharing proves each of them. Whatever the assignment, the analysis of each cluster has the
+//! last word.
 //!
 //! # Federated scheduling: cores of its own for each DAG that needs several
 //!
 //! J. Li, J.-J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, ECRTS 2014,
-//! doi:10.1109/ECRTS.2014.23; with `D <= T`: S. Baruah, DATE 2015. A *heavy*
-//! DAG (`volume > D`) gets `ceil((volume - length) / (D - length))` dedicated
-//! cores, on which Graham's bound is at most `D`. A *light* one is executed
-//! sequentially on one of the remaining cores, and a core takes light DAGs while
-//! the sum of their densities `volume / D` is at most 1 (partitioned EDF).
+//! doi:10.1109/ECRTS.2014.23; with `D <= T`: S. Baruah, DATE 2015. A *heavy* DAG (`volume > D`)
+//! gets `ceil((volume - length) / (D - length))` dedicated cores, where Graham's bound is at most
+//! `D`. A *light* DAG executes sequentially on one of the remaining cores. A core takes light DAGs
+//! while the sum of their densities `volume / D` is at most 1 (partitioned EDF).
 //!
-//! This is what the literature compares; a commit that makes its own clusters asks `assign`.
-//! Assumes `D <= T`.
+//! [`federated`] implements this form, the form compared in the literature; a commit that makes its
+//! own clusters calls [`assign`]. Assumes `D <= T`.
 //!
-//! Light DAGs are placed first-fit by descending density, ties by position;
-//! another placement may succeed where this one fails.
+//! Light DAGs are placed first-fit by descending density, ties by position. Where this placement
+//! fails, another may succeed.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -46,46 +48,47 @@ use crate::table::{ENTRY_LIMIT, Table};
 use crate::task_set::TaskSet;
 use crate::worded::texts;
 
-/// A DAG that gets no cores, and why.
+/// A DAG without cores, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NotAssigned {
     /// The DAG.
     pub dag: DagId,
-    /// Why it gets none.
+    /// Why the DAG gets no cores.
     pub reason: AssignmentFailure,
-    /// Why the [attempts](crate::LendingAttempt) to lend cores failed, and for which DAG, if there
-    /// is a first one; `None` where those do not apply.
+    /// Why the [attempts](crate::LendingAttempt) to lend cores failed, each with the first DAG to
+    /// fail, if any; `None` where lending does not apply.
     pub attempts: Option<FailedAttempts>,
 }
 
-/// Why attempts failed, and of which DAG.
+/// For each failed attempt, the DAG and the reason.
 pub type FailedAttempts = Vec<(Option<DagId>, AttemptFailure)>;
 
 texts! {
     /// Why a DAG gets no cores.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum AssignmentFailure {
-        /// It states a cluster, and the clusters are not made yet.
+        /// The DAG states a cluster, but the clusters do not exist yet.
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
-        /// It states cores of a cluster that is not made yet.
+        /// The DAG states cores of a cluster that does not exist yet.
         Confined =
             "it states cores of a cluster, and the commit is to make the clusters; leave its affinity out";
-        /// It enters a lock without a longest section.
+        /// The DAG enters a lock without a longest section.
         UnboundedLock =
             "it enters a lock without a longest section, in which it keeps what shares its cores \
              waiting; state one by `Lock::longest`";
-        /// Its need of cores is not known.
+        /// The number of cores needed is unknown.
         Unknown(error: TaskError) = "{error}";
-        /// A path of it, overheads included, takes longer than a job has, on any number of cores.
+        /// The longest path, overheads included, takes longer than a job has, on any number of
+        /// cores.
         TooLong { length_ns: u64, within_ns: u64 } =
             "its longest path takes {:?}, and a job has {:?} until its deadline or the next \
              release; shorten the path, or lengthen both",
             Duration::from_nanos(*length_ns), Duration::from_nanos(*within_ns);
-        /// It is heavy, or waits, and the cores that are left are too few.
+        /// The DAG is heavy, or waits, and too few cores are left.
         TooHeavy { left: u32 } =
             "a job needs cores of its own to be in time, and too few are left: {left}; add cores, or \
              lengthen its deadline and period";
-        /// It is light, and no core has room for it, of those that heavy DAGs leave.
+        /// The DAG is light, and no core left by heavy DAGs has room.
         NoRoom { left: u32 } =
             "no core has room for it, of those that heavy DAGs leave: {left}; add cores, or \
              lengthen deadlines and periods";
@@ -96,7 +99,7 @@ texts! {
 ///
 /// # Errors
 ///
-/// The first DAG that gets no cores: heavy and waiting ones in the order of the commit, then light ones,
+/// The first DAG without cores: heavy and waiting DAGs in the order of the commit, then light DAGs,
 /// the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let dags = task_set.dags().iter();
@@ -120,7 +123,8 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     let bursts = WorkloadBursts::of(task_set.dags().iter().map(|dag| (dag, false)), &all);
     let mut federated = task_set.clone();
     let outcome = federate(&mut federated, &bursts, &tasks, settings);
-    // A table fixes what a policy by releases would decide, so that one goes last.
+    // Under policies that look at releases, a table comes last: it fixes an order that such a
+    // policy would decide.
     let is_proven = settings.policy.adds_release()
         && outcome.is_ok()
         && answer(&federated, settings).is_proven();
@@ -134,7 +138,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         *task_set = federated;
         return Ok(());
     };
-    // Lending has tried that, where it applies; it knows neither waits nor EDF.
+    // Lending, where applicable, has already tried sharing; it knows neither waits nor EDF.
     let whole = LendingPlan::whole(tasks.len(), settings.cores as usize);
     let tasks: Vec<&Task> = tasks.iter().collect();
     match attempts.is_none() && take_if_proven(task_set, &whole, &tasks, settings) {
@@ -146,7 +150,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     }
 }
 
-/// Divides the cores as planned if that proves all DAGs, and reports whether it does.
+/// Divides the cores as planned if the division proves all DAGs, and reports whether it does.
 fn take_if_proven(
     task_set: &mut TaskSet,
     plan: &LendingPlan,
@@ -162,8 +166,8 @@ fn take_if_proven(
     is_proven
 }
 
-/// Divides the cores as [`lend`](super::lend()) does, if that applies; an error says why each
-/// attempt failed.
+/// Divides the cores by [`lend`](super::lend()), where applicable. The error tells why each attempt
+/// failed.
 fn lend_cores(
     task_set: &mut TaskSet,
     bursts: &WorkloadBursts,
@@ -174,13 +178,13 @@ fn lend_cores(
         return None;
     }
     let tasks: Vec<&Task> = tasks.iter().collect();
-    // A table has no slack for steps, interrupts and sections that delay its entries all at once.
+    // A table has no slack for steps, interrupts and sections that delay all its entries at once.
     let is_delayed =
         bursts.during(0) > 0 || task_set.dags().iter().any(|dag| !dag.locks().is_empty());
     let terms = LendingTerms {
         bursts,
         entry_limit: if is_delayed { 0 } else { ENTRY_LIMIT },
-        // They are ranked by deadline, and no order that depends on releases does that.
+        // Members are ranked by deadline, a ranking no release-dependent order provides.
         has_members: !settings.policy.adds_release(),
     };
     let LendingAnswer { plan, failed } = terms.lend(&tasks, settings.cores)?;
@@ -189,7 +193,7 @@ fn lend_cores(
         let failed = failed.into_iter().map(|(dag, why)| (dag.map(id), why));
         return (terms.has_members).then(|| Err(failed.collect()));
     };
-    // Priorities that the app states may rank DAGs in another way than by deadline.
+    // Stated priorities may rank DAGs differently than by deadline.
     take_if_proven(task_set, &plan, &tasks, settings).then_some(Ok(()))
 }
 
@@ -200,20 +204,21 @@ fn federate(
     tasks: &[Task],
     settings: &AnalysisSettings,
 ) -> Result<(), NotAssigned> {
-    // The cores of each cluster, and where each DAG is.
+    // The number of cores of each cluster, and the place of each DAG.
     let mut sizes = Vec::new();
     let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
     let (mut tables, mut left) = (Vec::new(), settings.cores);
     let mut light = Vec::new();
     for (dag, task) in tasks.iter().enumerate() {
         let (volume_ns, within_ns) = density(task);
-        // One core is enough for it, so it may share one; those are packed when it is known what
-        // the heavy ones leave. What waits has cores of its own: a sum of densities is no test of it.
+        // One core is enough for a light DAG, so it may share a core. Light DAGs are packed last,
+        // onto the cores left by heavy DAGs. A DAG with waits gets cores of its own: a sum of
+        // densities is no test for waits.
         if volume_ns <= within_ns && !task.has_waits() {
             light.push(dag);
             continue;
         }
-        // No number of cores shortens the longest path, so this is told apart from a lack of them.
+        // No number of cores shortens the longest path, so this case differs from a lack of cores.
         let length_ns = task.span_ns();
         if length_ns > within_ns {
             let too_long = AssignmentFailure::TooLong {
@@ -235,7 +240,7 @@ fn federate(
             let schedule = ListSchedule::within(task, &limits_ns).filter(|_| may_have_table)?;
             Some((count, Some(schedule.table(dag, task.period_ns(), 0))))
         };
-        // The least number that proves it, since light DAGs share what is left.
+        // The least number of cores with a proof, since light DAGs share the rest.
         let Some((count, table)) = (1..=left).find_map(enough) else {
             return Err(refused(dag, AssignmentFailure::TooHeavy { left }));
         };
@@ -269,7 +274,7 @@ fn refused(dag: usize, reason: AssignmentFailure) -> NotAssigned {
     }
 }
 
-/// Returns the work of a job, and the time in which one core would have to do it.
+/// Returns the work of a job, and the time in which one core would have to finish it.
 fn density(task: &Task) -> (u64, u64) {
     (task.volume_ns(), task.within_ns())
 }
@@ -311,18 +316,18 @@ fn pack(
     Ok(())
 }
 
-/// Which DAG gets which cores.
+/// An assignment of cores to DAGs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Federation {
     /// The heavy DAGs by position, each with its number of dedicated cores.
     pub heavy: Vec<(usize, u32)>,
-    /// The light DAGs of each remaining core, by position; the length is the
-    /// number of cores left for light DAGs.
+    /// The light DAGs of each remaining core, by position; the length is the number of cores left
+    /// for light DAGs.
     pub light: Vec<Vec<usize>>,
 }
 
-/// Assigns cores by Graham's bound, or returns `None` if that does not succeed
-/// or a DAG has `D > T` or waits.
+/// Assigns cores by Graham's bound. Returns `None` if the assignment fails, or if a DAG has `D > T`
+/// or waits.
 #[must_use]
 pub fn federated(tasks: &[&Task], cores: u32) -> Option<Federation> {
     if !constrained(tasks, cores) || tasks.iter().any(|task| task.has_waits()) {
@@ -333,7 +338,8 @@ pub fn federated(tasks: &[&Task], cores: u32) -> Option<Federation> {
     let mut light = Vec::new();
     for (position, task) in tasks.iter().enumerate() {
         if task.volume_ns() > task.relative_deadline_ns() {
-            // Zero slack: then the volume, which exceeds D, exceeds the length.
+            // With zero slack, the volume (more than `D`) exceeds the length, so no number of cores
+            // is enough.
             let slack = task.relative_deadline_ns().checked_sub(task.length_ns())?;
             let beside = task.volume_ns() - task.length_ns();
             let room = beside.checked_add(slack.checked_sub(1)?)?;

@@ -1,9 +1,9 @@
-//! The cases of a commit: the DAGs of a cluster that can be analysed, and what follows from their
+//! The cases of a commit: the analysable DAGs of a cluster, and the consequences of their
 //! attributes.
 //!
-//! A DAG that cannot be analysed, because it lacks a WCET for example, takes
-//! those with it that it may delay, directly or through others. What is left
-//! is analysed without it: whatever it does, it cannot delay these.
+//! A DAG may be unanalysable, for example for lack of a WCET. Then every DAG that it may delay,
+//! directly or through others, is unanalysable, too. The remaining DAGs are analysed without it,
+//! because it cannot delay them, whatever it does.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -23,9 +23,9 @@ use crate::policy::Preemption;
 use crate::table::Table;
 use crate::task_set::{Dag, Subtask};
 
-/// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
-/// others of these cannot be. There are no other DAGs on the cores of the settings, and no other
-/// tables.
+/// Makes the case of the analysable DAGs among the positions `own`, passes the case to `work`, and
+/// notes why others of `own` are not analysable. The cores of the settings have no other DAGs and
+/// no other tables.
 pub(super) fn with_case(
     (dags, tables, certificate): (&[Dag], &[&Table], Option<&str>),
     own: &[usize],
@@ -50,7 +50,7 @@ pub(super) fn with_case(
     work(&case, verdict, reasons);
 }
 
-/// Where the DAGs of a commit execute, as far as they are in one cluster.
+/// The places of execution of a commit's DAGs, as far as they are in one cluster.
 struct CorePlaces<'a> {
     all: &'a [Dag],
     tables: &'a [&'a Table],
@@ -78,22 +78,22 @@ impl<'a> CorePlaces<'a> {
         }
     }
 
-    /// Reports whether two DAGs without tables are members of one group.
+    /// Reports whether two DAGs without tables are members of the same group.
     fn share(&self, one: usize, other: usize) -> bool {
         let is_free = |dag: usize| self.table_of[dag].is_none();
         let same = self.all[one].affinity() == self.all[other].affinity();
         is_free(one) && is_free(other) && same
     }
 
-    /// Reports whether a member's group has a core of a table.
+    /// Reports whether a member's group includes a core of a table.
     fn meets(&self, member: usize, table: usize) -> bool {
         let affinity = self.all[member].affinity();
         let mut lists = self.tables[table].lists.iter();
         affinity.is_empty() || lists.any(|list| affinity.contains(&list.core))
     }
 
-    /// Reports whether a DAG may delay another one, if it may in a group of both; what keeps its
-    /// core may delay a table as well.
+    /// Reports whether a DAG may delay another DAG; `in_group` says whether it may in a group of
+    /// both. A DAG with subtasks that keep their cores may delay a table as well.
     fn delays(&self, other: usize, dag: usize, in_group: bool, keep_cores: bool) -> bool {
         match (self.table_of[other], self.table_of[dag]) {
             (Some(one), Some(two)) => one == two,
@@ -107,13 +107,13 @@ impl<'a> CorePlaces<'a> {
 /// A table of a case.
 pub(super) struct CaseTable<'a> {
     pub(super) table: &'a Table,
-    /// Its DAGs that can be analysed, ascending by their positions in the case.
+    /// The table's analysable DAGs, ascending by position in the case.
     pub(super) dags: Vec<usize>,
-    /// Its times, if it is right.
+    /// The table's times, or the fault that makes it wrong.
     pub(super) times: Result<TableTimes, NotProvenReason>,
 }
 
-/// Returns the settings for a cluster of so many cores, with these DAGs.
+/// Returns the settings for a cluster of `cores` cores with these DAGs.
 pub(super) fn of_cluster(
     settings: &AnalysisSettings,
     cores: u32,
@@ -126,24 +126,25 @@ pub(super) fn of_cluster(
     }
 }
 
-/// The DAGs that can be analysed, and what follows from their attributes.
+/// The analysable DAGs of a cluster, and the consequences of their attributes.
 pub(super) struct AnalysisInput<'a> {
     places: CorePlaces<'a>,
-    /// The positions of those on these cores, also of those that cannot be analysed.
+    /// The positions of all DAGs on these cores, analysable or not.
     own: &'a [usize],
-    /// Those of this case; elsewhere a DAG is a position in this list.
+    /// The positions of this case's DAGs; all other fields refer to a DAG by its position in this
+    /// list.
     pub(super) members: &'a [usize],
     pub(super) tasks: &'a [&'a Task],
     pub(super) settings: &'a AnalysisSettings,
     pub(super) relation: RankRelation,
-    /// The most urgent DAG first.
+    /// The DAGs, the most urgent first.
     pub(super) order: Vec<usize>,
     pub(super) set: EquationSet<'a>,
     pub(super) tables: Vec<CaseTable<'a>>,
-    /// By DAG, the features that enter it: its own, and those of all that may delay it.
+    /// By DAG, the features entering it: its own, and those of all DAGs able to delay it.
     pub(super) entering: Vec<Features>,
     pub(super) certificate: Option<&'a str>,
-    /// By DAG and subtask, the bounds of sinks by a certificate, if there is one.
+    /// By DAG and subtask, the bounds of sinks by a certificate, if the commit has a certificate.
     pub(super) closed: Option<Result<Vec<Vec<u64>>, NotClosed>>,
 }
 
@@ -181,15 +182,16 @@ impl<'a> AnalysisInput<'a> {
         case
     }
 
-    /// Returns the bursts of the DAGs of the commit on these cores, some of which may fall behind.
+    /// Returns the bursts of the commit's DAGs on these cores; `fall_behind` marks the DAGs that
+    /// may fall behind.
     fn bursts(&self, fall_behind: impl Fn(usize) -> bool) -> WorkloadBursts {
         let own = self.own.iter();
         let own = own.map(|&dag| (&self.places.all[dag], fall_behind(dag)));
         WorkloadBursts::of(own, self.settings)
     }
 
-    /// Answers, and lets those fall behind that have no bound, until the bounds of the others rest on
-    /// no such one.
+    /// Analyses the case repeatedly. Every DAG without a bound may fall behind in the next round,
+    /// until no bound rests on a DAG without a bound.
     fn settle(&mut self) -> AnalysisResult {
         let mut has_bound = vec![false; self.places.all.len()];
         for &dag in self.members {
@@ -214,7 +216,7 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Checks a table by the WCETs with what they are charged.
+    /// Checks a table with the charged WCETs.
     fn checked(&self, table: &'a Table) -> CaseTable<'a> {
         let ids = table.dags();
         let place = |id: &DagId| self.members.iter().position(|&dag| dag == id.index());
@@ -225,7 +227,7 @@ impl<'a> AnalysisInput<'a> {
             TableDag {
                 id: self.id(dag),
                 task: self.tasks[dag],
-                // The laps of a DAG alone begin with its jobs.
+                // For a DAG alone in its table, laps begin with its jobs.
                 offset_ns: model.offset_ns() * u64::from(ids.len() > 1),
                 keeps_core: subtasks.map(|subtask| self.keeps_core(subtask)).collect(),
             }
@@ -238,13 +240,14 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Returns the schedule-abstraction graph, of all DAGs or of none.
+    /// Returns the schedule-abstraction graph of all DAGs, or `NotCovered` if some DAG has no place
+    /// there.
     pub(super) fn graph(&self) -> Result<AbstractionSet, NotClosed> {
         if self.members.len() < self.own.len() || self.tells_cores() {
             return Err(NotClosed::NotCovered);
         }
         let dags = (0..self.members.len()).map(|dag| (self.dag(dag), self.tasks[dag]));
-        // As long as no DAG falls behind: if one does, no bound is of the graph.
+        // Assumes that no DAG falls behind: if one does, no bound comes from the graph.
         graph_of(
             &mut dags.into_iter(),
             self.settings,
@@ -252,7 +255,7 @@ impl<'a> AnalysisInput<'a> {
         )
     }
 
-    /// Returns by DAG the features that enter it.
+    /// Returns by DAG the features entering it.
     fn features(&self) -> Vec<Features> {
         let (settings, relation) = (self.settings, &self.relation);
         let all = Features::of_machine(settings, &self.set.bursts, self.tells_cores());
@@ -268,7 +271,7 @@ impl<'a> AnalysisInput<'a> {
                 ),
             }
         });
-        // What a table leaves does not depend on more than that it is right.
+        // The time left by a table depends on nothing but the table being right.
         let in_table = |dag: usize| self.table_of(dag).is_some();
         let keep_cores = relation.preemption != PreemptionMix::All;
         Features::spread(own.collect(), |other, dag| {
@@ -279,8 +282,8 @@ impl<'a> AnalysisInput<'a> {
         })
     }
 
-    /// Reports whether an instance of `other` may go before one of `dag` on a core that counts for
-    /// that, where both are members of groups.
+    /// Reports whether an instance of `other` may go before an instance of `dag` on a core that
+    /// counts for `dag`; both are members of groups.
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
         let is_kept = self.tells_cores() && self.relation.preemption != PreemptionMix::All;
         let [one, two] = [other, dag].map(|dag| self.members[dag]);
@@ -328,12 +331,12 @@ impl<'a> AnalysisInput<'a> {
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
     }
 
-    /// Reports whether a subtask is not preempted once it has started.
+    /// Reports whether a subtask, once started, is not preempted.
     pub(super) fn keeps_core(&self, subtask: &Subtask) -> bool {
         subtask.is_non_preemptive() || self.settings.preemption == Preemption::Disabled
     }
 
-    /// Tells the equations what follows from the attributes.
+    /// Passes the consequences of the attributes to the equations.
     fn complete(&mut self) {
         let tells_cores = self.tells_cores();
         self.set.keep_cores = !tells_cores && self.relation.preemption == PreemptionMix::None;
@@ -341,7 +344,8 @@ impl<'a> AnalysisInput<'a> {
             && self.relation.order == InstanceOrder::ByDeadline
             && match self.relation.preemption {
                 PreemptionMix::All => true,
-                // Jobs that count in full would not block, so less could delay.
+                // Jobs counted in full would not block, so the equations would count too little
+                // delay.
                 PreemptionMix::None => constrained(self.tasks, self.settings.cores),
                 PreemptionMix::Some => false,
             };
@@ -367,8 +371,8 @@ pub(super) fn dag_id(dag: usize) -> DagId {
     DagId(u32::try_from(dag).unwrap_or(u32::MAX))
 }
 
-/// Returns the DAGs at the positions `own` as the analysis sees them, and notes for each that
-/// cannot be analysed the reason: its own, or that it may have to wait for such a one.
+/// Returns the tasks of the DAGs at the positions `own`, and notes for each unanalysable DAG the
+/// reason: a reason of its own, or the unanalysable DAG it may have to wait for.
 fn analysable(
     places: &CorePlaces<'_>,
     own: &[usize],
@@ -400,7 +404,7 @@ fn analysable(
         own.iter().partition(|&&dag| reasons[dag].is_none());
     let mut seen = 0;
     let keep_cores = relation.preemption != PreemptionMix::All;
-    // Until nothing more follows: what is delayed by an unknown DAG is unknown, too.
+    // Repeated until nothing changes: a DAG delayed by an unknown DAG becomes unknown, too.
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
         known.retain(|&dag| {

@@ -1,11 +1,11 @@
-//! Features of the model: what DAGs make use of, and what the proof of a test covers.
+//! Features of the model: used by DAGs, and covered by the proof of a test.
 //!
-//! A test is asked of a DAG only if it covers *every* feature that enters the DAG: those of the
-//! machine, the DAG's own, and those of all that may delay it, directly or through others. A test
-//! covers nothing but what it names. So a new feature silences all tests, until somebody has read
-//! their proofs one by one and names it where it is covered. Where one of several values must hold
-//! (an order, one core or several, preemption), each is a feature, the plain one, too: a proof may
-//! need any of them.
+//! A test is asked about a DAG only if the test covers *every* feature entering the DAG: the
+//! features of the machine, of the DAG itself, and of all DAGs able to delay it, directly or
+//! through others. A test covers nothing but the features it names. So a new feature silences all
+//! tests, until somebody has read the proofs one by one and named the feature where covered. Where
+//! one of several values must hold (an order, one core or several, preemption), each value is a
+//! feature, the plain value included, because a proof may need any of them.
 
 use alloc::vec::Vec;
 
@@ -15,11 +15,11 @@ use super::workload::WorkloadBursts;
 use crate::policy::Activation;
 use crate::task_set::{Dag, Subtask};
 
-/// Some features.
+/// A set of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Features(u32);
 
-/// Names each feature, one bit after the other.
+/// Names each feature and gives it the next free bit.
 macro_rules! features {
     ($($(#[doc = $doc:literal])+ $NAME:ident)+) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "it counts the names")]
@@ -32,11 +32,11 @@ macro_rules! features {
 }
 
 features! {
-    /// The same order for every job, as by static priorities.
+    /// Every job has the same order, as with static priorities.
     RANKED
     /// The earliest absolute deadline first.
     BY_DEADLINE
-    /// Any other order.
+    /// An order of any other kind.
     ANY_ORDER
     /// One core.
     ONE_CORE
@@ -50,9 +50,9 @@ features! {
     SOME_KEEP
     /// Sinks have deadlines of their own, and the order depends on them.
     SINK_DEADLINES
-    /// Of two DAGs each may outrank the other, in the same order for every job.
+    /// Two DAGs may each outrank the other, in the same order for every job.
     INTERLEAVED
-    /// Cores are told apart: DAGs are confined to groups of cores, or tables run on some.
+    /// Cores are told apart: DAGs are confined to groups of cores, or tables run on some cores.
     GROUPS
     /// The DAG is in a table, or a core of its group has one.
     TABLE
@@ -62,9 +62,9 @@ features! {
     LATE_DEADLINES
     /// Fewer jobs may be in flight than the deadline has periods.
     FEW_IN_FLIGHT
-    /// Executions are charged what the platform takes.
+    /// Executions are charged the platform's costs.
     OVERHEADS
-    /// Steps of the scheduler are long that make much ready.
+    /// Some steps of the scheduler are long because they make many instances ready.
     BURSTS
     /// A device interrupts a core.
     DEVICE
@@ -76,22 +76,23 @@ impl Features {
     /// No feature at all.
     pub(super) const NONE: Self = Self(0);
 
-    /// Returns these and others.
+    /// Returns the union with other features.
     pub(super) const fn and(self, others: Self) -> Self {
         Self(self.0 | others.0)
     }
 
-    /// Returns these where a condition holds, else none.
+    /// Returns these features if a condition holds, otherwise none.
     pub(super) const fn if_so(self, holds: bool) -> Self {
         if holds { self } else { Self::NONE }
     }
 
-    /// Reports whether all others are among these.
+    /// Reports whether all the others are among these features.
     pub(super) const fn cover(self, others: Self) -> bool {
         others.0 & !self.0 == 0
     }
 
-    /// Returns by DAG the features of it and of all that may delay it, directly or through others.
+    /// Returns by DAG its features and those of all DAGs able to delay it, directly or through
+    /// others.
     pub(super) fn spread(mut of: Vec<Self>, delays: impl Fn(usize, usize) -> bool) -> Vec<Self> {
         let mut news: Vec<usize> = (0..of.len()).collect();
         while let Some(other) = news.pop() {
@@ -105,15 +106,14 @@ impl Features {
         of
     }
 
-    /// Returns the features of the machine. Each setting is named, as the attributes of a DAG are
-    /// below.
+    /// Returns the features of the machine. Every setting is named, like a DAG's attributes below.
     pub(super) fn of_machine(
         settings: &AnalysisSettings,
         bursts: &WorkloadBursts,
         tells_cores: bool,
     ) -> Self {
         let AnalysisSettings {
-            // Both are in the relation, with what subtasks state.
+            // The relation contains both, together with what subtasks state.
             policy: _,
             preemption,
             cores,
@@ -132,7 +132,7 @@ impl Features {
             .and(Self::GROUPS.if_so(tells_cores))
     }
 
-    /// Returns the features that the DAGs without tables make together.
+    /// Returns the joint features of the DAGs without tables.
     pub(super) fn of_order(relation: &RankRelation) -> Self {
         let order = match relation.order {
             InstanceOrder::Ranked => {
@@ -150,8 +150,9 @@ impl Features {
         order.and(preemption).and(sinks)
     }
 
-    /// Returns the features that the attributes of a DAG make. Each attribute is named: a new one
-    /// does not compile before somebody says which feature it makes, or that no proof depends on it.
+    /// Returns the features made by the attributes of a DAG. Every attribute is named, so a new
+    /// attribute does not compile until somebody says which feature it makes, or that no proof
+    /// depends on it.
     pub(super) fn of_dag(dag: &Dag) -> Self {
         let Dag {
             activation,
@@ -162,20 +163,20 @@ impl Features {
             locks,
             name: _,
             graph_hash: _,
-            // Bounds hold for any offsets and any of the jobs; but those of tables, which are made
-            // for their offsets, and of graphs, whose certificates have both.
+            // Bounds hold for any offsets and any subset of the jobs. Exceptions are tables, made
+            // for particular offsets, and graphs, whose certificates contain both.
             offset_ns: _,
             first_job: _,
             jobs: _,
-            // What is proven neither overruns nor fails, and what others may is in the bursts.
+            // Proven DAGs neither overrun nor fail; the bursts account for other DAGs.
             overrun: _,
             on_fault: _,
-            // A case has the DAGs of one cluster.
+            // A case contains the DAGs of one cluster.
             cluster: _,
             why_there: _,
             // Cores are told apart for all DAGs of a case: see `of_machine`.
             affinity: _,
-            // An order and a shared state are edges.
+            // An order and a shared state are edges already.
             state_precedences: _,
             graph: _,
             topics: _,
@@ -193,13 +194,13 @@ impl Features {
         let Subtask {
             waits,
             name: _,
-            // The analysis sees their sum.
+            // The analysis sees the sum.
             wcet_ns: _,
             lock_wait_ns: _,
             wcet_source: _,
             budget_ns: _,
             stack_bytes: _,
-            // What these come to depends on the settings and on the other DAGs: see `of_order`.
+            // Their effect depends on the settings and on the other DAGs: see `of_order`.
             priority: _,
             non_preemptive: _,
             relative_deadline_ns: _,
@@ -208,7 +209,7 @@ impl Features {
     }
 }
 
-/// Returns the features of these names.
+/// Returns the set of the named features.
 macro_rules! covers {
     ($($NAME:ident)+) => {
         $crate::analysis::features::Features::NONE

@@ -1,11 +1,10 @@
-//! The work that other DAGs may execute while a job lasts, in the forms that the equations need.
+//! The work other DAGs may execute during a job, in the forms needed by the equations.
 //!
-//! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has
-//! a [`InterferingWorkload`] for each number of cores up to those that a job of it can use. The
-//! clipped
-//! form asks for the work in some part of the window only, all together as long as the job
-//! waits: there no core executes more than that time, and neither does a chain of the
-//! other DAG, which is on one core at a time.
+//! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has an
+//! [`InterferingWorkload`] for each number of cores, up to the most cores usable by one of its
+//! jobs. The clipped form asks only for the work in some part of the window, in total as long as
+//! the job waits. In such a part no core executes longer than the part lasts. Neither does a chain
+//! of the other DAG, because a chain is on one core at a time.
 
 use alloc::vec::Vec;
 
@@ -15,32 +14,33 @@ use super::task::Task;
 use super::waiting::beside_span;
 use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
 
-/// Which interference the multi-path equations count; each is a bound, the later the tighter.
+/// The interference counted by the multi-path equations. Each variant is a bound, and later
+/// variants are tighter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum InterferenceBound {
-    /// All that fits into the window.
+    /// All interference that fits into the window.
     Window,
-    /// On each core no more than the time that the job waits.
+    /// On each core, no more than the time for which the job waits.
     Waiting,
-    /// And no more than that of each chain.
+    /// In addition, no more than that time for each chain.
     Chains,
-    /// The same, without the excess of 1 (`schedulability/sharp_clip.rs`).
+    /// As [`Chains`](Self::Chains), without the excess of 1 (`schedulability/sharp_clip.rs`).
     Sharp,
 }
 
-/// The figures of a DAG's graph that enter equations, its own and those of others.
+/// Figures of a DAG's graph needed by its own equations and by those of others.
 #[derive(Clone, Debug)]
 pub(super) struct GraphSummary {
-    /// The most cores that one job can use, at least 1 and at most all.
+    /// The most cores one job can use, at least 1 and at most all.
     pub(super) parallelism: u64,
-    /// The most work of 1, 2, .. disjoint chains, for as many as there are cores; waits count as
-    /// work.
+    /// The most work of 1, 2, .. disjoint chains, for as many chains as there are cores; waits
+    /// count as work.
     pub(super) covers: Vec<u64>,
-    /// The least that is left for `m`, `m - 1`, .. cores beside the span, by any form.
+    /// The least work left beside the span for `m`, `m - 1`, .. cores, by any form.
     pub(super) left: Vec<u64>,
     /// The work of some disjoint chains.
     chains: Vec<u64>,
-    /// The longest executions, which may block others where subtasks keep their cores.
+    /// The longest executions, able to block other DAGs where subtasks keep their cores.
     pub(super) largest_ns: Vec<u64>,
     pub(super) unblocked: Blocking,
 }
@@ -65,27 +65,27 @@ impl GraphSummary {
     }
 }
 
-/// All work that may delay a DAG's work that is due at some time, for as long as it waits.
+/// All work able to delay a DAG's work due at some time, for as long as the DAG waits.
 pub(super) struct DelaySources {
     /// The workloads of DAGs that may outrank it.
     pub(super) others: Vec<InterferingDag>,
     pub(super) blocking: Blocking,
-    /// Where the blocked DAG waits, what is left of it on all cores beside its span, with the
-    /// blocking along the path: then no other form holds.
+    /// For a blocked DAG with waits, the work left on all cores beside its span, with the blocking
+    /// along the path. No other form is valid then.
     pub(super) left_and_blocking: Option<u128>,
     pub(super) bursts: WorkloadBursts,
 }
 
-/// Returns the work that DAGs may execute on all cores within a window.
+/// Returns the most work of some DAGs on all cores within a window.
 pub(super) fn on_all_cores(others: &[InterferingDag], window_ns: u64) -> WorkloadSegment {
     let pieces = others.iter();
     let pieces = pieces.map(|other| other.on_all_cores().at(window_ns));
     pieces.fold(WorkloadSegment::NONE, WorkloadSegment::and)
 }
 
-/// A DAG that may outrank the one under analysis.
+/// A DAG that may outrank the DAG under analysis.
 pub(super) struct InterferingDag {
-    /// All of it, on at most 1, 2, .. cores.
+    /// All work of the DAG, on at most 1, 2, .. cores.
     whole: Vec<InterferingWorkload>,
     /// The work beyond its chains, likewise.
     rest: Vec<InterferingWorkload>,
@@ -106,7 +106,7 @@ impl InterferingDag {
             limit(all)
         };
         let by_cores = |volume_ns: u64| {
-            // Where all that a job can use count, jobs that overlap may use more.
+            // Beyond the most cores of one job, overlapping jobs may use all cores.
             let of_all = |count| {
                 if count < shape.parallelism {
                     count
@@ -133,8 +133,8 @@ impl InterferingDag {
         &self.whole[self.whole.len() - 1]
     }
 
-    /// Adds for each `j` what may execute on `m - j` cores within a window, of which the job
-    /// waits for `waiting_ns`: all that fits in to `plain`, and the clipped to `clipped`.
+    /// Adds for each `j` the work on `m - j` cores within a window: to `plain` all work that fits,
+    /// and to `clipped` the work limited to the `waiting_ns` for which the job waits.
     pub(super) fn add_to(
         &self,
         times: (u64, u64),
@@ -157,16 +157,16 @@ impl InterferingDag {
         }
     }
 
-    /// Returns the workload on at most `cores` cores, plain and clipped, and on how many it
-    /// is at most.
+    /// Returns the workload on at most `cores` cores, plain and clipped, and the number of cores
+    /// counted.
     pub(super) fn on(&self, times: (u64, u64), cores: usize) -> (usize, [u128; 2]) {
         let count = cores.min(self.whole.len());
         let pieces = self.pieces(times, count, Some(self.of_chains(times)));
         (count, pieces.map(|piece| piece.value))
     }
 
-    /// Returns the clipped workload on at most `cores` cores as a function of the time that the job
-    /// waits alone, in the window as it is: exact until the end of its piece.
+    /// Returns the clipped workload on at most `cores` cores as a function of the job's waiting
+    /// time only, with a fixed window. The function is exact until the end of its piece.
     pub(super) fn ahead(&self, times: (u64, u64), cores: usize) -> WorkloadSegment {
         let piece = |part: &InterferingWorkload| {
             let all = WorkloadSegment::new(part.at(times.0).value, 0, None);

@@ -1,18 +1,22 @@
-//! The check of a table: the conditions under which no entry is ever late, in one pass over the lists.
+//! The check of a table: the conditions under which no entry is ever late, in one pass over the
+//! lists.
 //!
-//! This is the function that is proven in Coq (`docs/bounds.md`, "Tables"), written again: three loops
-//! and a map. It trusts nothing of a table, neither its times nor its depths. A table that it accepts
-//! is *right*: whatever ends early, is skipped or cut, each entry finishes by its time in the table.
+//! This is the function proven in Coq (`docs/bounds.md`, "Tables"), written again in Rust: three
+//! loops and a map. The check trusts nothing of a table, neither times nor depths. An accepted
+//! table is *right*: whatever ends early, is skipped or cut, each entry finishes by its time in the
+//! table.
 //!
-//! Entries of the lap after the first stand in the same order, a lap later. The *family* of an entry
-//! is the entry and all of greater depth that directly follow. Of each entry:
+//! The lap after the first has the same entries in the same order, one lap later. The *family* of
+//! an entry is the entry itself together with all directly following entries of greater depth. Of
+//! each entry:
 //!
-//! - it starts no earlier than its release, and than the entry before it;
-//! - its length is enough for the WCETs of its family, and is over when the entry after that starts;
-//! - a subtask that keeps its core has nothing nested in it;
-//! - its predecessors, and the same subtask of the job before, end by its start, and start before.
+//! - it starts no earlier than its release, and no earlier than the entry before;
+//! - its length covers the WCETs of its family, and ends before the entry after the family starts;
+//! - nothing is nested in a subtask that keeps its core;
+//! - its predecessors, and the same subtask of the job before, start before it and end by its
+//!   start.
 //!
-//! Each subtask has one entry for each job of a lap. WCETs are above 0, as those of a [`Task`].
+//! Each subtask has one entry for each job of a lap. WCETs are above 0, as in every [`Task`].
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -26,39 +30,39 @@ use crate::worded::texts;
 pub struct TableDag<'a> {
     /// The DAG.
     pub id: DagId,
-    /// Its WCETs, with all that they are charged, and its edges.
+    /// The DAG's WCETs, with all charges, and its edges.
     pub task: &'a Task,
-    /// The release of its job 0; 0 where there is no other DAG.
+    /// The release of job 0 in nanoseconds; 0 without another DAG.
     pub offset_ns: u64,
-    /// By subtask, whether it keeps its core once it has started.
+    /// By subtask, whether it keeps its core once started.
     pub keeps_core: Vec<bool>,
 }
 
-/// An entry that fails a condition.
+/// An entry failing a condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TableFault {
     /// The DAG of the entry.
     pub dag: DagId,
-    /// Its subtask.
+    /// The subtask of the entry.
     pub subtask: SubtaskId,
-    /// Its job in the first lap.
+    /// The job of the entry in the first lap.
     pub job: i64,
-    /// The condition that fails.
+    /// The failed condition.
     pub condition: TableCondition,
 }
 
-/// The times of a table that is right.
+/// The times of a right table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TableTimes {
-    /// By DAG and subtask, how long after its release an entry finishes at most.
+    /// By DAG and subtask, the latest finish of an entry after its release, in nanoseconds.
     pub latest_ns: Vec<Vec<u64>>,
-    /// Whether no length is more than the WCETs of its family, all of which end by then: the table
-    /// is a run.
+    /// Whether each length equals the WCETs of the family, with all nested entries ending by then.
+    /// The table is then a possible run.
     pub is_exact: bool,
 }
 
 texts! {
-    /// A condition of a table, in the words of a failure.
+    /// A condition of a table, worded as a failure.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum TableCondition {
         /// Each job of a lap has one entry for each subtask.
@@ -67,24 +71,24 @@ texts! {
         Released = "starts before its release";
         /// Entries start in the order of the list.
         InOrder = "starts after the next entry of its core";
-        /// A length is enough for a family.
+        /// A length covers the WCETs of a family.
         Long = "has less time than the WCETs of it and of all nested in it, with their charges, take";
-        /// A family is over when the next entry starts.
+        /// A family ends before the next entry starts.
         Apart = "ends after the next entry of its core that is not nested in it starts";
         /// Nothing is nested in a subtask that keeps its core.
         Kept = "keeps its core, and the next entry is nested in it";
-        /// All that an entry waits for ends by its start.
+        /// An entry starts only after the end of everything waited for.
         Ready = "starts before the end of a predecessor, or of the job before";
         /// An entry belongs to the lap's own job.
         OwnLap = "is of another lap's job, though its DAG is sporadic or steps of the scheduler are long";
     }
 }
 
-/// Checks a table, whose DAGs are given ascending by their ids.
+/// Checks a table, with its DAGs in ascending order of ids.
 ///
 /// # Errors
 ///
-/// The first entry that fails a condition.
+/// The first entry to fail a condition.
 pub fn check_table(table: &Table, dags: &[TableDag<'_>]) -> Result<TableTimes, TableFault> {
     let check = TableCheck::of(table, dags)?;
     let mut is_exact = true;
@@ -107,13 +111,13 @@ pub fn check_table(table: &Table, dags: &[TableDag<'_>]) -> Result<TableTimes, T
     })
 }
 
-/// The most instances of a lap that are looked up.
+/// The most instances of a lap in the map.
 const INSTANCE_LIMIT: u32 = 1 << 17;
 
 struct TableCheck<'a> {
     table: &'a Table,
     dags: &'a [TableDag<'a>],
-    /// By DAG, its jobs in a lap and the number of instances of those before.
+    /// By DAG, the number of its jobs in a lap, and the number of instances of the DAGs before.
     jobs: Vec<(u32, usize)>,
     /// The map from the instances of a lap to their entries.
     entries: Vec<Option<&'a TableEntry>>,
@@ -143,7 +147,7 @@ impl<'a> TableCheck<'a> {
         for entry in table.lists.iter().flat_map(|list| &list.entries) {
             let dag = check.place(entry)?;
             let at = check.at(dag, entry.job, entry.subtask.index());
-            // A job after those of the first lap would leave out the first ones.
+            // A job after the first lap's jobs would leave out the first jobs.
             let is_later = |job| job >= i64::from(check.jobs[dag].0);
             if check.on_grid(dag, entry.job).is_none_or(is_later)
                 || check.entries[at].replace(entry).is_some()
@@ -162,7 +166,8 @@ impl<'a> TableCheck<'a> {
         Ok(check)
     }
 
-    /// Returns the position of an entry's DAG, which has the subtask.
+    /// Returns the position of the entry's DAG, after checking that the DAG has the entry's
+    /// subtask.
     fn place(&self, entry: &TableEntry) -> Result<usize, TableFault> {
         let mut dags = self.dags.iter();
         let has = |dag: &TableDag<'_>| entry.subtask.index() < dag.task.subtask_count();
@@ -170,7 +175,7 @@ impl<'a> TableCheck<'a> {
         found.ok_or(entry.fails(TableCondition::Once))
     }
 
-    /// Returns the number of a job counted from the first release of its grid, in lap 0, on.
+    /// Returns the number of a job, counted from the first release of its grid in lap 0.
     fn on_grid(&self, dag: usize, job: i64) -> Option<i64> {
         let TableDag {
             task, offset_ns, ..
@@ -185,7 +190,7 @@ impl<'a> TableCheck<'a> {
         first + job * count + subtask
     }
 
-    /// Checks the order of a list that goes on for another lap, and reports whether it is a run.
+    /// Checks the order of a list over two laps, and reports whether the list is a possible run.
     fn list(&self, list: &CoreList) -> Result<bool, TableFault> {
         let (entries, count) = (&list.entries, list.entries.len());
         let start = |at: usize| {
@@ -197,7 +202,7 @@ impl<'a> TableCheck<'a> {
             let (next, mut after) = (&entries[(at + 1) % count], at + 1);
             let length_ns = u128::from(entry.length_ns);
             let mut family_ns = u128::from(self.wcet_ns(entry)?);
-            // Without another one of such a depth that is the entry itself, a lap later.
+            // The loop ends at the latest with the entry itself, one lap later.
             while entries[after % count].depth > entry.depth {
                 let nested = &entries[after % count];
                 family_ns += u128::from(self.wcet_ns(nested)?);
@@ -227,7 +232,8 @@ impl<'a> TableCheck<'a> {
         Ok(dag.task.wcets_ns()[entry.subtask.index()])
     }
 
-    /// Checks what an entry waits for, and returns when it finishes after its release.
+    /// Checks everything an entry waits for, and returns its finish after its release, in
+    /// nanoseconds.
     fn entry(&self, entry: &TableEntry) -> Result<u64, TableFault> {
         let place = self.place(entry)?;
         let dag = &self.dags[place];
@@ -248,7 +254,7 @@ impl<'a> TableCheck<'a> {
         }
     }
 
-    /// Reports whether an instance starts before an entry and finishes by its start.
+    /// Reports whether an instance starts before an entry and finishes by the entry's start.
     fn is_over(&self, entry: &TableEntry, dag: usize, subtask: usize, job: i64) -> bool {
         let Some(before) = self.entries[self.at(dag, job, subtask)] else {
             return false;

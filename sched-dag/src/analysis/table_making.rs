@@ -1,18 +1,19 @@
-//! Making a table: one lap of a family of periodic DAGs on cores of their own, simulated.
+//! Making a table: simulates one lap of a family of periodic DAGs on cores of their own.
 //!
-//! The instance with the latest start that is least goes first: its deadline, less the WCETs of the
-//! longest path after it and its own, less a *boost* of its DAG, 0 at first. It takes an idle core,
-//! one where a predecessor has just ended if there is one; else it is *nested*: it starts on
-//! top of a less urgent one and preempts that, on the core with the most slack. What has begun
-//! never changes its core. If an instance is late, its DAG is boosted by as much, and the next
-//! *try* begins. The *lazy* method preempts only where waiting for a core would be too long.
+//! The instance with the least latest start goes first. The latest start is the deadline, less the
+//! WCETs of the longest path after the instance, less its own WCET, and less a *boost* of its DAG,
+//! 0 at first. The instance takes an idle core, preferably a core where a predecessor has just
+//! ended. Without an idle core it is *nested*: it preempts a less urgent instance and starts on
+//! top, on the core with the most slack. A begun instance never changes its core. If an instance is
+//! late, its DAG is boosted by as much, and the next *try* begins. The *lazy* method preempts only
+//! when waiting for a core would take too long.
 //!
-//! A lap *closes* if what it leaves to the next was assumed when it began: cores that are held at
-//! first, and subtasks whose instances of the last jobs have not finished. If it leaves more,
-//! the lap is simulated again with that.
+//! A lap *closes* if it leaves no more to the next lap than was assumed at its own beginning: cores
+//! held at first, and subtasks with unfinished instances of the last jobs. If it leaves more, the
+//! lap is simulated again with the new assumption.
 //!
-//! Guaranteed: a table that is made is right (`docs/bounds.md`, "Tables"). Not guaranteed: that
-//! there is none where none is made.
+//! Guaranteed: a finished table is right (`docs/bounds.md`, "Tables"). Not guaranteed: where no
+//! table is made, there may still be one.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -26,28 +27,28 @@ use crate::order::{sort_by_key, sorted_by_key};
 use crate::policy::LendingAttempt;
 use crate::table::{CoreList, Table, TableEntry};
 
-/// The most tries for a number of cores, and how often a lap is simulated again to close.
+/// The most tries for a number of cores, and the most repeated simulations for a lap to close.
 const TRIES: u32 = 8;
 const CLOSINGS: u32 = 4;
 
-/// How much may be looked at to make the tables of a commit, in entries times cores: 2 s or less.
+/// The most work for making the tables of a commit, in entries times cores: 2 s or less.
 const WORK_LIMIT: u64 = 1 << 25;
 
-/// The longest period and deadline in a family, so that sums of a lap's times fit into 63 bits.
+/// The longest period and deadline in a family. Sums of a lap's times then fit into 63 bits.
 const LONGEST_NS: u64 = 1 << 46;
 
-/// Periodic DAGs that may have a table together.
+/// Periodic DAGs that may share a table.
 pub(super) struct TableFamily<'a> {
     tasks: &'a [&'a Task],
     /// The positions of the DAGs, ascending.
     pub(super) dags: Vec<usize>,
     pub(super) lap_ns: u64,
     count: usize,
-    /// By DAG, then by job, then in a topological order.
+    /// Ordered by DAG, then by job, then topologically.
     entries: Vec<FamilyEntry>,
-    /// By DAG, where its entries begin, and by subtask its place in the topological order.
+    /// By DAG, the position of its first entry, and by subtask the place in the topological order.
     places: Vec<(usize, Vec<usize>)>,
-    /// The looks that are left.
+    /// The work left of [`WORK_LIMIT`].
     work_left: u64,
 }
 
@@ -63,17 +64,17 @@ struct FamilyEntry {
     keeps_core: bool,
 }
 
-/// The outcome of a lap that has not made a table.
+/// Why a lap has not made a table.
 enum LapFailure {
-    /// An entry of a DAG of the family is late by so much.
+    /// An entry of this DAG of the family is late by this many nanoseconds.
     Late(usize, i64),
-    /// It does not close.
+    /// The lap does not close.
     Open,
 }
 
 impl<'a> TableFamily<'a> {
-    /// Enters the periodic DAGs as long as a lap has at most `limit` entries: first those that
-    /// cannot be members, then the densest.
+    /// Enters periodic DAGs as long as a lap has at most `limit` entries: first the DAGs unfit as
+    /// members, then the densest.
     pub(super) fn of(tasks: &'a [&'a Task], limit: usize) -> Self {
         let is_periodic = |&dag: &usize| tasks[dag].table_terms().offset_ns.is_some();
         let mut order: Vec<usize> = (0..tasks.len()).filter(is_periodic).collect();
@@ -151,15 +152,15 @@ impl<'a> TableFamily<'a> {
         self.lap_ns / self.task(place).period_ns()
     }
 
-    /// Returns the least number of cores whose time is enough.
+    /// Returns the least number of cores with enough time for all entries.
     pub(super) fn least_cores(&self) -> usize {
         let entries = self.entries.iter();
         let work_ns: u64 = entries.map(|of| of.wcet_ns.cast_unsigned()).sum();
         usize::try_from(work_ns.div_ceil(self.lap_ns)).unwrap_or(usize::MAX)
     }
 
-    /// Makes a table, and says by which try; an error is the DAG that was late in the first try,
-    /// if it was that.
+    /// Makes a table, and tells the number of the successful try. The error is the DAG that was
+    /// late in the first try, if a DAG was late.
     pub(super) fn make(
         &mut self,
         cores: usize,
@@ -185,6 +186,7 @@ impl<'a> TableFamily<'a> {
                 method,
             };
             match self.close(&by, cores) {
+                // More tries would not help: the boosts change only after a late entry.
                 Ok(lap) => return Ok((self.table(&lap), tried)),
                 Err(LapFailure::Open) => break,
                 Err(LapFailure::Late(place, by_ns)) => {
@@ -217,6 +219,7 @@ impl<'a> TableFamily<'a> {
             for (place, (first, places)) in self.places.iter().enumerate() {
                 let end = self.places.get(place + 1).map_or(self.count, |next| next.0);
                 let last = end - places.len();
+                // A subtask that ends after the lap holds up its first instance in the next lap.
                 for subtask in 0..places.len() {
                     let found_ns = lap.finishes_ns[last + subtask] - lap_ns;
                     assume(&mut after_ns[first + subtask], found_ns);
@@ -229,7 +232,7 @@ impl<'a> TableFamily<'a> {
         Err(LapFailure::Open)
     }
 
-    /// Simulates one lap with WCETs; cores are held, and entries wait, until some time.
+    /// Simulates one lap with WCETs. Cores are held, and entries wait, until the given times.
     fn simulate(
         &self,
         by: &LapOrder,
@@ -238,7 +241,7 @@ impl<'a> TableFamily<'a> {
     ) -> Result<Lap, LapFailure> {
         let mut lap = Lap::of(&self.entries, held_ns);
         let mut missing = vec![0; self.count];
-        // The times that an entry waits for; where there is no entry, a core is held.
+        // The times each entry waits for; without an entry, a core is held until then.
         let mut times: Vec<(i64, usize)> = held_ns.iter().map(|&ns| (ns, self.count)).collect();
         for (entry, of) in self.entries.iter().enumerate() {
             let before = self.predecessors(of).len();
@@ -299,7 +302,8 @@ impl<'a> TableFamily<'a> {
         graph.predecessors.neighbours(SubtaskId(to_u32(of.subtask)))
     }
 
-    /// Returns the entries that wait for the end of one: its successors', and the next job's.
+    /// Returns the entries waiting for the end of an entry: its successors, and the same subtask in
+    /// the next job.
     fn after(&self, entry: usize) -> impl Iterator<Item = usize> {
         let of = &self.entries[entry];
         let (first, places) = &self.places[of.dag];
@@ -311,8 +315,8 @@ impl<'a> TableFamily<'a> {
         (successors.map(move |subtask| job + places[subtask])).chain(next)
     }
 
-    /// Returns the idle core for an entry: where a predecessor was the last entry, that which ended
-    /// last; else the first.
+    /// Returns the idle core for an entry: among the cores with a predecessor as the last entry,
+    /// the core with the latest end; otherwise the first idle core.
     fn idle_core(&self, lap: &Lap, entry: usize, now_ns: i64) -> Option<usize> {
         let of = &self.entries[entry];
         let mut best: Option<(usize, i64)> = None;
@@ -326,7 +330,7 @@ impl<'a> TableFamily<'a> {
                 let is_before = before.contains(&SubtaskId(to_u32(last.subtask)));
                 is_before && (last.dag, last.job) == (of.dag, of.job)
             });
-            // Without one, as if it had ended before all others.
+            // A core without a predecessor counts as ended before all others.
             let ended_ns = last.map_or(-1, |last| lap.finishes_ns[last]);
             if best.is_none_or(|(_, best_ns)| ended_ns > best_ns) {
                 best = Some((core, ended_ns));
@@ -335,7 +339,7 @@ impl<'a> TableFamily<'a> {
         best.map(|(core, _)| core)
     }
 
-    /// Returns the core with the most slack on which an entry may preempt.
+    /// Returns the core with the most slack among those where an entry may preempt.
     fn preempted_core(&self, lap: &Lap, by: &LapOrder, entry: usize, now_ns: i64) -> Option<usize> {
         let soonest_ns = lap.running().map(|(_, top)| lap.left_ns[top]).min()?;
         if by.method == LendingAttempt::Lazy && now_ns + soonest_ns <= by.keys_ns[entry] {
@@ -368,7 +372,7 @@ impl<'a> TableFamily<'a> {
                 let of = &self.entries[entry];
                 let task = self.task(of.dag);
                 let first = task.table_terms().offset_ns.unwrap_or(0) / task.period_ns();
-                // Of one DAG, times are from its release on.
+                // In the table of a single DAG, times count from the DAG's release.
                 let (origin_ns, first) = if is_alone {
                     (phase_ns(task), 0)
                 } else {
@@ -387,7 +391,7 @@ impl<'a> TableFamily<'a> {
                 };
                 entries.push((later, made));
             }
-            // Where several start at once, those of earlier laps come first.
+            // Of entries with the same start, those of earlier laps come first.
             let order = sorted_by_key(entries.len(), |place| {
                 (entries[place].1.start_ns, -entries[place].0)
             });
@@ -410,7 +414,7 @@ impl<'a> TableFamily<'a> {
 struct LapOrder {
     /// The entries, the most urgent first.
     order: Vec<usize>,
-    /// By entry, its place in that.
+    /// By entry, its place in the order.
     ranks: Vec<usize>,
     keys_ns: Vec<i64>,
     method: LendingAttempt,
@@ -419,7 +423,7 @@ struct LapOrder {
 /// A lap, as far as it is simulated.
 struct Lap {
     cores: Vec<LapCore>,
-    /// By entry, as are the others.
+    /// By entry, like the following fields.
     left_ns: Vec<i64>,
     starts_ns: Vec<i64>,
     finishes_ns: Vec<i64>,
@@ -430,7 +434,7 @@ struct LapCore {
     held_until_ns: i64,
     /// The entries that have begun and not finished.
     stack: Vec<usize>,
-    /// All that has begun, in that order.
+    /// All begun entries, in that order.
     begun: Vec<usize>,
     /// The entry that ended last.
     last: Option<usize>,
@@ -461,7 +465,7 @@ impl Lap {
         at.begun.push(entry);
     }
 
-    /// Ends what a core has executed to its end.
+    /// Ends the entry on top of a core if it has executed to its end.
     fn complete(&mut self, core: usize, now_ns: i64) -> Option<usize> {
         let at = &mut self.cores[core];
         let entry = at.stack.pop_if(|&mut top| self.left_ns[top] == 0)?;
@@ -470,7 +474,7 @@ impl Lap {
         Some(entry)
     }
 
-    /// Returns each core that executes, with its entry.
+    /// Returns each executing core with its entry.
     fn running(&self) -> impl Iterator<Item = (usize, usize)> {
         let cores = self.cores.iter().enumerate();
         cores.filter_map(|(core, at)| Some((core, *at.stack.last()?)))
@@ -485,18 +489,19 @@ impl Lap {
     }
 }
 
-/// Reports whether a DAG can execute in what tables leave.
+/// Reports whether a DAG can execute in the time left by tables.
 pub(super) fn may_be_member(task: &Task) -> bool {
     let terms = task.table_terms();
     terms.non_preemptive.is_empty() && terms.sink_deadlines_ns.is_empty()
 }
 
-/// Returns the first release from the origin of the grid on.
+/// Returns the DAG's first release at or after the origin of the grid.
 fn phase_ns(task: &Task) -> u64 {
     task.table_terms().offset_ns.unwrap_or(0) % task.period_ns()
 }
 
-/// Returns when each subtask has to finish for all after it to be in time, after the release.
+/// Returns the latest finish of each subtask for all its successors to be in time, counted from the
+/// release in nanoseconds.
 fn latest_finishes_ns(task: &Task) -> Vec<i64> {
     let deadline_ns = task.relative_deadline_ns().cast_signed();
     let mut latest_ns = vec![deadline_ns; task.subtask_count()];
@@ -511,7 +516,7 @@ fn latest_finishes_ns(task: &Task) -> Vec<i64> {
     latest_ns
 }
 
-/// Returns the topological order in which the subtask of the least position goes first.
+/// Returns the topological order that always takes the ready subtask of the least position first.
 fn least_first_order(task: &Task) -> Vec<usize> {
     let mut missing = task.graph.predecessor_counts();
     let mut ready: BinaryHeap<(u64, Reverse<usize>)> = BinaryHeap::new();
