@@ -1,30 +1,30 @@
 //! The schedule-abstraction graph of periodic DAGs whose subtasks keep their cores.
 //!
 //! M. Nasri, B. Brandenburg, RTSS 2017; M. Nasri, G. Nelissen, B. Brandenburg, ECRTS 2018 and 2019.
-//! Here for the scheduler's own rules (R2, R5, completions and releases before a dispatch, executions
-//! down to 0), and for a schedule without an end.
+//! This version follows the scheduler's own rules (R2, R5, completions and releases before a
+//! dispatch, executions down to 0) and covers schedules without an end.
 //!
-//! A *state* stands for all runs in which the same instances have been dispatched: for each core an
-//! interval in which the core becomes free, and one for the finish of each dispatched instance that
-//! matters still. Each run that is in a state and dispatches an instance next finds that instance
-//! *eligible* there, starts it within an interval, and is in the successor (`transitions`). So a
-//! list of states is *closed* if it includes the initial state and, with each state, all successors.
-//! Every run of any length stays in a closed list, and the latest finishes seen there bound all
-//! responses.
+//! A *state* represents all runs with the same instances dispatched. It has an interval for each
+//! core in which the core becomes free, and an interval for the finish of each dispatched instance
+//! that still matters. If a run is in a state and dispatches an instance next, the instance is
+//! *eligible* there, starts within a computed interval, and the run continues in the successor
+//! state (`transitions`). So a list of states is *closed* if it includes the initial state and,
+//! with each state, all successors. Every run of any length stays in a closed list, and the latest
+//! finishes seen there bound all responses.
 //!
-//! [`explore()`](super::explore()) looks for such a list; [`check_closed`] checks a list in one
-//! pass, and trusts nothing of the search.
+//! [`explore()`](super::explore()) searches for such a list. [`check_closed`] checks a list in one
+//! pass and trusts nothing of the search.
 //!
-//! Where DAGs have a last job, some state is the last before a candidate is cut off. From there on states
-//! count the *laps* (hyperperiods) that are over, and a job at or beyond the limit is no candidate.
-//! A state without laps stands for any number of these, so a list needs the few ends that its states
-//! have, not each lap.
+//! If DAGs have a last job, some state is the last before a candidate is cut off. From there on
+//! states count the *laps* (hyperperiods) completed, and a job at or beyond the limit is no
+//! candidate. A state without laps stands for any number of laps. So a list needs only the few ends
+//! of its states, not every lap.
 //!
-//! Assumes: each DAG is periodic, all stated jobs are released, each within the jitter after its nominal
-//! release; no instance loses its core or waits; nothing else executes. *Fewer* jobs than stated are a
-//! different set: the bounds do not hold beside pauses, modes, faults, or the early end of one DAG. No
-//! release waits for room in flight: the bound and the jitter of a DAG are at most its limit of jobs in
-//! flight times the period.
+//! Assumes: each DAG is periodic, and all stated jobs are released, each within the jitter after
+//! its nominal release; no instance loses its core or waits; nothing else executes. *Fewer* jobs
+//! than stated are a different set: the bounds do not cover pauses, modes, faults, or the early end
+//! of one DAG. No release waits for room in flight: the bound and the jitter of a DAG are at most
+//! its limit of jobs in flight times the period.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -37,25 +37,26 @@ use crate::worded::texts;
 /// The largest time of a set, in nanoseconds: 13 days; sums of a few stay far below an `i64`.
 const MOST_NS: u64 = 1 << 50;
 
-/// The latest time and the latest release of a state; far from where sums overflow.
+/// The latest time and the latest release of a state; sums stay far from overflow.
 const LATEST_NS: i64 = 1 << 53;
 
-/// The most steps of comparisons in a check, which forged lists would take: a second or so.
+/// The most comparison steps in a check, a limit against forged lists: a second or so.
 const STEP_LIMIT: u64 = 1 << 30;
 
 /// The most instances of a hyperperiod.
 pub const INSTANCE_LIMIT: u64 = 1 << 12;
 
-/// A DAG whose subtasks keep their cores.
+/// A DAG of subtasks that keep their cores.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AbstractionDag {
     /// The period in nanoseconds, at least 1.
     pub period_ns: u64,
-    /// The first nominal release.
+    /// The first nominal release, in nanoseconds.
     pub offset_ns: u64,
-    /// The longest time from a nominal release to the release, below the period.
+    /// The longest time from a nominal release to the actual release, below the period, in
+    /// nanoseconds.
     pub jitter_ns: u64,
-    /// The number of jobs; of all DAGs or of none.
+    /// The number of jobs, stated for all DAGs or for none.
     pub jobs: Option<u64>,
     /// The subtasks.
     pub subtasks: Vec<AbstractionSubtask>,
@@ -66,39 +67,39 @@ pub struct AbstractionDag {
 /// A subtask that keeps its core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AbstractionSubtask {
-    /// The shortest execution; at most the longest.
+    /// The shortest execution in nanoseconds, at most the longest.
     pub best_ns: u64,
-    /// The longest execution, at least 1.
+    /// The longest execution in nanoseconds, at least 1.
     pub wcet_ns: u64,
-    /// The number of the policy; the smaller one goes first.
+    /// The policy's number for the subtask; smaller numbers go first.
     pub number: u64,
-    /// The relative deadline; of a subtask that is no sink `None`.
+    /// The relative deadline in nanoseconds; `None` for a subtask that is no sink.
     pub deadline_ns: Option<u64>,
 }
 
 texts! {
-    /// The reason for a set without a closed list.
+    /// Why a set has no closed list.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum NotClosed {
-        /// A sink may finish after its deadline, as far as states tell: no proof of a miss.
+        /// A sink may finish after its deadline, as far as states can tell; a miss is not proven.
         Late { dag: usize, subtask: usize } =
             "subtask {subtask} of dag {dag} may be late, as far as states tell; relax its deadline";
         /// No core, no period, a WCET of 0 or below the shortest execution, a jitter as long as the
-        /// period, edges in a circle or to no subtask, a sink without a deadline, or a last job of some
-        /// DAGs only.
+        /// period, edges in a circle or to no subtask, a sink without a deadline, or a last job of
+        /// some DAGs only.
         NotCovered =
             "none covers this set; let all DAGs be periodic and end, or none, and subtasks keep their \
              cores without waits, locks, groups and lists";
         /// More states than the limit, or a hyperperiod of too many instances or too long.
         Limit = "it has too many states, or a hyperperiod too many instances; use fewer periods";
-        /// The text is of another set, of other cores, or of other charges.
+        /// The text belongs to another set, to other cores, or to other charges.
         Foreign = "it is of another set, of other cores or of other overheads; leave its lines out, and `run` explores this one";
-        /// A listed state is none of this set: of other numbers of subtasks or cores, out of order, or
-        /// beyond all times.
+        /// A listed state cannot belong to this set: the numbers of subtasks or cores differ, the
+        /// order is wrong, or times are out of range.
         Malformed { state: usize } = "state {state} is none of this set; explore it again";
         /// The list does not include the initial state.
         NoFirst = "no listed state includes the first one; explore the set again";
-        /// The list does not include a state that a run may reach next.
+        /// The list does not include a state a run may reach next.
         Open { state: usize } =
             "state {state} has a successor that no listed state includes; explore the set again";
     }
@@ -109,13 +110,14 @@ texts! {
 pub struct AbstractionSet {
     pub(super) cores: usize,
     adds_release: bool,
-    /// Whether executions are real numbers, and a release is seen together with all that were due no
-    /// later, as on a machine; else they are whole nanoseconds, and releases are late one by one.
+    /// Whether executions are real numbers, and a step sees a release together with all releases
+    /// due no later, as on a machine. Otherwise executions are whole nanoseconds, and releases are
+    /// late one by one.
     is_real: bool,
     hyperperiod_ns: i64,
     /// By DAG: period, offset, jitter, jobs in a hyperperiod.
     dags: Vec<[i64; 4]>,
-    /// By DAG, the number of all jobs; empty: there is no end.
+    /// By DAG, the number of all jobs; empty: the schedule has no end.
     limits: Vec<i64>,
     /// DAG by DAG.
     vertices: Vec<AbstractVertex>,
@@ -139,22 +141,22 @@ pub(super) struct FinishInterval {
     pub(super) high_ns: i64,
 }
 
-/// A state, in normal form where it is in a list.
+/// A state; states of a list are in normal form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AbstractState {
-    /// The laps that are over, if jobs are cut off; `None`: any number.
+    /// The completed laps, if jobs are cut off; `None`: any number.
     pub(super) laps: Option<i64>,
     /// By vertex, the number of dispatched jobs.
     pub(super) counts: Vec<i64>,
-    /// The earliest and the latest times at which cores become free, each sorted.
+    /// The earliest and the latest times for cores to become free, each sorted.
     pub(super) free_ns: [Vec<i64>; 2],
     /// Ascending by vertex and job.
     pub(super) finishes: Vec<FinishInterval>,
 }
 
 impl AbstractState {
-    /// Returns numbers for [`AbstractionSet::state`]: 0, or 1 more than the laps; the counts, the earliest
-    /// and the latest times of cores, and four numbers of each finish.
+    /// Returns the state as numbers for [`AbstractionSet::state`]: 0, or 1 more than the laps; the
+    /// counts; the earliest and the latest times of cores; and four numbers for each finish.
     pub fn numbers(&self) -> Vec<i64> {
         let mut numbers = vec![self.laps.map_or(0, |laps| laps + 1)];
         numbers.extend(&self.counts);
@@ -175,12 +177,13 @@ struct Candidate {
     release_ns: i64,
     earliest_ns: i64,
     latest_ns: i64,
-    /// The latest finish of all that it waits for besides its release.
+    /// The latest finish of everything the instance waits for besides its release.
     finished_ns: i64,
 }
 
 impl AbstractionDag {
-    /// Reports whether executions are in order, edges lead on, and each sink has a deadline.
+    /// Reports whether executions are in order, edges stay in range and form no circle, and each
+    /// sink has a deadline.
     fn is_whole(&self) -> bool {
         let count = self.subtasks.len();
         let (mut after, mut missing) = (vec![Vec::new(); count], vec![0_usize; count]);
@@ -196,7 +199,7 @@ impl AbstractionDag {
             let is_due = of.deadline_ns.is_some() || !after.is_empty();
             of.wcet_ns > 0 && of.best_ns <= of.wcet_ns && is_due
         });
-        // In a circle nothing is ever ready.
+        // In a circle no subtask ever becomes ready.
         let mut ready: Vec<usize> = (0..count).filter(|&of| missing[of] == 0).collect();
         let mut place = 0;
         while let Some(&from) = ready.get(place) {
@@ -213,8 +216,8 @@ impl AbstractionDag {
 }
 
 impl AbstractionSet {
-    /// Prepares a set. `adds_release` says whether the policy adds the nominal release to the numbers,
-    /// `is_real` whether executions are real numbers, and a release is seen together with all that were
+    /// Prepares a set. `adds_release`: the policy adds the nominal release to the numbers.
+    /// `is_real`: executions are real numbers, and a step sees a release together with all releases
     /// due no later.
     ///
     /// # Errors
@@ -278,7 +281,7 @@ impl AbstractionSet {
             }
         }
         match instances {
-            // The end of some DAGs beside others that go on.
+            // Some DAGs end while others go on.
             _ if !set.limits.is_empty() && set.limits.len() < dags.len() => {
                 Err(NotClosed::NotCovered)
             }
@@ -287,7 +290,7 @@ impl AbstractionSet {
         }
     }
 
-    /// Returns a hash of all that makes the set.
+    /// Returns a hash of everything in the set.
     pub(super) fn hash(&self) -> u64 {
         let mut hash = EMPTY;
         let mut add = |number: u64| hash = fnv_1a(hash, &number.to_le_bytes());
@@ -325,7 +328,7 @@ impl AbstractionSet {
         bounds
     }
 
-    /// Returns the state before anything has been dispatched.
+    /// Returns the state before the first dispatch.
     pub(super) fn initial(&self) -> AbstractState {
         self.normal(AbstractState {
             laps: None,
@@ -335,7 +338,7 @@ impl AbstractionSet {
         })
     }
 
-    /// Returns the state of such [numbers](AbstractState::numbers), if the set can have it.
+    /// Returns the state with such [numbers](AbstractState::numbers), if the set can have it.
     pub fn state(&self, numbers: &[i64]) -> Option<AbstractState> {
         let (laps, rest) = numbers.split_first()?;
         let (counts, rest) = rest.split_at_checked(self.vertices.len())?;
@@ -361,8 +364,8 @@ impl AbstractionSet {
         self.has_shape(&state).then_some(state)
     }
 
-    /// Reports whether a state has the form on which [`transitions`](Self::transitions) and
-    /// [`includes`](Self::includes) rely, whoever made it.
+    /// Reports whether a state, whoever made it, has the form required by
+    /// [`transitions`](Self::transitions) and [`includes`](Self::includes).
     fn has_shape(&self, state: &AbstractState) -> bool {
         let is_time = |ns: &i64| (-LATEST_NS..=LATEST_NS).contains(ns);
         let is_count = |(count, vertex): (&i64, &AbstractVertex)| {
@@ -390,12 +393,12 @@ impl AbstractionSet {
                 .all(|of| (of[0].vertex, of[0].job) < (of[1].vertex, of[1].job))
     }
 
-    /// Returns the number of jobs of a DAG behind so many laps.
+    /// Returns the number of jobs of a DAG left after `laps` laps.
     fn limit(&self, dag: usize, laps: i64) -> i64 {
         self.limits[dag] - laps * self.dags[dag][3]
     }
 
-    /// Returns a state at each end that cuts off one of its candidates.
+    /// Returns a state for each end that cuts off a candidate of the given state.
     fn ends(&self, state: &AbstractState) -> Vec<AbstractState> {
         let mut ends = Vec::new();
         if state.laps.is_some() || self.limits.is_empty() {
@@ -422,7 +425,7 @@ impl AbstractionSet {
         ends
     }
 
-    /// Calls `each` with the normal successors of a state, and of its ends, as
+    /// Calls `each` with the normal successors of a state and of its ends, as
     /// [`transitions`](Self::transitions) does.
     pub(super) fn successors(
         &self,
@@ -435,7 +438,7 @@ impl AbstractionSet {
         ends.try_for_each(|end| self.transitions(&end, bounds, each))
     }
 
-    /// Returns the next job of each vertex, of which all predecessors have been dispatched.
+    /// Returns the next job of each vertex with all predecessors dispatched.
     fn candidates(&self, state: &AbstractState) -> Vec<Candidate> {
         let mut candidates = Vec::new();
         for (position, vertex) in self.vertices.iter().enumerate() {
@@ -470,7 +473,7 @@ impl AbstractionSet {
         candidates
     }
 
-    /// Reports whether an instance is ready only after a finish.
+    /// Reports whether an instance becomes ready only after a finish.
     fn precedes(&self, finish: &FinishInterval, vertex: usize, job: i64) -> bool {
         match finish.vertex == vertex {
             true => finish.job == job - 1,
@@ -480,8 +483,8 @@ impl AbstractionSet {
         }
     }
 
-    /// Calls `each` with the normal successor of a state by each eligible instance, and raises bounds to
-    /// the latest finishes of sinks.
+    /// Calls `each` with the normal successor of a state for each eligible instance, and raises
+    /// bounds to the latest finishes of sinks.
     ///
     /// # Errors
     ///
@@ -498,9 +501,9 @@ impl AbstractionSet {
         for chosen in &candidates {
             let start_ns = chosen.earliest_ns.max(state.free_ns[0][0]);
             let more_urgent = candidates.iter().filter(|of| of.key < chosen.key);
-            // What is ready at the same instant and more urgent goes first; the instants just before
-            // that readiness are whole ones only where executions are.
-            // Once one is released, all are that were due no later.
+            // A more urgent instance ready at the same instant goes first. The instants just before
+            // are whole only if executions are. Once a release is seen, so are all releases due no
+            // later.
             let latest = more_urgent.map(|of| match of.release_ns <= chosen.release_ns {
                 true if self.is_real => of.finished_ns,
                 _ => of.latest_ns,
@@ -542,7 +545,7 @@ impl AbstractionSet {
         Ok(())
     }
 
-    /// Returns the normal state after the dispatch of an instance, which starts between two times.
+    /// Returns the normal state after the dispatch of an instance that starts between two times.
     fn successor(
         &self,
         state: &AbstractState,
@@ -569,7 +572,7 @@ impl AbstractionSet {
         self.normal(next)
     }
 
-    /// Drops what no later start can see, and counts from the hyperperiod in hand.
+    /// Drops everything invisible to later starts, and counts from the present hyperperiod.
     pub(super) fn normal(&self, mut state: AbstractState) -> AbstractState {
         let counts = &state.counts;
         state.finishes.retain(|of| {
@@ -607,7 +610,7 @@ impl AbstractionSet {
         state.free_ns[0][0].max(earliest.min().unwrap_or(i64::MIN))
     }
 
-    /// Reports whether each run of a normal state is in another one, too.
+    /// Reports whether each run of a normal state is also in another normal state.
     pub(super) fn includes(&self, outer: &AbstractState, inner: &AbstractState) -> bool {
         let [outer_ns, inner_ns] = [&outer.free_ns, &inner.free_ns];
         let is_earlier = |(outer, inner): (&i64, &i64)| outer <= inner;
@@ -634,8 +637,8 @@ impl AbstractionSet {
     }
 }
 
-/// Checks that a list of normal states is closed, in one pass, and returns by DAG and subtask the
-/// longest responses of sinks; 0 of a subtask that is none.
+/// Checks in one pass that a list of normal states is closed. Returns by DAG and subtask the
+/// longest responses of sinks, in nanoseconds; 0 for a subtask that is no sink.
 ///
 /// # Errors
 ///

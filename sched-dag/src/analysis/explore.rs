@@ -1,16 +1,17 @@
-//! The exploration of a schedule-abstraction graph, on a host. [`check_closed`](super::check_closed) checks
-//! the list.
+//! The exploration of a schedule-abstraction graph on a host. [`check_closed`](super::check_closed)
+//! checks the resulting list.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::abstraction::{AbstractState, AbstractionSet, FinishInterval, NotClosed};
 
-/// The most states of a list that are worth looking for.
+/// The most states of a list worth searching for.
 pub const STATE_LIMIT: usize = 2_000;
 
-/// Looks for a closed list of states, level by level: all states after as many dispatches. Those that
-/// have dispatched the same instances are merged where no core's interval leaves a gap.
+/// Searches for a closed list of states, level by level; a level has all states after the same
+/// number of dispatches. States with the same dispatched instances are merged unless some core's
+/// intervals leave a gap.
 ///
 /// # Errors
 ///
@@ -43,7 +44,8 @@ pub fn explore(set: &AbstractionSet, limit: usize) -> Result<Vec<AbstractState>,
     Ok(expanded)
 }
 
-/// Reports whether two states have dispatched the same, and no core is free in a gap between.
+/// Reports whether two states have the same dispatched instances and no gap between the intervals
+/// of a core.
 fn touch(one: &AbstractState, other: &AbstractState) -> bool {
     let [low, high] = &one.free_ns;
     let [other_low, other_high] = &other.free_ns;
@@ -52,13 +54,13 @@ fn touch(one: &AbstractState, other: &AbstractState) -> bool {
             .all(|core| low[core] <= other_high[core] + 1 && other_low[core] <= high[core] + 1)
 }
 
-/// Returns the least state that includes two.
+/// Returns the least state that includes both.
 fn hull(set: &AbstractionSet, one: &AbstractState, other: &AbstractState) -> AbstractState {
     let pairs = |which: usize, of: fn(i64, i64) -> i64| {
         let pairs = one.free_ns[which].iter().zip(&other.free_ns[which]);
         pairs.map(|(one, other)| of(*one, *other)).collect()
     };
-    // An instance that a state does not name has finished by then.
+    // An instance missing in a state has finished by then.
     let [now_ns, other_now_ns] = [one, other].map(|state| set.now_ns(state));
     let mut finishes = Vec::new();
     for (own, others, then_ns) in [

@@ -1,46 +1,42 @@
-//! Jobs that overlap, `R > T`: their equation, and its solution.
+//! Overlapping jobs, `R > T`: their equation, and its solution.
 //!
-//! Derived for this project; related work (J. Fonseca, G. Nelissen, V. Nélis, Real-Time
-//! Systems 55, 2019) has arbitrary deadlines without the rule that a subtask is sequential
-//! over its own jobs.
+//! Derived for this project. Related work (J. Fonseca, G. Nelissen, V. Nélis, Real-Time Systems 55,
+//! 2019) covers arbitrary deadlines, but without the rule that a subtask is sequential over its own
+//! jobs.
 //!
-//! The critical chain of a job ends with its last subtask and goes back through
-//! what each subtask waited for last: a predecessor, or the same subtask of the
-//! job before. Say it starts with the release of the job `j` places earlier.
-//! It has at most `P_j = length + j * largest WCET` of its own, and whenever it
-//! waits, all `m` cores run something else. So the job's last finish, counted
-//! from that release, is at most the least `X` with
+//! The critical chain of a job ends with its last subtask. It goes back through the last thing each
+//! subtask waited for: a predecessor, or the same subtask of the job before. Say the chain starts
+//! with the release of the job `j` places earlier. The chain has at most
+//! `P_j = length + j * largest WCET` of work, and whenever it waits, all `m` cores run something
+//! else. So the job's last finish, counted from the chain's release, is at most the least `X` with
 //!
 //! `X = P_j + ((j + 1) volume - P_j + own + blocking + sum of W_i(X)) / m`
 //!
-//! and the response time is `R = max over j of X_j - j T`. Which `j` can occur
-//! follows from the chain: it goes back over `j` releases only if its part over
-//! `j - 1` of them can last until the next release, `X_(j-1) > j T`.
+//! and the response time is `R = max over j of X_j - j T`. The chain itself limits `j`: it goes
+//! back over `j` releases only if its part over `j - 1` of them can last until the next release,
+//! `X_(j-1) > j T`.
 //!
-//! The terms: `W_i`, the [`InterferingWorkload`](super::workload::InterferingWorkload) of each DAG
-//! that may
-//! outrank this one; `own`, what still older jobs may run in the window,
-//! `sum over l >= 1, l T < R of min(volume, p (R - l T))`, twice that if
-//! younger jobs may win over older ones; `blocking`, lower-ranked work that
-//! cannot be preempted; to it all `m` cores add what long steps keep them for (`bursts`). While
-//! `X_0 <= T` only `j = 0` is left and `own` is 0:
-//! then this is the equation of Melani et al. 2015, and `multi_path` has better ones.
+//! The terms: `W_i` is the [`InterferingWorkload`](super::workload::InterferingWorkload) of each
+//! DAG that may outrank this DAG. `own` is the work of still older jobs in the window,
+//! `sum over l >= 1, l T < R of min(volume, p (R - l T))`, twice as much if younger jobs may win
+//! over older jobs. `blocking` is lower-ranked work that cannot be preempted. The right side also
+//! contains the time lost by all `m` cores to long steps (`bursts`). While `X_0 <= T` only `j = 0`
+//! is left and `own` is 0: this is the equation of Melani et al. 2015, and `multi_path` has better
+//! equations.
 //!
 //! Traps, both found in an earlier form:
 //!
-//! 1. To follow the chain back only over the jobs that the job itself can meet
-//!    (`j T < R`). But each job may delay only the next, and a delay still be
-//!    handed on forever: a subtask with a WCET of one period never catches up.
-//!    In the test `delays_that_are_handed_on_count` that would claim 18 where
-//!    observed response times grow without end.
-//! 2. To take another DAG to use no more cores than one of its jobs can, also
-//!    when its jobs overlap. In the test `overlapping_jobs_take_more_cores`
-//!    that would claim 8, and 9 is observed.
+//! 1. Following the chain back only over the jobs able to meet the job itself (`j T < R`). But each
+//!    job may delay only the next, and a delay may still be handed on forever: a subtask with a
+//!    WCET of one period never catches up. In the test `delays_that_are_handed_on_count` this
+//!    mistake would claim 18, while observed response times grow without end.
+//! 2. Assuming that another DAG uses no more cores than one of its jobs can, even when its jobs
+//!    overlap. In the test `overlapping_jobs_take_more_cores` this mistake would claim 8, while 9
+//!    is observed.
 //!
-//! The least solution is found exactly, from below. Both sides are piecewise
-//! linear, so instead of creeping up by the difference, which may be one
-//! nanosecond a step, each step solves the present linear piece or jumps to
-//! its end; see [`WorkloadSegment`].
+//! The least solution is found exactly, from below. Both sides are piecewise linear. Creeping up by
+//! the difference might advance one nanosecond a step, so each step solves the present linear piece
+//! or jumps to its end; see [`WorkloadSegment`].
 
 use alloc::vec::Vec;
 
@@ -48,15 +44,15 @@ use super::interference::{DelaySources, GraphSummary, on_all_cores};
 use super::task::Task;
 use super::workload::WorkloadSegment;
 
-/// The most evaluations of equations' right-hand sides that the DAGs of one analysis share; a
-/// DAG that needs more is "not proven".
+/// The most evaluations of equations' right-hand sides, shared by the DAGs of one analysis. A DAG
+/// in need of more is "not proven".
 pub(super) const STEP_LIMIT: u64 = 200_000;
 
-/// The same for each DAG alone, besides the shared ones. Ordinary sets need tens.
+/// Further evaluations for each DAG alone, besides the shared evaluations. Ordinary sets need tens.
 pub(super) const OWN_STEPS: u64 = 256;
 
-/// The most jobs of one DAG that a window may reach back over; a set that
-/// needs more (`R > 1024 T`) is "not proven".
+/// The most jobs of one DAG in reach of a window. A set in need of more (`R > 1024 T`) is "not
+/// proven".
 const OVERLAP_LIMIT: u64 = 1024;
 
 /// The terms of a task in its equation.
@@ -65,14 +61,14 @@ pub(super) struct PipelineTerms {
     period: u128,
     deadline: u128,
     volume: u128,
-    /// The part of the volume that may delay the chain in its last job.
+    /// The part of the volume able to delay the chain in its last job.
     last_volume: u128,
     length: u128,
     largest: u128,
     cores: usize,
-    /// The most cores that one job can use, at most `cores`.
+    /// The most cores usable by one job, at most `cores`.
     parallelism: u128,
-    /// The response-time bound of all jobs, if it is known already.
+    /// The response-time bound of all jobs, if already known.
     whole: Option<u128>,
     /// Whether a younger job's subtask may win over an older job's.
     pub(super) younger_may_win: bool,
@@ -104,8 +100,8 @@ impl PipelineTerms {
         }
     }
 
-    /// Returns the figures of one sink of the task: the longest path to it, what of its
-    /// own job may delay it, its deadline, and the bound of all jobs of the task.
+    /// Returns the figures of one sink of the task: the longest path to the sink, the part of its
+    /// own job able to delay it, its deadline, and the bound of all jobs of the task.
     pub(super) fn of_sink(
         &self,
         length_ns: u64,
@@ -122,19 +118,19 @@ impl PipelineTerms {
         }
     }
 
-    /// Accepts no response time beyond this number of periods: one more job would meet
-    /// the overrun policy.
+    /// Accepts no response time beyond `jobs` periods: one more job in flight would meet the
+    /// overrun policy.
     pub(super) fn allow_in_flight(&mut self, jobs: u32) {
         self.deadline = self.deadline.min(u128::from(jobs) * self.period);
     }
 
-    /// Returns the longest response time of use.
+    /// Returns the longest useful response time in nanoseconds.
     pub(super) fn limit_ns(&self) -> u64 {
         u64::try_from(self.deadline).unwrap_or(u64::MAX)
     }
 
-    /// Returns the least response-time bound that is at least `start_ns`, which
-    /// must not exceed the least solution (0 always is right).
+    /// Returns the least response-time bound no smaller than `start_ns`; `start_ns` must not exceed
+    /// the least solution (0 is always right).
     pub(super) fn solve(
         &self,
         delays: &DelaySources,
@@ -144,7 +140,7 @@ impl PipelineTerms {
         let mut response = u128::from(start_ns);
         let mut windows: Vec<u128> = Vec::new();
         loop {
-            // With the response the windows only grow, so they go on from where they are.
+            // Windows only grow with the response, so each search goes on from the last result.
             self.extend(&mut windows, response, delays, steps)?;
             let back = windows.iter().zip(0..);
             let responses = back.map(|(window, back)| window.saturating_sub(back * self.period));
@@ -156,8 +152,8 @@ impl PipelineTerms {
         }
     }
 
-    /// Returns the windows `X_0`, `X_1`, .. of a response time that is a solution, and what
-    /// jobs before the chain's first can run.
+    /// Returns the windows `X_0`, `X_1`, .. of a response time known as a solution, and the most
+    /// work of jobs before the chain's first.
     pub(super) fn windows(
         &self,
         delays: &DelaySources,
@@ -170,7 +166,7 @@ impl PipelineTerms {
         Ok((windows, own))
     }
 
-    /// Raises the windows to those of a response time.
+    /// Raises the windows to the windows of a response time.
     fn extend(
         &self,
         windows: &mut Vec<u128>,
@@ -192,8 +188,8 @@ impl PipelineTerms {
         Err(SolverFailure::Limit)
     }
 
-    /// Returns what jobs before the chain's first (and after the job itself,
-    /// if they may win) can run while the chain lasts.
+    /// Returns the most work, during the chain, of jobs before the chain's first (and of jobs after
+    /// the job itself, if they may win).
     fn other_jobs(&self, response: u128) -> Result<u128, SolverFailure> {
         let mut sum = 0;
         let mut left = response;
@@ -242,7 +238,7 @@ impl PipelineTerms {
         self.length + back * self.largest
     }
 
-    /// Returns the most that the cores execute while a chain over `back` releases waits.
+    /// Returns the most work on the cores while a chain over `back` releases waits.
     pub(super) fn busy(
         &self,
         back: u128,

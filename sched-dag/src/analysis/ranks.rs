@@ -1,9 +1,9 @@
-//! Which DAG may delay which: the relation that the policy makes between DAGs.
+//! Which DAG may delay which: the policy's relation between DAGs.
 //!
-//! It depends on the policy's numbers and on which subtasks can be preempted, not on
-//! any execution time; so it is known also for DAGs that cannot be analysed. A DAG *outranks*
-//! another if an instance of it may win a core over one of the other's, and *delays* it also
-//! where it merely keeps a core. `judge` says why each case is sound.
+//! The relation depends on the policy's numbers and on the preemptibility of subtasks, not on any
+//! execution time. So the relation is known even for DAGs that cannot be analysed. A DAG *outranks*
+//! another if one of its instances may win a core over an instance of the other. A DAG *delays*
+//! another also by merely keeping a core. `docs/bounds.md` proves the tests based on this relation.
 
 use alloc::vec::Vec;
 
@@ -16,20 +16,20 @@ use crate::task_set::{Dag, Subtask};
 pub(super) struct RankRelation {
     pub(super) order: InstanceOrder,
     pub(super) preemption: PreemptionMix,
-    /// Per DAG the policy's smallest and largest number.
+    /// By DAG, the policy's smallest and largest number.
     numbers: Vec<[u64; 2]>,
-    /// Whether subtasks of one job may have different deadlines, and the order is by these.
+    /// Whether subtasks of one job may have different deadlines, and the order uses them.
     pub(super) ranks_sinks: bool,
 }
 
-/// The order of instances as far as proofs know it, whatever the policy is called.
+/// The order of instances as far as known to proofs, whatever the policy's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum InstanceOrder {
-    /// By numbers that are the same for every job, as static priorities are.
+    /// By numbers equal for every job, like static priorities.
     Ranked,
     /// By absolute deadlines.
     ByDeadline,
-    /// By something else: what holds is what any work-conserving order gives.
+    /// By anything else. Only the guarantees of any work-conserving order hold.
     Any,
 }
 
@@ -42,7 +42,7 @@ pub(super) enum PreemptionMix {
 }
 
 impl RankRelation {
-    /// Makes the relation between those that are at the positions `own`.
+    /// Makes the relation between the DAGs at the positions `own`.
     pub(super) fn new(dags: &[Dag], own: &[usize], policy: Policy, preemption: Preemption) -> Self {
         let mut own_dags = own.iter().map(|&dag| &dags[dag]);
         let is_by_deadline = |dag: &Dag| {
@@ -67,8 +67,8 @@ impl RankRelation {
         }
     }
 
-    /// Returns the relation between some of the DAGs, by their positions among
-    /// these. The others still are on the machine: what can be preempted stays.
+    /// Returns the relation between some of the DAGs, by their positions here. The other DAGs are
+    /// still on the machine, so the preemption mix stays.
     pub(super) fn among(&self, members: &[usize]) -> Self {
         Self {
             numbers: members.iter().map(|&dag| self.numbers[dag]).collect(),
@@ -76,8 +76,7 @@ impl RankRelation {
         }
     }
 
-    /// Reports whether an instance of `other` may win a core that an instance
-    /// of `dag` waits for.
+    /// Reports whether an instance of `other` may win a core for which an instance of `dag` waits.
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
         other != dag
             && (self.order != InstanceOrder::Ranked
@@ -85,29 +84,30 @@ impl RankRelation {
                 || self.ranks(other)[0] < self.ranks(dag)[1])
     }
 
-    /// Reports whether `dag` may have to wait for `other`, be it only because
-    /// an instance of `other` keeps its core.
+    /// Reports whether `dag` may have to wait for `other`, even if only because an instance of
+    /// `other` keeps its core.
     pub(super) fn may_delay(&self, other: usize, dag: usize) -> bool {
         other != dag && (self.preemption != PreemptionMix::All || self.may_outrank(other, dag))
     }
 
-    /// Reports whether of two DAGs each may outrank the other.
+    /// Reports whether some two DAGs may each outrank the other.
     pub(super) fn interleaves(&self) -> bool {
         let all = 0..self.numbers.len();
         let both = |a: usize, b: usize| self.may_outrank(a, b) && self.may_outrank(b, a);
         all.clone().any(|a| all.clone().any(|b| both(a, b)))
     }
 
-    /// Returns the smallest and the largest number of a DAG among all; the smaller wins.
+    /// Returns the smallest and the largest number of a DAG, each with its position; the smaller
+    /// wins.
     pub(super) fn ranks(&self, dag: usize) -> [(u64, usize); 2] {
         self.numbers[dag].map(|number| (number, dag))
     }
 
-    /// Reports whether a younger job of a DAG may win over an older one.
+    /// Reports whether a younger job of a DAG may win over an older job.
     pub(super) fn younger_may_win(&self, dag: usize) -> bool {
         let unequal = match self.order {
             InstanceOrder::Ranked => self.numbers[dag][0] != self.numbers[dag][1],
-            // It may have a subtask that leads to a more urgent sink.
+            // The younger job may have a subtask on the way to a more urgent sink.
             InstanceOrder::ByDeadline => self.ranks_sinks,
             InstanceOrder::Any => true,
         };

@@ -495,13 +495,12 @@ pub(super) fn may_be_member(task: &Task) -> bool {
     terms.non_preemptive.is_empty() && terms.sink_deadlines_ns.is_empty()
 }
 
-/// Returns the DAG's first release at or after the origin of the grid.
+/// Returns the DAG's first release from the origin of the grid on.
 fn phase_ns(task: &Task) -> u64 {
     task.table_terms().offset_ns.unwrap_or(0) % task.period_ns()
 }
 
-/// Returns the latest finish of each subtask for all its successors to be in time, counted from the
-/// release in nanoseconds.
+/// Returns the latest finish of each subtask, after the release, for all successors to be in time.
 fn latest_finishes_ns(task: &Task) -> Vec<i64> {
     let deadline_ns = task.relative_deadline_ns().cast_signed();
     let mut latest_ns = vec![deadline_ns; task.subtask_count()];

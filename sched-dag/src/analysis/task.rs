@@ -1,29 +1,27 @@
 //! The task as the analysis sees it: numbers and a graph, nothing else.
 //!
-//! A [`Task`] is a DAG task reduced to what response-time analysis needs:
-//! period, relative deadline, one WCET a subtask and the precedence edges. It
-//! is made from a verified [`Dag`] with [`Task::from_dag`], or directly with
-//! [`Task::new`] by tools and tests. It need not be connected and may have
-//! several sources and sinks.
+//! A [`Task`] is a DAG task reduced to the needs of response-time analysis: period, relative
+//! deadline, one WCET a subtask and the precedence edges. [`Task::from_dag`] makes a task from a
+//! verified [`Dag`]; tools and tests call [`Task::new`] directly. A task need not be connected and
+//! may have several sources and sinks.
 //!
-//! Words: the *volume* is the sum of all WCETs; the *length* is the largest sum
-//! of WCETs along a path. Both are computed once, checked against overflow, so
-//! every other analysis may rely on `length <= volume <= u64::MAX`. The *bottom level* (also
-//! *rank*) of a subtask is the largest sum of WCETs along a path that begins with it; the
-//! descending rank is the list order of HLF, "highest level first" (T. C. Hu, Operations
-//! Research 9(6), 1961).
+//! Words: the *volume* is the sum of all WCETs; the *length* is the largest sum of WCETs along a
+//! path. Both are computed once and checked against overflow, so every analysis may rely on
+//! `length <= volume <= u64::MAX`. The *bottom level* (also *rank*) of a subtask is the largest sum
+//! of WCETs along a path from the subtask on. The descending rank is the list order of HLF,
+//! "highest level first" (T. C. Hu, Operations Research 9(6), 1961).
 //!
-//! A subtask may *wait* between its segments. Its WCET is then the sum of its segments', and
-//! three more numbers are known: the sum of the limits of its waits, their number, and its
-//! longest segment, which is the longest that it keeps a core. The *span* is the largest sum of
-//! WCETs and limits along a path: it is the length of the *oblivious* task, of which each
-//! subtask executes while it waits.
+//! A subtask may *wait* between its segments. Its WCET is then the sum over its segments, and three
+//! more numbers are known: the sum of the limits of its waits, their number, and its longest
+//! segment, the longest time on a core. The *span* is the largest sum of WCETs and limits along a
+//! path. It is also the length of the *oblivious* task, where every subtask executes during its
+//! waits.
 //!
-//! No WCET is 0. All tests here count the work that delays a subtask, and one without
-//! any would be delayed by what they do not count: say a subtask of WCET 0 becomes
-//! ready at the very end of a busy period, as the last one of its job. All of the work
-//! is done then, so the equations call the job complete; but a dispatch has yet to
-//! choose it, and may choose the next job, which is released at this instant.
+//! No WCET is 0. All tests here count the work delaying a subtask, and a subtask without work could
+//! be delayed by something else. Say a subtask of WCET 0 becomes ready at the very end of a busy
+//! period, as the last of its job. All work is done then, so the equations call the job complete.
+//! But the dispatcher has yet to choose the subtask, and may choose the next job, released at this
+//! very instant.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -51,14 +49,14 @@ pub struct Task {
     table_terms: TableTerms,
 }
 
-/// The attributes that matter to a table alone; by default those of a sporadic DAG.
+/// The attributes relevant to a table alone; the default describes a sporadic DAG.
 #[derive(Clone, Debug, Default)]
 pub struct TableTerms {
-    /// The offset of a periodic DAG; `None`: it is sporadic.
+    /// The offset of a periodic DAG in nanoseconds; `None`: the DAG is sporadic.
     pub offset_ns: Option<u64>,
     /// The subtasks that are not preempted.
     pub non_preemptive: Vec<usize>,
-    /// The sinks with a relative deadline of their own, and that.
+    /// The sinks with a relative deadline of their own, each with that deadline in nanoseconds.
     pub sink_deadlines_ns: Vec<(usize, u64)>,
 }
 
@@ -72,11 +70,11 @@ struct TaskWaits {
 /// The waits of one subtask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SubtaskWaits {
-    /// The number of its waits.
+    /// The number of waits.
     pub count: u32,
-    /// The sum of their limits, in nanoseconds.
+    /// The sum of the waits' limits, in nanoseconds.
     pub limits_ns: u64,
-    /// The WCET of its longest segment, in nanoseconds; without waits that of the subtask.
+    /// The WCET of the longest segment, in nanoseconds; without waits the subtask's WCET.
     pub longest_segment_ns: u64,
 }
 
@@ -84,7 +82,7 @@ texts! {
     /// Why a DAG cannot be analysed.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum TaskError {
-        /// No WCET above 0 is known for this subtask, perhaps for further ones.
+        /// No WCET above 0 is known for this subtask, and perhaps for others.
         MissingWcet { subtask: SubtaskId } =
             "no WCET above 0 is given for subtask {}; give it one to have the DAG analysed",
             subtask.0;
@@ -110,12 +108,12 @@ texts! {
 impl Task {
     /// Makes a task from its timing, its WCETs and its precedence edges.
     ///
-    /// Edges are `(predecessor, successor)` by position in `wcets_ns`, in any
-    /// order; repeated and transitive ones change nothing.
+    /// Edges are `(predecessor, successor)` by position in `wcets_ns`, in any order. Repeated and
+    /// transitive edges change nothing.
     ///
     /// # Errors
     ///
-    /// The first [`TaskError`] that is found.
+    /// The first [`TaskError`] found.
     pub fn new(
         period_ns: u64,
         relative_deadline_ns: u64,
@@ -145,13 +143,12 @@ impl Task {
 
     /// Makes a task from a verified DAG, adding `overhead_ns` to the WCET of each segment.
     ///
-    /// See `Overheads` for what the overhead stands for.
+    /// See `Overheads` for the meaning of the overhead.
     ///
     /// # Errors
     ///
-    /// [`MissingWcet`](TaskError::MissingWcet) for the first subtask without one
-    /// above 0, whatever the overhead, or
-    /// [`VolumeOverflow`](TaskError::VolumeOverflow) or
+    /// [`MissingWcet`](TaskError::MissingWcet) for the first subtask without a WCET above 0,
+    /// whatever the overhead, or [`VolumeOverflow`](TaskError::VolumeOverflow) or
     /// [`WaitsOverflow`](TaskError::WaitsOverflow).
     pub fn from_dag(dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
         let charge = |(subtask, of): (u32, &Subtask)| {
@@ -187,7 +184,7 @@ impl Task {
         let waits = dag.subtasks().iter().map(|of| SubtaskWaits {
             count: to_u32(of.waits().len()),
             limits_ns: of.waiting_ns(),
-            // No longer than the WCET, to which as much is added, if not more.
+            // No longer than the WCET, which grows by at least as much.
             longest_segment_ns: of.longest_segment_ns().unwrap_or(0) + overhead_ns,
         });
         task.with_waits(waits.collect())
@@ -201,8 +198,8 @@ impl Task {
     ///
     /// # Panics
     ///
-    /// If `waits` has not as many entries as there are subtasks, or a longest segment exceeds the
-    /// WCET of its subtask.
+    /// If the number of `waits` differs from the number of subtasks, or a longest segment exceeds
+    /// the WCET of its subtask.
     pub fn with_waits(self, waits: Vec<SubtaskWaits>) -> Result<Self, TaskError> {
         assert_eq!(
             waits.len(),
@@ -227,7 +224,7 @@ impl Task {
         })
     }
 
-    /// Returns the task with what a table of it depends on besides.
+    /// Returns the task with further attributes relevant to its table.
     #[must_use]
     pub fn with_table_terms(self, table_terms: TableTerms) -> Self {
         Self {
@@ -282,13 +279,13 @@ impl Task {
         self.least_deadline_ns
     }
 
-    /// Returns the time by which a job is complete at the latest, if none is to overlap the next.
+    /// Returns the latest time for a job to complete without overlapping the next job.
     pub(super) fn within_ns(&self) -> u64 {
         self.relative_deadline_ns.min(self.period_ns)
     }
 
-    /// Returns when a job of lap 0 is released in a table, of this DAG alone or with others, from
-    /// the beginning of the lap on.
+    /// Returns the release of a job of lap 0, in nanoseconds from the beginning of the lap, in a
+    /// table of this DAG alone or with other DAGs.
     pub const fn release_in_lap_ns(&self, job: i64, is_alone: bool) -> i64 {
         let offset_ns = match self.table_terms.offset_ns {
             Some(offset_ns) if !is_alone => offset_ns.cast_signed(),
@@ -298,7 +295,7 @@ impl Task {
             .wrapping_add(offset_ns)
     }
 
-    /// Returns the attributes that matter to a table.
+    /// Returns the attributes relevant to a table.
     pub const fn table_terms(&self) -> &TableTerms {
         &self.table_terms
     }
@@ -317,7 +314,7 @@ impl Task {
     ///
     /// # Panics
     ///
-    /// If there is no such subtask.
+    /// If the subtask does not exist.
     pub fn successors(&self, subtask: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
         let successors = &self.graph.successors;
         let of_subtask = &successors.neighbours[successors.range(subtask)];
@@ -335,7 +332,7 @@ impl Task {
         self.graph.successors.neighbours.len()
     }
 
-    /// Returns the subtasks in an order in which every predecessor comes first.
+    /// Returns the subtasks in a topological order, every predecessor first.
     pub fn topological_order(&self) -> impl DoubleEndedIterator<Item = usize> {
         self.graph.topological_order.iter().map(|id| id.index())
     }
@@ -350,8 +347,8 @@ impl Task {
         self.graph.levels(&self.wcets_ns)
     }
 
-    /// Returns the longest path to each subtask with it: when it finishes after the release, in
-    /// nanoseconds, if it takes its WCET and no subtask waits for a core.
+    /// Returns by subtask the longest path up to and including the subtask: the finish after the
+    /// release, in nanoseconds, if every subtask takes its WCET and none waits for a core.
     pub(super) fn finishes_ns(&self) -> Vec<u64> {
         let mut finishes_ns = self.wcets_ns().to_vec();
         for subtask in self.topological_order() {
@@ -363,14 +360,13 @@ impl Task {
         finishes_ns
     }
 
-    /// Returns a longest path for the given weights; ties go to the smallest
-    /// position.
+    /// Returns a longest path for the given weights; ties go to the smallest position.
     ///
     /// The weights replace the WCETs, and their sum must not overflow.
     ///
     /// # Panics
     ///
-    /// If `weights` has not as many entries as there are subtasks.
+    /// If the number of `weights` differs from the number of subtasks.
     pub fn longest_path<W>(&self, weights: &[W]) -> Vec<usize>
     where
         W: Copy + Default + Ord + Add<Output = W>,
@@ -379,8 +375,8 @@ impl Task {
         self.descend(&levels, 0..levels.len())
     }
 
-    /// Returns a longest path that begins with a source, which is another one only where weights
-    /// are 0.
+    /// Returns a longest path from a source on, different from [`longest_path`](Self::longest_path)
+    /// only where weights are 0.
     pub(super) fn longest_complete_path<W>(&self, weights: &[W]) -> Vec<usize>
     where
         W: Copy + Default + Ord + Add<Output = W>,
@@ -388,7 +384,8 @@ impl Task {
         self.descend(&self.graph.levels(weights), self.sources())
     }
 
-    /// Returns the path that goes on from the first of the highest level to the next one.
+    /// Returns the path that starts at the highest level of `first` and always continues at the
+    /// highest level.
     fn descend<W: Copy + Ord>(
         &self,
         levels: &[W],
@@ -431,8 +428,8 @@ impl Task {
         waits.map_or(&[], |waits| &waits.of_subtasks)
     }
 
-    /// Returns the task in which the waits are executed, for their limits; without waits that is
-    /// this one.
+    /// Returns the task with all waits executed for their limits; without waits, returns the task
+    /// itself.
     pub fn oblivious(&self) -> &Self {
         let waits = self.waits.as_ref();
         waits.map_or(self, |waits| &waits.oblivious)
