@@ -1,34 +1,33 @@
 //! Blocking: subtasks that keep their core once started ("limited preemption").
 //!
-//! The lower-ranked work that they may have to wait for, in a safe form that was derived for this
-//! project.
+//! This module bounds the lower-ranked work for which such subtasks may have to wait, in a safe
+//! form derived for this project.
 //!
 //! Let `Delta(x)` be the sum of the `x` largest lower-ranked subtasks of other DAGs. While a
-//! subtask of the job waits, nothing lower starts. Lower-ranked work that it finds was
-//! started before it became ready: on at most `m` cores for a source, on at most `m - 1` for
-//! a later one, because the core of its predecessor has just become free. A subtask never
-//! overlaps with itself, so those running are different subtasks. On `m - j` cores then
+//! subtask of the job waits, nothing lower starts. Any lower-ranked work already running was
+//! started before the subtask became ready: on at most `m` cores for a source, and on at most
+//! `m - 1` for a later subtask, because its predecessor's core has just become free. A subtask
+//! never overlaps with itself, so the running subtasks are all different. On `m - j` cores then
 //!
 //! - at most `Delta(m - j) + N Delta(m - max(j, 1))` blocks, with `N` the number of the DAG's
-//!   subtasks that have a predecessor: each stretch of waiting but the first begins when
-//!   one of these becomes ready;
+//!   subtasks with a predecessor: each stretch of waiting except the first begins when such a
+//!   subtask becomes ready;
 //! - for `j = 0`, unless clipped, at most `Delta(m) + (P - 1) Delta(m - 1)`, with `P` the most
-//!   subtasks on a path, by the critical chain of `pipelined` instead: only the subtasks of
-//!   that one chain wait.
+//!   subtasks on a path. The critical chain of `pipelined` gives this bound: only the chain's own
+//!   subtasks wait.
 //!
-//! Trap: the published LP-max bound (M. A. Serrano et al., "Response-Time
-//! Analysis of DAG Tasks under Fixed Priority Scheduling with Limited
-//! Preemptions", DATE 2016) counts blocking after the first subtask only for
-//! preemptions by higher-priority work. But a DAG's own serial phases leave
-//! cores idle, and those admit new lower-priority subtasks without anybody
-//! being preempted: in the unit test below that gives 10 and 11 is observed.
+//! Trap: the published LP-max bound (M. A. Serrano et al., "Response-Time Analysis of DAG Tasks
+//! under Fixed Priority Scheduling with Limited Preemptions", DATE 2016) counts blocking after the
+//! first subtask only for preemptions by higher-priority work. But serial phases of a DAG leave
+//! cores idle, and idle cores admit new lower-priority subtasks without any preemption. In the unit
+//! test below the published bound gives 10, while 11 is observed.
 //!
-//! Under EDF any other DAG's job may have the later deadline, whatever the relative
-//! deadlines: it may be released during this job. So `Delta` is over all other DAGs. An
-//! instance that starts while a subtask waits is due no later than that, so it is among the
-//! interference, be it up to the job's deadline or up to a sink's.
+//! Under EDF a job of any other DAG may have the later deadline, whatever the relative deadlines,
+//! because the other DAG may be released during this job. So `Delta` is over all other DAGs. An
+//! instance starting while a subtask waits is due no later than the subtask. Such an instance is
+//! part of the interference, up to the job's deadline or up to a sink's.
 //!
-//! Assumes: *no* subtask of any DAG is ever preempted; work-conserving.
+//! Assumes: *no* subtask of any DAG is ever preempted, and the scheduler is work-conserving.
 
 use alloc::vec::Vec;
 
@@ -42,12 +41,12 @@ pub(super) struct Blocking {
     largest: Vec<u128>,
     /// The most subtasks on a path of the blocked DAG.
     path: u128,
-    /// Its subtasks that have a predecessor.
+    /// The number of its subtasks with a predecessor.
     later: u128,
 }
 
 impl Blocking {
-    /// Returns that of a DAG which nothing blocks.
+    /// Returns the blocking of a DAG never blocked.
     pub(super) fn none(task: &Task) -> Self {
         Self {
             largest: Vec::new(),
@@ -56,7 +55,7 @@ impl Blocking {
         }
     }
 
-    /// Returns that of the same DAG by subtasks of these WCETs.
+    /// Returns the blocking of the same DAG by subtasks of these WCETs.
     pub(super) fn by(&self, wcets_ns: &[u64], cores: u32) -> Self {
         let sums = largest(wcets_ns, cores).into_iter().scan(0, |sum, wcet| {
             *sum += u128::from(wcet);
@@ -74,7 +73,7 @@ impl Blocking {
         last.map_or(0, |last| self.largest[last])
     }
 
-    /// Returns the blocking on `cores - j` cores; if not `is_clipped`, in the window.
+    /// Returns the blocking on `cores - j` cores, in the window unless `is_clipped`.
     pub(super) fn during(&self, cores: usize, j: usize, is_clipped: bool) -> u128 {
         if j == 0 && !is_clipped {
             return self.along_a_chain(cores, 0);
@@ -83,7 +82,7 @@ impl Blocking {
         self.sum(cores - j).saturating_add(again)
     }
 
-    /// Returns the blocking of a critical chain that crosses `back` releases.
+    /// Returns the blocking of a critical chain across `back` releases.
     pub(super) fn along_a_chain(&self, cores: usize, back: u128) -> u128 {
         let again = (self.path + back).saturating_sub(1);
         let again = again.saturating_mul(self.sum(cores - 1));
@@ -91,7 +90,7 @@ impl Blocking {
     }
 }
 
-/// Returns the largest WCETs, as many as there are cores at most, the largest first.
+/// Returns the largest WCETs, at most as many as there are cores, the largest first.
 pub(super) fn largest(wcets_ns: &[u64], cores: u32) -> Vec<u64> {
     let cores = usize::try_from(cores).unwrap_or(usize::MAX);
     let ascending = sorted(wcets_ns);

@@ -1,19 +1,19 @@
-//! Certificates: closed lists of states as text, which travel with a set of DAGs.
+//! Certificates: closed lists of states as text, carried along with a set of DAGs.
 //!
 //! ```text
 //! certificate v1 of HASH              of cores, order, times and graphs, with all that is charged
 //! state LAPS COUNT.. FREE.. FINISH..  the numbers of a state
 //! ```
 //!
-//! A host explores ([`explore()`](super::explore())); a commit checks the list in one pass. A list that
-//! somebody has cut or altered, or that is of another set, costs the bounds only.
+//! A host explores ([`explore()`](super::explore())); a commit checks the list in one pass. A list
+//! cut or altered by somebody, or made for another set, costs only the bounds.
 //!
-//! Executions count as real numbers here, which covers whole ones, too.
+//! Executions count as real numbers here, and whole numbers are a special case.
 //!
-//! Assumes that the set is *fixed*: all jobs are released, none is paused, cut or aborted. A commit
-//! with a certificate refuses what would change that. Charges of the platform lengthen executions, and
-//! releases may be late by as much (the jitter): a step of the scheduler sees a release together with
-//! all that were due no later.
+//! Assumes a *fixed* set: all jobs are released, and none is paused, cut or aborted. A commit with
+//! a certificate refuses anything that would change the set. Charges of the platform lengthen
+//! executions, and releases may be late by as much (the jitter): a step of the scheduler sees a
+//! release together with all releases due no later.
 
 use alloc::format;
 use alloc::string::String;
@@ -30,14 +30,14 @@ use super::workload::WorkloadBursts;
 use crate::policy::Preemption;
 use crate::task_set::{Dag, Subtask};
 
-/// Returns how late a step may see a release. A charge may be of lateness, too, which changes the order
-/// of instances, as a longer execution does not.
+/// Returns how late a step may see a release, in nanoseconds. A charge may also stand for lateness;
+/// unlike a longer execution, lateness changes the order of instances.
 pub(super) fn lateness_ns(settings: &AnalysisSettings, bursts: &WorkloadBursts) -> u64 {
     let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption);
     bursts.late_ns.max(charge_ns.unwrap_or(u64::MAX))
 }
 
-/// Reports whether an instance may end within its WCET, if that was observed.
+/// Reports whether an instance may end within its WCET, if the WCET was observed.
 fn is_cut(of: &Subtask) -> bool {
     of.budget_ns
         .is_some_and(|budget_ns| of.wcet_ns.is_none_or(|wcet_ns| budget_ns < wcet_ns))
@@ -111,7 +111,7 @@ pub(super) fn write_certificate(set: &AbstractionSet, states: &[AbstractState]) 
 ///
 /// # Errors
 ///
-/// The text is none of this set, or its list is not closed.
+/// The text does not belong to this set, or its list is not closed.
 pub(super) fn check_certificate(
     set: &AbstractionSet,
     text: &str,

@@ -1,40 +1,39 @@
-//! The most work that a few disjoint chains of a graph can hold.
+//! The most work a few disjoint chains of a graph can hold.
 //!
-//! Words: a *chain* is a set of subtasks of which any two are ordered; along a path of the
-//! graph it *takes* some subtasks and *passes* the others. The *cover* of `k` chains is the
-//! largest sum of WCETs that `k` disjoint chains take together: the length for one chain,
-//! the volume for as many as the graph is wide.
+//! Words: a *chain* is a set of subtasks any two of which are ordered. Along a path of the graph a
+//! chain *takes* some subtasks and *passes* the others. The *cover* of `k` chains is the largest
+//! sum of WCETs taken together by `k` disjoint chains. For one chain the cover is the length; for
+//! as many chains as the graph is wide, the volume.
 //!
-//! Up to [`STEPS`] the covers are exact. Chains that may pass through subtasks are the
-//! paths of a flow, each subtask of which pays its WCET once; a flow one larger comes from
-//! a heaviest augmenting path (R. K. Ahuja, T. L. Magnanti, J. B. Orlin, "Network Flows",
-//! 1993, section 9.7). Its weights are found by sweeps along the topological order and back
-//! until nothing changes, which few sweeps suffice for. Beyond, chains are peeled off one
-//! by one, a longest path at a time: covers that are too small, and thus safe wherever a
-//! cover is subtracted.
+//! Up to [`STEPS`] the covers are exact. Chains able to pass through subtasks are the paths of a
+//! flow in which each subtask pays its WCET once. A heaviest augmenting path makes the flow larger
+//! by one chain (R. K. Ahuja, T. L. Magnanti, J. B. Orlin, "Network Flows", 1993, section 9.7).
+//! Sweeps along the topological order and back find the weights; a few sweeps are enough until
+//! nothing changes. Beyond [`STEPS`], chains are peeled off one by one, a longest path at a time.
+//! The resulting covers are too small, and therefore safe wherever a cover is subtracted.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::task::Task;
 
-/// How many subtasks and edges, summed over the chains, are looked at for exact covers, and
-/// for peeled ones beyond the second.
+/// The limit on subtasks and edges visited, summed over the chains, for exact covers, and for
+/// peeled chains beyond the second.
 pub(super) const STEPS: usize = 1 << 17;
 
 /// One chain: the subtasks of a path, each with whether the chain takes it.
 pub(super) type CoverChain = Vec<(usize, bool)>;
 
-/// Returns the covers of 1, 2, .. chains: at most `most`, and no more than it takes to
-/// cover the volume.
+/// Returns the covers of 1, 2, .. chains: at most `most` chains, and no more than needed to cover
+/// the volume.
 ///
 /// Exact unless the graph is large.
 pub fn covers(task: &Task, most: usize) -> Vec<u64> {
     exact(task, most).unwrap_or_else(|| sums(&parts(task, most)))
 }
 
-/// Returns the most cores that one job can use at an instant, at least 1; the covers for as many
-/// chains; and the work of each of the chains that [`peel`] finds.
+/// Returns the most cores usable by one job at an instant, at least 1; the covers for as many
+/// chains; and the work of each chain found by [`peel`].
 pub(super) fn parallelism_covers_and_parts(task: &Task, cores: u32) -> (u64, Vec<u64>, Vec<u64>) {
     let most = usize::try_from(cores).unwrap_or(usize::MAX);
     let covers = exact(task, most);
@@ -44,18 +43,18 @@ pub(super) fn parallelism_covers_and_parts(task: &Task, cores: u32) -> (u64, Vec
     (parallelism as u64, covers, parts)
 }
 
-/// Returns the width, or `None` if the graph is too large to find it.
+/// Returns the width, or `None` if the graph is too large for finding it.
 pub fn width(task: &Task) -> Option<u64> {
     Some(exact(task, usize::MAX)?.len() as u64)
 }
 
-/// Returns the most cores that one job can use at an instant, at least 1:
-/// `min(cores, width)`, or just `cores` where the width is not known.
+/// Returns the most cores usable by one job at an instant, at least 1: `min(cores, width)`, or just
+/// `cores` if the width is unknown.
 pub fn parallelism(task: &Task, cores: u32) -> u64 {
     parallelism_covers_and_parts(task, cores).0
 }
 
-/// Returns the covers if they can be found within the limit.
+/// Returns the covers, if found within the limit.
 fn exact(task: &Task, most: usize) -> Option<Vec<u64>> {
     let mut flow = ChainFlow::none(task);
     let mut covers: Vec<u64> = Vec::new();
@@ -92,7 +91,7 @@ pub(super) fn covering(task: &Task, most: usize, count: usize) -> Vec<CoverChain
     }
 }
 
-/// Returns `count` disjoint chains of the most work, whatever the size of the graph.
+/// Returns `count` disjoint chains with the most work, whatever the size of the graph.
 pub(super) fn heaviest(task: &Task, count: usize) -> Vec<CoverChain> {
     let mut flow = ChainFlow::none(task);
     for _ in 0..count {
@@ -101,8 +100,8 @@ pub(super) fn heaviest(task: &Task, count: usize) -> Vec<CoverChain> {
     flow.into_chains()
 }
 
-/// Returns disjoint chains, each a longest path of what the earlier ones left: at most
-/// `most`, and fewer in a large graph.
+/// Returns disjoint chains, each a longest path in the rest left by earlier chains: at most `most`
+/// chains, and fewer in a large graph.
 pub(super) fn peel(task: &Task, most: usize) -> Vec<CoverChain> {
     let steps = (task.subtask_count() + task.edge_count()).max(1);
     let mut weights = Vec::from(task.wcets_ns());
@@ -119,7 +118,7 @@ pub(super) fn peel(task: &Task, most: usize) -> Vec<CoverChain> {
     chains
 }
 
-/// Returns the work that a chain takes.
+/// Returns the work taken by a chain.
 pub(super) fn weight(task: &Task, chain: &CoverChain) -> u64 {
     let taken = chain.iter().filter(|(_, takes)| *takes);
     taken.map(|&(subtask, _)| task.wcets_ns()[subtask]).sum()
@@ -130,28 +129,28 @@ fn is_small(task: &Task, chains: usize) -> bool {
     steps.saturating_mul(chains) <= STEPS
 }
 
-/// A flow of chains. Each subtask has an entry and an exit; it is taken between them once,
+/// A flow of chains. Each subtask has an entry and an exit. Between them the subtask is taken once,
 /// for its WCET, or passed any number of times, for nothing.
 struct ChainFlow<'a> {
     task: &'a Task,
     taken: Vec<bool>,
     passed: Vec<u32>,
-    /// The chains along each edge, in the order of the task's successors.
+    /// The number of chains along each edge, in the order of the task's successors.
     along: Vec<u32>,
 }
 
-/// How the heaviest way to an entry or exit comes there.
+/// The last step of the heaviest way to an entry or exit.
 #[derive(Clone, Copy)]
 enum PathStep {
-    /// It begins at this entry.
+    /// The way begins at this entry.
     Begin,
-    /// Along an edge, from the exit of its predecessor.
+    /// Along an edge, from the exit of the predecessor.
     Edge { from: usize, edge: usize },
-    /// From the entry of the same subtask: taking it, or passing it.
+    /// From the entry of the same subtask: taking or passing the subtask.
     Through { takes: bool },
-    /// From the exit of the same subtask, which is then not taken, or not passed.
+    /// From the exit of the same subtask, undoing a taking or a passing.
     Undo { takes: bool },
-    /// Against an edge, from the entry of its successor.
+    /// Against an edge, from the entry of the successor.
     UndoEdge { to: usize, edge: usize },
 }
 
@@ -182,7 +181,7 @@ impl<'a> ChainFlow<'a> {
         }
     }
 
-    /// Adds a chain so that the chains take the most, and returns how much more that is.
+    /// Adds a chain, to the most work of all chains together, and returns the increase.
     fn augment(&mut self) -> u64 {
         let count = self.task.subtask_count();
         let ways = |step| HeaviestPaths {
@@ -193,7 +192,7 @@ impl<'a> ChainFlow<'a> {
             ways(PathStep::Begin),
             ways(PathStep::Through { takes: false }),
         );
-        // No way goes round, so each pair of sweeps settles a further turn of some way.
+        // No way goes round in circles, so each pair of sweeps settles a further turn of some way.
         for _ in 0..=count {
             self.sweep(&mut entries, &mut exits);
             if !self.sweep_back(&mut entries, &mut exits) {
@@ -274,7 +273,8 @@ impl<'a> ChainFlow<'a> {
 
     /// Takes the flow apart into its chains.
     fn into_chains(mut self) -> Vec<CoverChain> {
-        // As many chains begin at a subtask as lead through it and do not come along an edge.
+        // The chains beginning at a subtask are the chains through it, less the chains arriving
+        // along an edge.
         let through = self.taken.iter().zip(&self.passed);
         let mut begin: Vec<u32> = through.map(|(&t, &p)| u32::from(t) + p).collect();
         for v in 0..begin.len() {
@@ -288,7 +288,7 @@ impl<'a> ChainFlow<'a> {
                 let mut chain = CoverChain::new();
                 let mut at = Some(first);
                 while let Some(v) = at {
-                    // A subtask is covered by one chain; the others only pass through it.
+                    // A subtask is covered by one chain; further chains only pass through.
                     chain.push((v, core::mem::take(&mut self.taken[v])));
                     let next = self
                         .task

@@ -1,36 +1,34 @@
-//! One DAG whose subtasks have priorities of their own.
+//! One DAG with priorities of its subtasks.
 //!
 //! Q. He, X. Jiang, N. Guan, Z. Guo, "Intra-Task Priority Assignment in
 //! Real-Time Scheduling of DAG Tasks on Multi-Cores", IEEE TPDS 30(10), 2019.
 //! Let `I(v)` be the subtasks parallel to `v` of higher priority. Then
 //! `R = max over complete paths p of len(p) + c(union of I(v) over p, less p) / m`.
 //!
-//! Assumes: preemptive, one job alone on `m` cores, and priorities that respect
-//! precedence (a predecessor has the higher one).
+//! Assumes: preemptive, one job alone on `m` cores, and priorities that respect precedence (a
+//! predecessor has the higher priority).
 //!
-//! Trap: carrying one "best" path per subtask through the graph, as published
-//! code does, is unsafe, because the union is not additive: in example E5 that
-//! gives 63, and a schedule of 64 exists. So paths are enumerated, up to
-//! [`PATH_LIMIT`]; beyond, callers use the multi-path bound.
+//! Trap: published code carries a single "best" path per subtask through the graph. This is unsafe,
+//! because the union is not additive: in example E5 the result is 63, while a schedule of 64
+//! exists. So paths are enumerated, up to [`PATH_LIMIT`]; beyond, callers use the multi-path bound.
 //!
-//! Two subtasks are *parallel* if neither reaches the other. That is asked of the transitive
-//! closure, one bit row a subtask: it takes `n * n / 8` bytes and `edges * n / 64` word
-//! operations, so it is only built up to [`SUBTASK_LIMIT`] subtasks (128 KiB).
+//! Two subtasks are *parallel* if neither reaches the other. The transitive closure answers such
+//! questions, with one bit row a subtask. The closure takes `n * n / 8` bytes and `edges * n / 64`
+//! word operations, so it is only built up to [`SUBTASK_LIMIT`] subtasks (128 KiB).
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::task::Task;
 
-/// The most complete paths that [`intra_task`] enumerates: 4,096.
+/// The most complete paths enumerated by [`intra_task`]: 4,096.
 pub const PATH_LIMIT: u32 = 4096;
 
-/// Bounds the response time of one job alone, its subtasks given by descending
-/// priority.
+/// Bounds the response time of one job alone, with its subtasks ordered by descending priority.
 ///
-/// `None`: does not apply (no cores, waits, `order` does not name each subtask once,
-/// or contradicts precedence) or takes too long (more than [`PATH_LIMIT`]
-/// paths or [`SUBTASK_LIMIT`] subtasks).
+/// Returns `None` if the test does not apply (no cores, waits, or an `order` that does not name
+/// each subtask once or contradicts precedence) or takes too long (more than [`PATH_LIMIT`] paths
+/// or [`SUBTASK_LIMIT`] subtasks).
 pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     let count = task.subtask_count();
     let ranks = ranks(task, order)?;
@@ -55,7 +53,7 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
             let row = &interfering[v * words..(v + 1) * words];
             union.iter_mut().zip(row).for_each(|(all, row)| *all |= row);
         }
-        // A path's own subtasks are in its length already.
+        // A path's own subtasks are already in its length.
         path.iter().for_each(|&v| remove(&mut union, v));
         let beside = (0..count).filter(|&v| contains(&union, v));
         let beside: u64 = beside.map(|v| wcets[v]).sum();
@@ -65,10 +63,10 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     Some(bound)
 }
 
-/// Visits each path from a source to a sink, in the order of their subtasks' positions.
+/// Visits each path from a source to a sink, in the order of the subtasks' positions.
 pub(super) fn each_path(task: &Task, mut visit: impl FnMut(&[usize])) {
     for source in task.sources() {
-        // The path so far, and of each of its subtasks the successors that were not tried.
+        // The path so far, and for each of its subtasks the untried successors.
         let (mut path, mut untried) = (vec![source], vec![task.successors(source)]);
         while let (Some(&last), Some(successors)) = (path.last(), untried.last_mut()) {
             if let Some(next) = successors.next() {
@@ -98,8 +96,7 @@ fn paths(task: &Task) -> u32 {
         .fold(0, |sum, v| sum.saturating_add(onward[v]))
 }
 
-/// Returns each subtask's place in `order`, if that is a permutation that
-/// respects precedence.
+/// Returns each subtask's place in `order`, if `order` is a permutation and respects precedence.
 fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
     let count = task.subtask_count();
     let mut ranks = vec![usize::MAX; count];
@@ -113,12 +110,12 @@ fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
 
 /// The most subtasks of a DAG for which the closure is built: 1,024.
 ///
-/// Beyond, intra-task priorities are not exploited. The limit keeps a commit's time
-/// near linear and its temporary memory small.
+/// Beyond, intra-task priorities are not used. The limit keeps a commit's time near linear and its
+/// temporary memory small.
 pub const SUBTASK_LIMIT: usize = 1024;
 
-/// Returns for each subtask the set of `words` words of the subtasks that it precedes, directly or
-/// not; `None` beyond [`SUBTASK_LIMIT`].
+/// Returns for each subtask the set of all later subtasks, reached directly or not, in `words`
+/// words; `None` beyond [`SUBTASK_LIMIT`].
 fn successors(task: &Task, words: usize) -> Option<Vec<u64>> {
     let count = task.subtask_count();
     let mut sets = (count <= SUBTASK_LIMIT).then(|| vec![0; words * count])?;

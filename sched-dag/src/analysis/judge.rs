@@ -1,9 +1,9 @@
-//! The verdict at commit: what the tests find, or why there is no bound.
+//! The verdict at commit: the findings of the tests, or the reason for a missing bound.
 //!
-//! [`answer`] asks the [tests](super::schedulability) for the jobs of each cluster and then for their
-//! sinks. A DAG of which a sink has no bound within its own deadline is not proven. What is certain
-//! (missing WCETs, a path longer than the deadline, a subtask longer than the period, more work
-//! than cores) is said instead of what a test says.
+//! [`answer`] asks the [tests](super::schedulability) about the jobs of each cluster, and then
+//! about their sinks. A DAG with a sink unbounded by the sink's own deadline is not proven. Certain
+//! findings (missing WCETs, a path longer than the deadline, a subtask longer than the period, more
+//! work than cores) take precedence over the tests' reasons.
 
 use alloc::string::String;
 use alloc::vec;
@@ -21,10 +21,10 @@ use crate::ids::{SubtaskId, to_u32};
 use crate::table::Table;
 use crate::task_set::{Dag, TaskSet};
 
-/// Bounds the response time of every DAG, as far as a test proves it.
+/// Bounds the response time of every DAG, as far as a test proves a bound.
 ///
-/// Clusters share no core, so each is a case of its own. A signal from one to another needs
-/// no term: a sporadic DAG counts as if signals came as fast as they may.
+/// Clusters share no core, so each is a case of its own. A signal between clusters needs no term: a
+/// sporadic DAG counts as if signals came as fast as allowed.
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult {
     let dags = task_set.dags();
@@ -51,7 +51,7 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         },
     );
     answer.reasons = reasons;
-    // However the search ended: where a DAG has no bound, one is named, with what is now its reason.
+    // The first failing DAG must have no bound in the end, and its final reason.
     let all: Vec<usize> = (0..dags.len()).collect();
     let first = answer.first_failing.map(|failing| failing.dag.index());
     answer.first_failing = (first.and_then(|dag| first_own(&[dag], &answer.reasons)))
@@ -59,8 +59,8 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
     answer
 }
 
-/// Bounds the response time of every DAG by each test that bounds it, where the others' smallest
-/// bounds are known, whichever of them is proven.
+/// Bounds the response time of every DAG by each successful test. Each test assumes the smallest
+/// known bounds of the other DAGs, whichever test proves them.
 #[must_use]
 pub fn bounds_by_test(task_set: &TaskSet, settings: &AnalysisSettings) -> Vec<Vec<DagBound>> {
     let mut found = vec![Vec::new(); task_set.dags().len()];
@@ -73,7 +73,7 @@ pub fn bounds_by_test(task_set: &TaskSet, settings: &AnalysisSettings) -> Vec<Ve
     found
 }
 
-/// Explores a set whose cores are not divided, and returns its certificate for a later commit with the
+/// Explores a set with undivided cores, and returns its certificate for a later commit with the
 /// same settings.
 ///
 /// # Errors
@@ -99,7 +99,7 @@ pub fn certify(task_set: &TaskSet, settings: &AnalysisSettings) -> Result<String
     }
 }
 
-/// Calls `work` for the case of each cluster, with the positions of all its DAGs.
+/// Calls `work` for the case of each cluster, with the positions of all DAGs of the cluster.
 fn each_case(
     task_set: &TaskSet,
     settings: &AnalysisSettings,
@@ -128,7 +128,7 @@ type CaseWork<'w> =
     dyn FnMut(&[usize], &AnalysisInput<'_>, AnalysisResult, &mut [Option<NotProvenReason>]) + 'w;
 
 impl AnalysisResult {
-    /// Takes all bounds away for one reason.
+    /// Takes all bounds away for the given reason.
     pub(super) fn refuse(&mut self, reason: NotProvenReason) {
         for (bound, own) in self.bounds.iter_mut().zip(&mut self.reasons) {
             *own = own.or(bound.take().map(|_| reason));
@@ -137,8 +137,8 @@ impl AnalysisResult {
 }
 
 impl AnalysisInput<'_> {
-    /// Answers for the jobs of the DAGs of this case, by their positions in it; names
-    /// them by their positions in the commit.
+    /// Answers for the jobs of this case's DAGs. Bounds are by position in the case; the first
+    /// failing DAG has its position in the commit.
     pub(super) fn verdict(&self) -> AnalysisResult {
         let JobBounds {
             bounds,
@@ -167,13 +167,13 @@ impl AnalysisInput<'_> {
         }
     }
 
-    /// Reports whether jobs are certain to come; a sporadic DAG's signals may not.
+    /// Reports whether jobs are certain to come; signals of a sporadic DAG may stay away.
     fn must_keep_up(&self, dag: usize) -> bool {
         !self.dag(dag).is_sporadic()
     }
 
-    /// Finds the DAGs that cannot keep up at WCETs: by urgency those that could
-    /// not even alone, then the first at which the cores do not suffice.
+    /// Finds the DAGs that cannot keep up at WCETs: by urgency, first the DAGs unable to keep up
+    /// even alone, then the first DAG to overload the cores.
     fn certain(&self) -> Vec<(usize, NotProvenReason)> {
         let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
@@ -199,7 +199,7 @@ impl AnalysisInput<'_> {
             let Some(sum) = Ratio::sum(used.iter().copied()) else {
                 break;
             };
-            // The DAGs so far need more than all cores: the least urgent of them cannot keep up.
+            // The DAGs so far need more than all cores, so the least urgent of them cannot keep up.
             if !sum.at_most(cores, 1) {
                 if certain.iter().all(|&(hopeless, _)| hopeless != dag) {
                     certain.push((dag, NotProvenReason::Overload));
@@ -211,7 +211,7 @@ impl AnalysisInput<'_> {
     }
 }
 
-/// Returns the first DAG at the positions `among` that has no bound for a reason of its own.
+/// Returns the first DAG at the positions `among` without a bound for a reason of its own.
 fn first_own(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<NotProven> {
     let own = |reason: &NotProvenReason| !matches!(reason, NotProvenReason::DelayedBy { .. });
     let mut failing = among.iter().filter_map(|&dag| {
@@ -222,8 +222,8 @@ fn first_own(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<Not
     failing.next()
 }
 
-/// Fills in the bounds of the sinks of each DAG, in their order, that follow from the bounds
-/// of jobs. A DAG of which a sink is not bounded by its own deadline is not proven.
+/// Fills in the bounds of the sinks of each DAG, in order, based on the bounds of jobs. A DAG with
+/// a sink unbounded by the sink's own deadline is not proven.
 fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
@@ -254,15 +254,15 @@ fn is_certain(reason: Option<NotProvenReason>) -> bool {
     reason.is_some_and(|reason| reason.is_certain())
 }
 
-/// Returns the longest path to each sink, in their order.
+/// Returns the longest path to each sink in nanoseconds, in the order of the sinks.
 fn lengths_ns(task: &Task, model: &Dag) -> Vec<u64> {
     let finishes_ns = task.finishes_ns();
     let sinks = model.sinks().iter();
     sinks.map(|sink| finishes_ns[sink.index()]).collect()
 }
 
-/// Completes the bounds of a DAG's sinks by that of its jobs, and returns the first sink
-/// that is not bounded by its deadline; then none of them has a bound.
+/// Completes the bounds of a DAG's sinks by the bound of its jobs. Returns the first sink not
+/// bounded by its deadline; in this case no sink gets a bound.
 fn within_deadlines(
     model: &Dag,
     whole: Option<DagBound>,
@@ -286,8 +286,8 @@ fn within_deadlines(
     late
 }
 
-/// Returns the first sink whose longest path is longer than its deadline, and that path's
-/// length.
+/// Returns the first sink with a longest path beyond its deadline, and the path's length in
+/// nanoseconds.
 fn too_far(task: &Task, model: &Dag) -> Option<(SubtaskId, u64)> {
     let mut sinks = model.sinks().iter().copied().zip(lengths_ns(task, model));
     sinks.find(|&(sink, length_ns)| length_ns > model.subtask(sink).relative_deadline_ns())

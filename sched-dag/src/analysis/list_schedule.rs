@@ -1,20 +1,20 @@
-//! List schedules: for each of some cores a list of a DAG's subtasks, with the times of their WCETs.
+//! List schedules: a list of a DAG's subtasks for each of some cores, with times based on WCETs.
 //!
-//! Let each subtask execute for its WCET, and at each completion look at the *ready* ones in the
-//! order of their ranks, the longest remaining path first, ties by position. Each goes to the first
-//! idle core on which it ends by that core's *limit*; if there is none, it stays ready. None is
-//! preempted.
+//! Let each subtask execute for its WCET. At each completion, look at the *ready* subtasks in the
+//! order of their ranks, the longest remaining path first, ties by position. Each subtask goes to
+//! the first idle core on which it ends by the core's *limit*. Without such a core the subtask
+//! stays ready. Nothing is preempted.
 //!
-//! A run keeps to these times if it keeps to the lists: each subtask executes on its core only and
-//! after the one before it, with nothing that wins over it. Then each ends at its time after the
-//! release, or earlier, whatever is shorter than its WCET; a schedule made anew by shorter times
-//! might take longer (R. L. Graham's anomalies, 1969). The proof is in `docs/bounds.md`, "Lent
-//! cores".
+//! A run keeps to these times if it keeps to the lists: each subtask executes on its core only,
+//! after the subtask before it, and nothing wins over it. Then each subtask ends at its time after
+//! the release, or earlier, even if some executions are shorter than their WCETs. A new schedule
+//! for the shorter times might take longer (R. L. Graham's anomalies, 1969). `docs/bounds.md`,
+//! "Tables", has the proof.
 //!
-//! Limits make some cores end early. [`ListSchedule::squeezed`] lowers them as far as it finds
-//! schedules: the first cores are then full up to the deadline, and the last are left early.
+//! Limits make some cores end early. [`ListSchedule::squeezed`] lowers the limits as far as it
+//! finds schedules. The first cores are then full up to the deadline, and the last cores end early.
 //!
-//! Not guaranteed: that a schedule within the limits is found if there is one.
+//! Not guaranteed: an existing schedule within the limits may not be found.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -25,22 +25,22 @@ use super::task::Task;
 use crate::ids::{ClusterId, DagId, SubtaskId, to_u32};
 use crate::table::{CoreList, Table, TableEntry};
 
-/// How often one core's limit is lowered, at most.
+/// The most times one core's limit is lowered.
 const SQUEEZES: usize = 256;
 
-/// How many pairs of subtasks are looked at to squeeze one schedule, at most. A schedule of n
-/// subtasks counts as n^2, since those that no core may take are looked at again at each
-/// completion. It limits no graph of less than 45 subtasks on 16 cores.
+/// The most pairs of subtasks visited to squeeze one schedule. A schedule of n subtasks counts as
+/// n^2, since subtasks refused by all cores are visited again at each completion. Graphs of less
+/// than 45 subtasks on 16 cores never reach the limit.
 const SQUEEZE_STEPS: usize = 1 << 23;
 
 /// A subtask in the list of its core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScheduledSubtask {
-    /// Its position in the DAG.
+    /// The subtask's position in the DAG.
     pub subtask: usize,
-    /// Its start after the release, in nanoseconds.
+    /// The start after the release, in nanoseconds.
     pub start_ns: u64,
-    /// Its finish: later than the start by its WCET.
+    /// The finish, later than the start by the WCET.
     pub finish_ns: u64,
 }
 
@@ -54,14 +54,14 @@ pub struct ListSchedule {
 impl ListSchedule {
     /// Schedules the WCETs on as many cores as there are limits, in nanoseconds after the release.
     ///
-    /// `None` if no core may take some subtask, and without cores.
+    /// Returns `None` if no core may take some subtask, and without cores.
     #[must_use]
     pub fn within(task: &Task, limits_ns: &[u64]) -> Option<Self> {
         let latest_ns = *limits_ns.iter().max()?;
         let (levels, wcets_ns) = (task.bottom_levels(), task.wcets_ns());
         let mut missing = task.graph.predecessor_counts();
         let mut ready = BinaryHeap::new();
-        // Those that are to join the others.
+        // Subtasks about to become ready, or ready again.
         let mut released: Vec<usize> = task.sources().collect();
         let mut cores: Vec<Vec<ScheduledSubtask>> = vec![Vec::new(); limits_ns.len()];
         let mut start_ns = 0;
@@ -75,7 +75,7 @@ impl ListSchedule {
             while idle > 0
                 && let Some((_, Reverse(subtask))) = ready.pop()
             {
-                // Some subtask executes at each instant so far, so this is at most the volume.
+                // Some subtask executes at each instant so far, so the sum is at most the volume.
                 let finish_ns = start_ns + wcets_ns[subtask];
                 let mut places = cores.iter_mut().zip(limits_ns);
                 match places.find(|(list, limit_ns)| is_idle(list) && finish_ns <= **limit_ns) {
@@ -87,7 +87,7 @@ impl ListSchedule {
                             finish_ns,
                         });
                     }
-                    // It only gets later, so no core will ever take it.
+                    // The finish only gets later, so no core will ever take the subtask.
                     None if finish_ns > latest_ns => return None,
                     None => released.push(subtask),
                 }
@@ -109,10 +109,10 @@ impl ListSchedule {
         }
     }
 
-    /// Lowers the limit of each core from the last to the first, each as far as there are
-    /// schedules, where all limits are `limit_ns` to begin with.
+    /// Lowers the limit of each core, from the last core to the first, as far as there are
+    /// schedules. All limits are `limit_ns` to begin with.
     ///
-    /// The schedule may get longer, but not beyond that.
+    /// The schedule may get longer, but never longer than `limit_ns`.
     pub fn squeezed(&self, task: &Task, limit_ns: u64) -> Self {
         let mut limits_ns = vec![limit_ns; self.cores.len()];
         let mut best = self.clone();
@@ -140,7 +140,7 @@ impl ListSchedule {
     ///
     /// # Panics
     ///
-    /// If there is no such core.
+    /// If the core does not exist.
     pub fn finish_ns(&self, core: usize) -> u64 {
         self.cores[core].last().map_or(0, |last| last.finish_ns)
     }
@@ -151,7 +151,7 @@ impl ListSchedule {
         finishes_ns.max().unwrap_or(0)
     }
 
-    /// Returns the schedule as a table of one DAG on cores from a first one on.
+    /// Returns the schedule as a table of one DAG, on cores from `first_core` on.
     pub(super) fn table(&self, dag: usize, period_ns: u64, first_core: usize) -> Table {
         let entry = |of: &ScheduledSubtask| TableEntry {
             dag: DagId(to_u32(dag)),

@@ -1,27 +1,28 @@
 //! The multi-path bound: one job of a DAG at a time, alone or among others.
 //!
-//! Statement, proof and what was checked are in `docs/bounds.md`; here in short. Let
-//! `C_j` be the most work of `j + 1` disjoint chains of the DAG (see `cover`), and
-//! `B_j = volume - C_j`. Look at a job at any instant at which its longest remaining path
-//! does not shrink. Then a ready subtask waits, so all `m` cores are busy, and the
-//! remaining `j + 1` heaviest chains run on at most `j` of them. Such instants sum up to
-//! `x = r - length` if the job is not complete at `r`; so it is, if for some `j < m`
+//! `docs/bounds.md` has the statement, the proof and the checks; this is a summary. Let `C_j` be
+//! the most work of `j + 1` disjoint chains of the DAG (see `cover`), and `B_j = volume - C_j`.
+//! Look at any instant of a job at which its longest remaining path does not shrink. At such an
+//! instant a ready subtask waits, so all `m` cores are busy, and the remaining `j + 1` heaviest
+//! chains run on at most `j` of them. If the job is not complete at `r`, such instants sum up to
+//! `x = r - length`. So the job is complete at `r` if for some `j < m`
 //!
 //! - `(m - j) x >= B_j + blocking + sum of W_i(r)`, or
-//! - `(m - j) x >= max(1, B_j) + blocking + sum of W_i(r)`, each `W_i` clipped to what DAG `i`
+//! - `(m - j) x >= max(1, B_j) + blocking + sum of W_i(r)`, each `W_i` clipped to the work DAG `i`
 //!   can execute in `x`: on each of its cores, and of each of its chains.
 //!
-//! `W_i` counts at most `m - j` cores. With `j = 0` the first form is that of Melani et al.
-//! 2015, without others Graham's; with chains of greedy long paths it is that of He et al.
-//! 2022. So none of these can be better, but for the rounding: here divisions round up,
-//! since preemptions need not be at whole nanoseconds.
+//! `W_i` counts at most `m - j` cores. With `j = 0` the first form is the form of Melani et al.
+//! 2015, and without other DAGs Graham's. With chains of greedy long paths it is the form of He et
+//! al. 2022. So none of them can be better, except for the rounding: here divisions round up, since
+//! preemptions need not happen at whole nanoseconds.
 //!
-//! Where long steps may keep cores (bursts, in `workload`), `m - j` times that is added to the right side.
+//! For cores kept by long steps (bursts, in `workload`), `m - j` times the lost time is added to
+//! the right side.
 //!
-//! Assumes: no core idles while a subtask is ready; `R <= T`, that is one job of the DAG at
-//! a time, which each solution is limited to. Any order inside the DAG.
+//! Assumes: no core idles while a subtask is ready; `R <= T`, so only one job of the DAG executes
+//! at a time, a limit on each solution. Any order inside the DAG.
 //!
-//! Trap: without `max(1, ..)` the second form "proves" `r = length` whenever `B_j = 0`: the
+//! Trap: without `max(1, ..)` the second form "proves" `r = length` whenever `B_j = 0`, because the
 //! clip then counts nothing.
 
 use alloc::vec;
@@ -46,12 +47,12 @@ pub fn multi_path(task: &Task, cores: u32) -> Option<u64> {
     )
 }
 
-/// Bounds the response time of one job alone, by what is left beside its span.
+/// Bounds the response time of one job alone by the work left beside its span.
 pub(super) fn alone(task: &Task, left: &[u64], cores: u32, rounding: Rounding) -> Option<u64> {
     let cores = u64::from(cores);
     let left = (0..cores).zip(left);
     let left = left.map(|(j, &left)| rounding.divide(left, cores - j));
-    // A DAG without subtasks has no chain, and takes no time.
+    // A DAG without subtasks has no chain and takes no time.
     let waiting = left.min().or((cores > 0).then_some(0))?;
     task.span_ns().checked_add(waiting)
 }
@@ -65,21 +66,21 @@ pub(super) struct MultiPathEquations<'a> {
     pub(super) cores: usize,
     pub(super) clip: InterferenceBound,
     pub(super) rounding: Rounding,
-    /// The longest response time that is of use, at most a period.
+    /// The longest useful response time in nanoseconds, at most a period.
     pub(super) limit_ns: u64,
 }
 
-/// One of the inequalities: proven if `cores` times the waiting is at least `busy`.
+/// One of the inequalities: proven if `cores` times the waiting time is at least `busy`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WaitInequality {
-    /// The cores that count: `m - j`.
+    /// The number of cores counted: `m - j`.
     pub(super) cores: u128,
     pub(super) is_clipped: bool,
     pub(super) busy: WorkloadSegment,
 }
 
 impl MultiPathEquations<'_> {
-    /// Returns the least response time that some form proves, if it is at least `start_ns`.
+    /// Returns the least response time of at least `start_ns` proven by some form.
     pub(super) fn solve(
         &self,
         delays: &DelaySources,
@@ -103,8 +104,8 @@ impl MultiPathEquations<'_> {
         Err(SolverFailure::BeyondDeadline)
     }
 
-    /// Returns how much longer a window of at least the span must be until a form may hold; `None`:
-    /// the form does.
+    /// Returns how much longer a window of at least the span must be before a form may be
+    /// satisfied; `None`: the form is satisfied.
     pub(super) fn lacks(
         &self,
         delays: &DelaySources,
@@ -125,8 +126,8 @@ impl MultiPathEquations<'_> {
         if cover != Some(&self.task.oblivious().volume_ns()) || form.busy.value != value + 1 {
             return published;
         }
-        // In a longer window workloads are no smaller. As long as they grow with the waiting, in this
-        // window, no slower than cores execute, the job may wait longer.
+        // Workloads are no smaller in a longer window. The job may wait longer as long as they grow
+        // with the waiting, in this window, no slower than the cores execute.
         let is_steep = ahead.slope >= cores;
         let steep = is_steep.then(|| ahead.span.map_or(u128::MAX, |span| span.max(1)));
         let busy = WorkloadSegment { value, ..form.busy };
@@ -134,7 +135,7 @@ impl MultiPathEquations<'_> {
         beyond.max(busy.lacks(cores, waiting))
     }
 
-    /// Returns the forms at a window of at least the span.
+    /// Returns the forms for a window of at least the span.
     pub(super) fn forms(
         &self,
         delays: &DelaySources,
@@ -153,7 +154,7 @@ impl MultiPathEquations<'_> {
         for other in others {
             other.add_to(times, self.clip, self.cores, &mut plain, &mut clipped);
         }
-        // Alone, or without a clip, both forms are one.
+        // Alone, or without a clip, both forms are the same.
         let has_clipped = !others.is_empty() && self.clip != InterferenceBound::Window;
         let form = move |j: usize, is_clipped: bool, own: u128, sum: WorkloadSegment| {
             let sum = sum.and(bursts.on(self.cores - j, window_ns));

@@ -1,9 +1,9 @@
 //! Sums of fractions, exact where possible, else rounded up.
 //!
-//! Utilisations are sums of `volume / period`. Such a sum is kept as a reduced fraction; periods
-//! without common factors may outgrow it, and from then on it is a multiple of 2^-40, each further
-//! term rounded up. Rounding up can only turn "fits" into "does not fit", and only for a set within
-//! `n * 2^-40` of the limit.
+//! Utilisations are sums of `volume / period`. Such a sum is kept as a reduced fraction, until
+//! periods without common factors outgrow the fraction. From then on the sum is a multiple of
+//! 2^-40, with each further term rounded up. Rounding up can only turn "fits" into "does not fit",
+//! and only for a set within `n * 2^-40` of the limit.
 
 use core::cmp::Ordering;
 
@@ -16,16 +16,16 @@ pub(super) struct Ratio {
     pub(super) denominator: u128,
 }
 
-/// Numerators and denominators stay below this, so that a product of two of
-/// them and of a core count fits into 128 bits.
+/// The limit of numerators and denominators, so that a product of two of them and of a core count
+/// fits into 128 bits.
 const LIMIT: u128 = 1 << 48;
 
 /// The denominator of an approximation.
 const UNIT: u128 = 1 << 40;
 
 impl Ratio {
-    /// Returns `numerator / denominator`, rounded up if it must be, or `None`
-    /// for a denominator of 0 or a value of 2^8 or more that needs rounding.
+    /// Returns `numerator / denominator`, rounded up if necessary, or `None` for a denominator of 0
+    /// or a value of 2^8 or more in need of rounding.
     pub(super) fn new(numerator: u128, denominator: u128) -> Option<Self> {
         let divisor = greatest_common_divisor(numerator, denominator);
         Self {

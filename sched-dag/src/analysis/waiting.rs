@@ -1,38 +1,40 @@
-//! Subtasks that wait: bounds of DAGs that suspend themselves.
+//! Subtasks that wait: bounds for self-suspending DAGs.
 //!
-//! A subtask with waits is segments with a wait between any two: each wait has a limit, after
-//! which it ends whatever a device does, and no core is held meanwhile. Such subtasks are
-//! *self-suspending*, and most tests of the literature are wrong for them. These forms are
-//! proven in `docs/bounds.md`, "Subtasks that wait"; here in short.
+//! A subtask with waits consists of segments with a wait between any two. Each wait has a limit: at
+//! the limit the wait ends, whatever a device does. No core is held during a wait. Such subtasks
+//! are *self-suspending*, and most tests of the literature are wrong for them. `docs/bounds.md`,
+//! "Subtasks that wait", proves the forms here; this is a summary.
 //!
-//! Follow a job back from the segment that ends last: to the release, the end of the latest
-//! predecessor or the end of its own wait, whichever made it eligible. That gives a path `P`. At
-//! each instant of the response `P` executes, for `c(P)` in all, or it waits, for `s(P)` at most,
-//! or a segment of it is eligible and does not execute. For `X`, the time of the third kind, all
+//! Follow a job back from the last segment to end. Each segment became eligible by the release, by
+//! the end of its latest predecessor, or by the end of its own wait. The result is a path `P`. At
+//! each instant of the response, `P` executes (`c(P)` in all), or waits (`s(P)` at most), or has an
+//! eligible segment that does not execute. Let `X` be the time of the third kind. During `X` all
 //! `m` cores execute something else. So waits enter the bound through `P` only:
 //!
 //! - *One path*: `m X <= volume - c(P)`.
-//! - *Reserved chains*: let `U` be `j` disjoint chains. In `X` at most `j` cores execute `U`, so
-//!   `(m - j) X <= volume - c(P or U)`. Each `U` takes one longest path to bound over all `P`.
-//! - *Oblivious*: where waits are executed instead, `multi_path` holds as it stands, with covers
-//!   of WCETs and limits together; the proof exchanges chains by their weights only.
+//! - *Reserved chains*: let `U` be `j` disjoint chains. During `X` at most `j` cores execute `U`,
+//!   so `(m - j) X <= volume - c(P or U)`. Each `U` needs one longest path for a bound over all
+//!   `P`.
+//! - *Oblivious*: with waits executed instead, `multi_path` applies unchanged, with covers of WCETs
+//!   and limits together; its proof exchanges chains by their weights only.
 //!
-//! Interference and blocking are added to what the cores execute in `X`. The workloads of `workload`
-//! and `interference` hold for DAGs that wait, with their own bounds as `R`: a wait only takes
-//! work away from instants. What is left beside the span, `x = r - span`, is the common
-//! currency: the first two forms are `m - j` times the span above it, or more, for each `j`.
+//! Interference and blocking add to the work of the cores during `X`. The workloads of `workload`
+//! and `interference` are valid for DAGs with waits, with the DAGs' own bounds as `R`: a wait only
+//! takes work away from instants. All forms compare the work left beside the span with
+//! `x = r - span`. For each `j`, the first two forms exceed the span by their work divided by
+//! `m - j`.
 //!
-//! *Blocking.* Where segments keep their cores, a segment that becomes eligible may find as many
-//! lower-ranked ones running as there are cores, and one less where its predecessor has just
-//! left a core. After a wait nobody has. So the path pays `Delta(m)` at the release and after
-//! each wait, and `Delta(m - 1)` after each predecessor, `Delta(q)` being the `q` longest segments.
+//! *Blocking.* Where segments keep their cores, an eligible segment may find as many lower-ranked
+//! segments running as there are cores, and one less if its predecessor has just left a core. After
+//! a wait no predecessor has just left a core. So the path pays `Delta(m)` at the release and after
+//! each wait, and `Delta(m - 1)` after each predecessor. `Delta(q)` is the sum of the `q` longest
+//! segments.
+//! Assumes: `R <= T` for each DAG in the equations, so jobs of one DAG do not overlap; and no core
+//! idles while a segment is eligible. All forms are sustainable: no bound falls when executions or
+//! waits get longer, so shorter executions and waits are covered.
 //!
-//! Assumes: `R <= T` of each DAG that enters, so that jobs of one DAG do not overlap; no core
-//! idles while a segment is eligible. All of it is sustainable: no bound falls where executions
-//! or waits get longer, so shorter ones are covered.
-//!
-//! Preemptions may be at any instant of real time, so divisions round up. Where all times are
-//! whole units, the first two forms may round down; reference values do ([`Rounding`]).
+//! Preemptions may happen at any instant of real time, so divisions round up. If all times are
+//! whole units, the first two forms may round down, as reference values do ([`Rounding`]).
 
 use alloc::vec::Vec;
 
@@ -40,17 +42,17 @@ use super::blocking::Blocking;
 use super::cover::{CoverChain, STEPS};
 use super::task::{SubtaskWaits, Task};
 
-/// At which instants a schedule may change.
+/// The instants at which a schedule may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rounding {
-    /// At any: bounds round up.
+    /// At any instant: bounds round up.
     Up,
-    /// At whole units: the forms of paths round down.
+    /// At whole units only: the forms of paths round down.
     Down,
 }
 
 impl Rounding {
-    /// Prepares what so many cores are to execute, to be divided by their number and rounded up.
+    /// Prepares work of `cores` cores for a division by their number, rounded up.
     pub(super) const fn of(self, sum: u128, cores: u128) -> u128 {
         match self {
             Self::Down => sum.saturating_sub(cores - 1),
@@ -58,7 +60,7 @@ impl Rounding {
         }
     }
 
-    /// Divides what so many cores are to execute.
+    /// Divides the work of `cores` cores by their number.
     pub(super) const fn divide(self, left: u64, cores: u64) -> u64 {
         match self {
             Self::Down => left / cores,
@@ -67,22 +69,22 @@ impl Rounding {
     }
 }
 
-/// Returns what is left of a job for `m`, `m - 1`, .. cores while its path is ready and does not
-/// execute, by the best form for each; the covers are those of the oblivious task.
+/// Returns the work left of a job for `m`, `m - 1`, .. cores while its path is ready without
+/// executing, by the best form for each number. The covers belong to the oblivious task.
 pub(super) fn beside_span(task: &Task, covers: &[u64], cores: u32) -> Vec<u64> {
     let volume_ns = task.oblivious().volume_ns();
     let mut left: Vec<u64> = covers.iter().map(|cover| volume_ns - cover).collect();
-    // Without waits the others are no better.
+    // Without waits the other forms are no better.
     if task.has_waits() {
         lower(&mut left, &reserved(task, cores));
     }
     left
 }
 
-/// Lowers what is left to what reserved chains give.
+/// Lowers the work left to the results of the reserved chains.
 pub(super) fn lower(left: &mut Vec<u64>, reserved: &[ReservedChains]) {
     for (j, with) in reserved.iter().enumerate() {
-        // A form whose numbers are too large is of no use, nor are those of more chains after it.
+        // A form with numbers too large is useless, and so are the later forms, with more chains.
         match (u64::try_from(with.left), left.get_mut(j)) {
             (Ok(own), Some(least)) => *least = own.min(*least),
             (Ok(own), None) => left.push(own),
@@ -92,23 +94,23 @@ pub(super) fn lower(left: &mut Vec<u64>, reserved: &[ReservedChains]) {
     }
 }
 
-/// The form of some reserved chains: those of the entries before, and one more.
+/// The form of some reserved chains: the chains of the entries before, and one more.
 pub(super) struct ReservedChains {
-    /// The last of the chains; none of them is empty but the first.
+    /// The last of the chains. Only the first entry's chain is empty.
     pub(super) chain: CoverChain,
-    /// The cores that they leave free.
+    /// The cores left free by the chains.
     pub(super) free: u128,
-    /// The most of `volume - c(P or U)`, and the excess of `P` over the span on each free core,
+    /// The most of `volume - c(P or U)`, plus the excess of `P` over the span on each free core,
     /// over all paths `P`.
     pub(super) left: u128,
 }
 
-/// Returns the forms of 0, 1, .. reserved chains: the heaviest, one after the other, of what the
-/// path of the form without chains leaves.
+/// Returns the forms of 0, 1, .. reserved chains. The chains are the heaviest, one after the other,
+/// in the rest left by the path of the form without chains.
 pub(super) fn reserved(task: &Task, cores: u32) -> Vec<ReservedChains> {
     let steps = (task.subtask_count() + task.edge_count()).max(1);
     let span = u128::from(task.span_ns());
-    // The WCETs of what is in no chain, and of what may be in the next one.
+    // The WCETs outside all chains, and the WCETs available to the next chain.
     let mut outside = Vec::from(task.wcets_ns());
     let mut unused = outside.clone();
     let mut chain = CoverChain::new();
@@ -129,7 +131,7 @@ pub(super) fn reserved(task: &Task, cores: u32) -> Vec<ReservedChains> {
             path.iter().for_each(|&subtask| unused[subtask] = 0);
         }
         found.push(ReservedChains { chain, free, left });
-        // A chain takes what no other has, and passes the rest.
+        // A chain takes the subtasks no other chain has, and passes the rest.
         let next = task.longest_complete_path(&unused).into_iter();
         chain = next
             .map(|subtask| (subtask, core::mem::take(&mut unused[subtask]) > 0))
@@ -141,7 +143,7 @@ pub(super) fn reserved(task: &Task, cores: u32) -> Vec<ReservedChains> {
     found
 }
 
-/// Returns what is left of a job on all cores beside its span, if its path is blocked where its
+/// Returns the work left of a job on all cores beside its span, if its path is blocked wherever its
 /// segments become eligible.
 pub(super) fn with_blocking(task: &Task, cores: u32, blocking: &Blocking) -> u128 {
     let count = cores as usize;

@@ -1,8 +1,8 @@
-//! Bounds of subtasks that wait by single forms, where all times are whole units.
+//! Bounds for waiting subtasks by single forms, with all times as whole units.
 //!
-//! The bounds of a commit are those of [`answer()`](super::answer()): by the best of all forms,
-//! at any instant of real time. These here stand for themselves, as the literature compares
-//! tests: one job alone by each form of `waiting`, and sets by one of them.
+//! A commit gets its bounds from [`answer()`](super::answer()), by the best of all forms and at any
+//! instant of real time. The bounds here are separate, the way the literature compares tests: one
+//! job alone by each form of `waiting`, and sets by a chosen form.
 
 use alloc::vec::Vec;
 
@@ -15,11 +15,11 @@ use super::waiting::{ReservedChains, Rounding, lower, reserved};
 /// The bounds of one job alone by each form, in whole units of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AloneBounds {
-    /// By one path.
+    /// The bound by one path.
     pub one_path_ns: u64,
-    /// By the best number of reserved chains, none among them.
+    /// The bound by the best number of reserved chains, including none.
     pub reserved_ns: u64,
-    /// By several paths, with waits that are executed.
+    /// The bound by several paths, with waits executed.
     pub oblivious_ns: u64,
 }
 
@@ -36,7 +36,7 @@ pub fn alone_forms(task: &Task, cores: u32) -> Option<AloneBounds> {
     })
 }
 
-/// Which forms bound the response times of a set.
+/// The forms used to bound the response times of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WaitingForm {
     /// One path, preemptive.
@@ -47,16 +47,16 @@ pub enum WaitingForm {
     NonPreemptive,
 }
 
-/// Bounds the response times under global fixed priorities, in whole units of time, the DAGs given
-/// from the highest priority to the lowest. `None` if there is no core, or a DAG has no bound
+/// Bounds the response times under global fixed priorities, in whole units of time, with the DAGs
+/// from the highest priority to the lowest. Returns `None` without cores, or if a DAG has no bound
 /// within its deadline and its period.
 #[must_use]
 pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
     in_units(tasks, cores, form)?.in_order()
 }
 
-/// Bounds the response times under global EDF, in whole units of time and in the order given: down
-/// from deadlines and periods. `None` as [`waiting_fp`].
+/// Bounds the response times under global EDF, in whole units of time and in the order given, going
+/// down from deadlines and periods. Returns `None` in the same cases as [`waiting_fp`].
 #[must_use]
 pub fn waiting_edf(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
     let mut set = in_units(tasks, cores, form)?;
@@ -74,7 +74,7 @@ fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<Equ
     };
     for ((task, shape), figures) in (tasks.iter()).zip(&mut set.shapes).zip(&mut set.figures) {
         figures.allow_in_flight(1);
-        // Only covers round up, so that they count as less than a core more.
+        // Only covers round up, so here they count as almost one unit a core more.
         let by_covers = shape.left.iter_mut();
         (1..=u64::from(cores))
             .rev()
