@@ -1,4 +1,4 @@
-//! The commit's own clusters: heavy DAGs own cores and lend the rest, or each DAG in need of
+//! The commit's own clusters: heavy DAGs own cores and lend the rest, or each DAG that needs
 //! several cores gets cores of its own and the others share single cores.
 //!
 //! Under static priorities the cores are divided by [`lend`](super::lend()) if the result proves

@@ -46,7 +46,7 @@ pub(super) struct Blocking {
 }
 
 impl Blocking {
-    /// Returns the blocking of a DAG never blocked.
+    /// Returns the terms of a DAG that nothing blocks.
     pub(super) fn none(task: &Task) -> Self {
         Self {
             largest: Vec::new(),

@@ -141,7 +141,7 @@ pub(super) struct AnalysisInput<'a> {
     pub(super) order: Vec<usize>,
     pub(super) set: EquationSet<'a>,
     pub(super) tables: Vec<CaseTable<'a>>,
-    /// By DAG, the features entering it: its own, and those of all DAGs able to delay it.
+    /// By DAG, the features entering it: its own, and those of all DAGs that may delay it.
     pub(super) entering: Vec<Features>,
     pub(super) certificate: Option<&'a str>,
     /// By DAG and subtask, the bounds of sinks by a certificate, if the commit has a certificate.
@@ -203,6 +203,7 @@ impl<'a> AnalysisInput<'a> {
                 has_bound[dag] &= bound.is_some();
             }
             let bursts = self.bursts(|dag| !has_bound[dag]);
+            // Bounds only disappear from round to round, so the loop ends.
             let is_settled = bursts == self.set.bursts;
             self.set.bursts = bursts;
             if let Some(place) = self.set.bursts.endless {

@@ -5,7 +5,7 @@
 //! sum of WCETs taken together by `k` disjoint chains. For one chain the cover is the length; for
 //! as many chains as the graph is wide, the volume.
 //!
-//! Up to [`STEPS`] the covers are exact. Chains able to pass through subtasks are the paths of a
+//! Up to [`STEPS`] the covers are exact. Chains that may pass through subtasks are the paths of a
 //! flow in which each subtask pays its WCET once. A heaviest augmenting path makes the flow larger
 //! by one chain (R. K. Ahuja, T. L. Magnanti, J. B. Orlin, "Network Flows", 1993, section 9.7).
 //! Sweeps along the topological order and back find the weights; a few sweeps are enough until
@@ -32,8 +32,8 @@ pub fn covers(task: &Task, most: usize) -> Vec<u64> {
     exact(task, most).unwrap_or_else(|| sums(&parts(task, most)))
 }
 
-/// Returns the most cores usable by one job at an instant, at least 1; the covers for as many
-/// chains; and the work of each chain found by [`peel`].
+/// Returns the most cores one job can use at an instant, at least 1; the covers for as many chains;
+/// and the work of each chain found by [`peel`].
 pub(super) fn parallelism_covers_and_parts(task: &Task, cores: u32) -> (u64, Vec<u64>, Vec<u64>) {
     let most = usize::try_from(cores).unwrap_or(usize::MAX);
     let covers = exact(task, most);
@@ -48,7 +48,7 @@ pub fn width(task: &Task) -> Option<u64> {
     Some(exact(task, usize::MAX)?.len() as u64)
 }
 
-/// Returns the most cores usable by one job at an instant, at least 1: `min(cores, width)`, or just
+/// Returns the most cores one job can use at an instant, at least 1: `min(cores, width)`, or just
 /// `cores` if the width is unknown.
 pub fn parallelism(task: &Task, cores: u32) -> u64 {
     parallelism_covers_and_parts(task, cores).0
@@ -181,7 +181,7 @@ impl<'a> ChainFlow<'a> {
         }
     }
 
-    /// Adds a chain, to the most work of all chains together, and returns the increase.
+    /// Adds a chain so that all chains together take the most work, and returns the increase.
     fn augment(&mut self) -> u64 {
         let count = self.task.subtask_count();
         let ways = |step| HeaviestPaths {

@@ -1,7 +1,7 @@
 //! Features of the model: used by DAGs, and covered by the proof of a test.
 //!
 //! A test is asked about a DAG only if the test covers *every* feature entering the DAG: the
-//! features of the machine, of the DAG itself, and of all DAGs able to delay it, directly or
+//! features of the machine, of the DAG itself, and of all DAGs that may delay it, directly or
 //! through others. A test covers nothing but the features it names. So a new feature silences all
 //! tests, until somebody has read the proofs one by one and named the feature where covered. Where
 //! one of several values must hold (an order, one core or several, preemption), each value is a
@@ -91,7 +91,7 @@ impl Features {
         others.0 & !self.0 == 0
     }
 
-    /// Returns by DAG its features and those of all DAGs able to delay it, directly or through
+    /// Returns by DAG its features and those of all DAGs that may delay it, directly or through
     /// others.
     pub(super) fn spread(mut of: Vec<Self>, delays: impl Fn(usize, usize) -> bool) -> Vec<Self> {
         let mut news: Vec<usize> = (0..of.len()).collect();

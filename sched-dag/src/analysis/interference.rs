@@ -1,10 +1,10 @@
 //! The work other DAGs may execute during a job, in the forms needed by the equations.
 //!
 //! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has an
-//! [`InterferingWorkload`] for each number of cores, up to the most cores usable by one of its
-//! jobs. The clipped form asks only for the work in some part of the window, in total as long as
-//! the job waits. In such a part no core executes longer than the part lasts. Neither does a chain
-//! of the other DAG, because a chain is on one core at a time.
+//! [`InterferingWorkload`] for each number of cores, up to the most cores one of its jobs can use.
+//! The clipped form asks only for the work in some part of the window, in total as long as the job
+//! waits. In such a part no core executes longer than the part lasts. Neither does a chain of the
+//! other DAG, because a chain is on one core at a time.
 
 use alloc::vec::Vec;
 
@@ -40,7 +40,7 @@ pub(super) struct GraphSummary {
     pub(super) left: Vec<u64>,
     /// The work of some disjoint chains.
     chains: Vec<u64>,
-    /// The longest executions, able to block other DAGs where subtasks keep their cores.
+    /// The longest executions, which may block other DAGs where subtasks keep their cores.
     pub(super) largest_ns: Vec<u64>,
     pub(super) unblocked: Blocking,
 }
@@ -65,7 +65,7 @@ impl GraphSummary {
     }
 }
 
-/// All work able to delay a DAG's work due at some time, for as long as the DAG waits.
+/// All work that may delay a DAG's work due at some time, for as long as the DAG waits.
 pub(super) struct DelaySources {
     /// The workloads of DAGs that may outrank it.
     pub(super) others: Vec<InterferingDag>,

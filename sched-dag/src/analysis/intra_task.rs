@@ -1,4 +1,4 @@
-//! One DAG with priorities of its subtasks.
+//! One DAG alone, with priorities for its subtasks.
 //!
 //! Q. He, X. Jiang, N. Guan, Z. Guo, "Intra-Task Priority Assignment in
 //! Real-Time Scheduling of DAG Tasks on Multi-Cores", IEEE TPDS 30(10), 2019.

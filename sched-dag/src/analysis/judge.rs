@@ -1,9 +1,9 @@
 //! The verdict at commit: the findings of the tests, or the reason for a missing bound.
 //!
 //! [`answer`] asks the [tests](super::schedulability) about the jobs of each cluster, and then
-//! about their sinks. A DAG with a sink unbounded by the sink's own deadline is not proven. Certain
-//! findings (missing WCETs, a path longer than the deadline, a subtask longer than the period, more
-//! work than cores) take precedence over the tests' reasons.
+//! about their sinks. A DAG is not proven if one of its sinks has no bound within its own deadline.
+//! Certain findings (missing WCETs, a path longer than the deadline, a subtask longer than the
+//! period, more work than cores) take precedence over the tests' reasons.
 
 use alloc::string::String;
 use alloc::vec;
@@ -147,6 +147,7 @@ impl AnalysisInput<'_> {
             ..
         } = bound_jobs(self);
         if reasons.iter().any(Option::is_some) {
+            // A certain miss helps the user more than the failure of a test.
             for (dag, reason) in self.certain().into_iter().rev() {
                 if bounds[dag].is_none() {
                     reasons[dag] = Some(reason);
@@ -172,8 +173,8 @@ impl AnalysisInput<'_> {
         !self.dag(dag).is_sporadic()
     }
 
-    /// Finds the DAGs that cannot keep up at WCETs: by urgency, first the DAGs unable to keep up
-    /// even alone, then the first DAG to overload the cores.
+    /// Finds the DAGs that cannot keep up at WCETs: by urgency, first those that cannot even alone,
+    /// then the first DAG to overload the cores.
     fn certain(&self) -> Vec<(usize, NotProvenReason)> {
         let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
@@ -222,8 +223,8 @@ fn first_own(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<Not
     failing.next()
 }
 
-/// Fills in the bounds of the sinks of each DAG, in order, based on the bounds of jobs. A DAG with
-/// a sink unbounded by the sink's own deadline is not proven.
+/// Fills in the bounds of the sinks of each DAG, in order, based on the bounds of jobs. A DAG is
+/// not proven if one of its sinks has no bound within its own deadline.
 fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();

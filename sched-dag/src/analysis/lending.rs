@@ -93,7 +93,7 @@ pub struct LendingAnswer {
 }
 
 impl LendingPlan {
-    /// Returns the plan of the first attempt, for DAGs to be proven by another analysis.
+    /// Returns the plan of the first attempt, for DAGs that another analysis has to prove.
     pub(super) fn whole(dags: usize, cores: usize) -> Self {
         let mut group = LentGroup::of((0..cores).collect());
         group.members = (0..dags).map(|dag| (dag, u64::MAX)).collect();

@@ -288,7 +288,7 @@ pub(super) struct MemberTask<'a> {
 }
 
 /// The most terms of equations evaluated in one attempt, one term for each core and member. A
-/// member in need of more is not proven. Ordinary sets need hundreds or thousands.
+/// member that needs more is not proven. Ordinary sets need hundreds or thousands.
 pub(super) const STEP_LIMIT: u32 = 1 << 16;
 
 impl<'a> MemberTask<'a> {

@@ -286,7 +286,7 @@ texts! {
             "its longest path with all waits takes {:?}, more than its deadline or period of {:?}; \
              lower the limits or lengthen both",
             Duration::from_nanos(*span_ns), Duration::from_nanos(*limit_ns);
-        /// Subtasks wait, and no test bounds the response time of this DAG, or of a DAG able to
+        /// Subtasks wait, and no test bounds the response time of this DAG, or of a DAG that may
         /// delay it, by the respective period.
         NoBoundByPeriod =
             "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \

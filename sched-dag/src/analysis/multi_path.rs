@@ -169,6 +169,7 @@ impl MultiPathEquations<'_> {
                 busy: WorkloadSegment { value, ..sum },
             }
         };
+        // With waits and blocking together, only the first form is proven.
         let count = left_and_blocking.map_or(self.left.len(), |_| 1);
         let sums = plain.into_iter().zip(clipped).enumerate().take(count);
         sums.flat_map(move |(j, (plain, clipped))| {

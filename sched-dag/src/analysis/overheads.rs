@@ -173,7 +173,7 @@ impl Overheads {
         self.device_ns == 0 || self.device_ns < self.device_distance_ns
     }
 
-    /// Returns the overheads in a cluster of these DAGs, with subtasks able to enter sections of
+    /// Returns the overheads in a cluster of these DAGs, whose subtasks may enter sections of
     /// locks, on a machine of `cores` cores in all.
     ///
     /// An instance given a core may find another instance there inside a section: once at its

@@ -26,9 +26,9 @@
 //!
 //! Traps, both found in an earlier form:
 //!
-//! 1. Following the chain back only over the jobs able to meet the job itself (`j T < R`). But each
-//!    job may delay only the next, and a delay may still be handed on forever: a subtask with a
-//!    WCET of one period never catches up. In the test `delays_that_are_handed_on_count` this
+//! 1. Following the chain back only over the jobs that the job itself can meet (`j T < R`). But
+//!    each job may delay only the next, and a delay may still be handed on forever: a subtask with
+//!    a WCET of one period never catches up. In the test `delays_that_are_handed_on_count` this
 //!    mistake would claim 18, while observed response times grow without end.
 //! 2. Assuming that another DAG uses no more cores than one of its jobs can, even when its jobs
 //!    overlap. In the test `overlapping_jobs_take_more_cores` this mistake would claim 8, while 9
@@ -45,14 +45,14 @@ use super::task::Task;
 use super::workload::WorkloadSegment;
 
 /// The most evaluations of equations' right-hand sides, shared by the DAGs of one analysis. A DAG
-/// in need of more is "not proven".
+/// that needs more is "not proven".
 pub(super) const STEP_LIMIT: u64 = 200_000;
 
 /// Further evaluations for each DAG alone, besides the shared evaluations. Ordinary sets need tens.
 pub(super) const OWN_STEPS: u64 = 256;
 
-/// The most jobs of one DAG in reach of a window. A set in need of more (`R > 1024 T`) is "not
-/// proven".
+/// The most jobs of one DAG over which a window may reach back. A set that needs more
+/// (`R > 1024 T`) is "not proven".
 const OVERLAP_LIMIT: u64 = 1024;
 
 /// The terms of a task in its equation.
@@ -61,12 +61,12 @@ pub(super) struct PipelineTerms {
     period: u128,
     deadline: u128,
     volume: u128,
-    /// The part of the volume able to delay the chain in its last job.
+    /// The part of the volume that may delay the chain in its last job.
     last_volume: u128,
     length: u128,
     largest: u128,
     cores: usize,
-    /// The most cores usable by one job, at most `cores`.
+    /// The most cores one job can use, at most `cores`.
     parallelism: u128,
     /// The response-time bound of all jobs, if already known.
     whole: Option<u128>,
@@ -101,7 +101,7 @@ impl PipelineTerms {
     }
 
     /// Returns the figures of one sink of the task: the longest path to the sink, the part of its
-    /// own job able to delay it, its deadline, and the bound of all jobs of the task.
+    /// own job that may delay it, its deadline, and the bound of all jobs of the task.
     pub(super) fn of_sink(
         &self,
         length_ns: u64,
@@ -129,8 +129,8 @@ impl PipelineTerms {
         u64::try_from(self.deadline).unwrap_or(u64::MAX)
     }
 
-    /// Returns the least response-time bound no smaller than `start_ns`; `start_ns` must not exceed
-    /// the least solution (0 is always right).
+    /// Returns the least response-time bound of at least `start_ns`; `start_ns` must not exceed the
+    /// least solution (0 is always right).
     pub(super) fn solve(
         &self,
         delays: &DelaySources,
@@ -196,6 +196,7 @@ impl PipelineTerms {
         for _ in 0..OVERLAP_LIMIT {
             match left.checked_sub(self.period) {
                 None | Some(0) => {
+                    // Younger jobs overlap the chain at its end, as older jobs do at its beginning.
                     let sides = if self.younger_may_win { 2 } else { 1 };
                     return Ok(sides * sum);
                 }

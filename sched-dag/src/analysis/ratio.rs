@@ -25,7 +25,7 @@ const UNIT: u128 = 1 << 40;
 
 impl Ratio {
     /// Returns `numerator / denominator`, rounded up if necessary, or `None` for a denominator of 0
-    /// or a value of 2^8 or more in need of rounding.
+    /// or a value of 2^8 or more that needs rounding.
     pub(super) fn new(numerator: u128, denominator: u128) -> Option<Self> {
         let divisor = greatest_common_divisor(numerator, denominator);
         Self {

@@ -139,7 +139,7 @@ impl<'a> EquationSet<'a> {
         self.with_waits = with_waits;
     }
 
-    /// Reports whether subtasks wait in a DAG, or in another DAG able to delay it.
+    /// Reports whether subtasks wait in a DAG, or in another DAG that may delay it.
     pub(super) fn waits_enter(&self, dag: usize) -> bool {
         self.has_waits() && self.with_waits.get(dag) == Some(&true)
     }
@@ -332,7 +332,8 @@ impl<'a> EquationSet<'a> {
         Ok(self.delays_by(dag, others, &blocking_ns))
     }
 
-    /// Returns the sources of delay of a DAG: workloads, and the longest segments able to block it.
+    /// Returns the sources of delay of a DAG: workloads, and the longest segments that may block
+    /// it.
     fn delays_by(
         &self,
         dag: usize,

@@ -2,7 +2,7 @@
 //! lists.
 //!
 //! This is the function proven in Coq (`docs/bounds.md`, "Tables"), written again in Rust: three
-//! loops and a map. The check trusts nothing of a table, neither times nor depths. An accepted
+//! loops and a map. The check trusts nothing in a table, neither times nor depths. An accepted
 //! table is *right*: whatever ends early, is skipped or cut, each entry finishes by its time in the
 //! table.
 //!

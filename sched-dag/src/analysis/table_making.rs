@@ -73,8 +73,8 @@ enum LapFailure {
 }
 
 impl<'a> TableFamily<'a> {
-    /// Enters periodic DAGs as long as a lap has at most `limit` entries: first the DAGs unfit as
-    /// members, then the densest.
+    /// Enters periodic DAGs as long as a lap has at most `limit` entries: first those that cannot
+    /// be members, then the densest.
     pub(super) fn of(tasks: &'a [&'a Task], limit: usize) -> Self {
         let is_periodic = |&dag: &usize| tasks[dag].table_terms().offset_ns.is_some();
         let mut order: Vec<usize> = (0..tasks.len()).filter(is_periodic).collect();
@@ -342,6 +342,7 @@ impl<'a> TableFamily<'a> {
     /// Returns the core with the most slack among those where an entry may preempt.
     fn preempted_core(&self, lap: &Lap, by: &LapOrder, entry: usize, now_ns: i64) -> Option<usize> {
         let soonest_ns = lap.running().map(|(_, top)| lap.left_ns[top]).min()?;
+        // Some core becomes free by the latest start, so nobody has to be preempted.
         if by.method == LendingAttempt::Lazy && now_ns + soonest_ns <= by.keys_ns[entry] {
             return None;
         }

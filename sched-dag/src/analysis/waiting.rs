@@ -20,9 +20,9 @@
 //!
 //! Interference and blocking add to the work of the cores during `X`. The workloads of `workload`
 //! and `interference` are valid for DAGs with waits, with the DAGs' own bounds as `R`: a wait only
-//! takes work away from instants. All forms compare the work left beside the span with
-//! `x = r - span`. For each `j`, the first two forms exceed the span by their work divided by
-//! `m - j`.
+//! takes work away from instants. All forms use one currency, the work left beside the span, which
+//! `(m - j) x` must reach, with `x = r - span`. For the first two forms this work contains `m - j`
+//! times the excess of `P` over the span.
 //!
 //! *Blocking.* Where segments keep their cores, an eligible segment may find as many lower-ranked
 //! segments running as there are cores, and one less if its predecessor has just left a core. After
