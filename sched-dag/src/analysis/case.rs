@@ -241,8 +241,7 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Returns the schedule-abstraction graph of all DAGs, or `NotCovered` if some DAG has no place
-    /// there.
+    /// Returns the schedule-abstraction graph of all DAGs, or an error if it cannot have some DAG.
     pub(super) fn graph(&self) -> Result<AbstractionSet, NotClosed> {
         if self.members.len() < self.own.len() || self.tells_cores() {
             return Err(NotClosed::NotCovered);

@@ -10,9 +10,9 @@
 //!   gets a table of one DAG, on the fewest cores on which its [list schedule](ListSchedule) ends
 //!   by its deadline. A DAG left with too few cores is *late*.
 //! - *Members*: the late DAGs and then the light DAGs are placed one by one. A DAG goes to the
-//!   first core that proves it together with all DAGs already there; otherwise to the first group
-//!   of several cores with the same property; otherwise to the fewest cores outside any group that
-//!   prove it, the least busy cores first.
+//!   first core on which it is proven together with all DAGs already there; otherwise to the first
+//!   such group of several cores; otherwise to the fewest cores that are enough for a proof,
+//!   outside any group and the least busy first.
 //!
 //! Two of the four squeeze the owners' lists before placing members. In the last two attempts as
 //! many periodic DAGs as fit into a lap form a *family*, with one table (`table_making`). Heavy
@@ -87,8 +87,7 @@ pub struct LendingPlan {
 pub struct LendingAnswer {
     /// The plan; `None`: no attempt proved all DAGs.
     pub plan: Option<LendingPlan>,
-    /// For each failed attempt, the reason, and the position of the first DAG to fail, if there is
-    /// one.
+    /// For each failed attempt, the reason, and the position of the first DAG to fail, if any.
     pub failed: Vec<(Option<usize>, AttemptFailure)>,
 }
 
@@ -522,7 +521,7 @@ impl<'a> MemberPlacing<'a> {
         self.place_on_one(dag) || self.place_in_group(dag) || self.place_in_new_group(dag)
     }
 
-    /// Places a DAG on the first core that proves it and belongs to no larger group.
+    /// Places a DAG on the first core that is in no larger group and on which it is proven.
     fn place_on_one(&mut self, dag: usize) -> bool {
         (0..self.supplies.len()).any(|core| match self.group_of(core) {
             None => self.add_group(vec![core], dag),
@@ -530,7 +529,7 @@ impl<'a> MemberPlacing<'a> {
         })
     }
 
-    /// Places a DAG in the first group of several cores that proves it.
+    /// Places a DAG in the first group of several cores in which it is proven.
     fn place_in_group(&mut self, dag: usize) -> bool {
         (0..self.groups.len()).any(|place| {
             // Groups of a single core were tried before.
@@ -538,7 +537,8 @@ impl<'a> MemberPlacing<'a> {
         })
     }
 
-    /// Places a DAG on the fewest cores that prove it, outside any group and the least busy first.
+    /// Places a DAG on the fewest cores on which it is proven, outside any group and the least busy
+    /// first.
     fn place_in_new_group(&mut self, dag: usize) -> bool {
         let task = self.members[dag].task;
         let (deadline_ns, length_ns) = (task.within_ns(), task.length_ns());
@@ -558,7 +558,7 @@ impl<'a> MemberPlacing<'a> {
         groups.position(|group| group.cores.contains(&core))
     }
 
-    /// Makes a group with one member if the member is proven there.
+    /// Makes a group with one member, provided the member is proven there.
     fn add_group(&mut self, cores: Vec<usize>, dag: usize) -> bool {
         let group = self.join(LentGroup::of(cores), dag);
         group.map(|group| self.groups.push(group)).is_some()

@@ -1,8 +1,8 @@
 //! Several DAGs on one set of cores: their response-time equations, solved together.
 //!
-//! DAG `i` *may outrank* DAG `k` if some instance of `i` may win a core from a waiting instance of
-//! `k`. The bound of `k` then depends on the bound of `i`. If priorities do not interleave, the
-//! dependency goes one way, from the highest priority down. If they do, or under EDF, there are
+//! DAG `i` *may outrank* DAG `k` if some instance of `i` may win a core for which an instance of
+//! `k` waits. The bound of `k` then depends on the bound of `i`. If priorities do not interleave,
+//! the dependency goes one way, from the highest priority down. If they do, or under EDF, there are
 //! circles. Both cases have the same solution: start from the bounds of jobs alone, and raise one
 //! DAG's bound after the other until nothing changes. All functions are monotone, so the iteration
 //! ends in the least solution.

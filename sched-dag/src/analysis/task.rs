@@ -279,7 +279,7 @@ impl Task {
         self.least_deadline_ns
     }
 
-    /// Returns the latest time for a job to complete without overlapping the next job.
+    /// Returns the time by which a job must complete: its deadline, or the next release if earlier.
     pub(super) fn within_ns(&self) -> u64 {
         self.relative_deadline_ns.min(self.period_ns)
     }

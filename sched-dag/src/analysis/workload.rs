@@ -51,8 +51,9 @@
 //! complete in the window besides the jobs released in the window, so `carry = k T`. Where releases
 //! wait for room, one completion releases `k` jobs at most. If the completion makes no more than
 //! [`WIDE`] instances ready, and the DAG has no second burst, the ordinary charges cover them.
-//! Otherwise both bursts grow by one `k T` where `k` releases can wait ([`OverrunPolicy::Abort`]
-//! and signals), and have no limit with [`OverrunPolicy::Queue`].
+//! Otherwise the `carry` of both bursts grows by `k T` where `k` releases can wait
+//! ([`OverrunPolicy::Abort`] and signals), and with [`OverrunPolicy::Queue`] the bursts have no
+//! limit.
 //!
 //! In the equations all cores are busy for `E`. The workloads of the DAGs stay the same.
 //!
