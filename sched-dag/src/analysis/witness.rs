@@ -1,9 +1,9 @@
-//! Witnesses: what it takes to check bounds without solving anything.
+//! Witnesses: all data needed to check bounds without solving anything.
 //!
-//! [`witness()`] writes a text of lines of words. It begins with what was committed, in the
-//! analysis's own terms, and a hash of that; then come a few certificates of each graph, and
-//! of each bound the inequality that proves it with every term. `./scripts/check-witness`,
-//! whose text says what it requires of each line, computes each term again from the others.
+//! [`witness()`] writes a text of lines of words. The text begins with the commit in the analysis's
+//! own terms, and a hash. A few certificates of each graph follow, and for each bound the proving
+//! inequality with every term. `./scripts/check-witness` computes each term again from the others;
+//! its own text lists the requirements on each line.
 //!
 //! ```text
 //! machine CORES ORDER OVERHEAD_NS             static: by the numbers of subtasks; edf: by deadlines; any
@@ -73,8 +73,8 @@
 //! seal FNV_1A                                 of all above
 //! ```
 //!
-//! `cover` lines show that a DAG is no wider than there are of them; without any it may use
-//! all cores. `part` lines are disjoint chains, for the clipped form.
+//! The number of `cover` lines is an upper limit on a DAG's width; without any, the DAG may use all
+//! cores. `part` lines are disjoint chains, for the clipped form.
 
 use alloc::string::String;
 use alloc::vec;
@@ -94,8 +94,8 @@ use crate::policy::Preemption;
 use crate::table::Table;
 use crate::task_set::{Dag, Subtask, TaskSet};
 
-/// Writes a witness for the bounds that [`answer()`](super::answer()) gives; where the cores
-/// are divided, one for each cluster, with its DAGs counted from 0.
+/// Writes a witness for the bounds given by [`answer()`](super::answer()). With divided cores, each
+/// cluster gets a witness of its own, with its DAGs counted from 0.
 #[must_use]
 pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
     let parts = task_set.clusters().map(|cluster| {
@@ -111,7 +111,7 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
     parts.collect()
 }
 
-/// Returns copies of the tables of a cluster, whose DAGs are counted from 0.
+/// Returns copies of the tables of a cluster, with the cluster's DAGs counted from 0.
 fn part_of_tables(task_set: &TaskSet, cluster: ClusterId) -> Vec<Table> {
     let mut numbers = vec![DagId(0); task_set.dags().len()];
     let of_cluster = |dag: &usize| task_set.dags()[*dag].cluster() == cluster;
@@ -233,7 +233,7 @@ impl WitnessText {
                     subtask.is_non_preemptive() || settings.preemption == Preemption::Disabled;
                 let number = match case.relation.order {
                     InstanceOrder::Ranked => number,
-                    // They tell nothing.
+                    // Numbers of other orders prove nothing, so the priority is written.
                     _ => subtask.priority().0.into(),
                 };
                 let wcet = subtask.locking_wcet_ns().unwrap_or(0);
@@ -255,7 +255,8 @@ impl WitnessText {
             }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();
-                // One that shares a state may precede others, which the graph alone does not tell.
+                // A sink with a shared state may precede other subtasks, an order unknown to the
+                // graph alone.
                 if deadline_ns < dag.relative_deadline_ns() || !dag.successors(sink).is_empty() {
                     self.line(format_args!("due {} {deadline_ns}", sink.0));
                 }
@@ -277,7 +278,7 @@ impl WitnessText {
                 let finish_ns = i128::from(of.start_ns) + i128::from(of.length_ns);
                 let (dag, subtask) = (of.dag.0.into(), of.subtask.0.into());
                 let model = &dags[of.dag.index()];
-                // Counted from the first release in lap 0 on, as that of `grid`.
+                // Counted from the first release in lap 0, like `grid`.
                 let before = model.offset_ns() / model.period_ns() * u64::from(!is_alone);
                 let (job, depth) = (i128::from(of.job) + i128::from(before), of.depth.into());
                 [dag, job, subtask, of.start_ns.into(), finish_ns, depth]
