@@ -1,118 +1,122 @@
-//! Chains that cross DAGs by latest values: how long an effect takes from end to end.
+//! Chains of subtasks across DAGs: how long an effect takes from end to end.
 //!
-//! Within a DAG the response time says all. From the DAG of a sensor to that of a motor values
-//! pass by *sampling*: a subtask takes the latest value that is complete when it starts. Such a
-//! path of subtasks is what the literature calls a *cause-effect chain*, with *implicit
-//! communication* (N. Feiertag et al., A Compositional Framework for End-to-End Path Delay
-//! Calculation of Automotive Systems under Different Path Semantics, CRTS 2008; M. Günzel et al.,
-//! Timing Analysis of Asynchronized Distributed Cause-Effect Chains, RTAS 2021,
-//! doi:10.1109/RTAS52030.2021.00012).
+//! Within a DAG, the response time bounds the effect. Between the DAG of a sensor and the DAG of a
+//! motor, values pass by *sampling*: a subtask takes the latest value complete at its start. The
+//! literature calls such a path of subtasks a *cause-effect chain* with *implicit communication*
+//! (N. Feiertag et al., A Compositional Framework for End-to-End Path Delay Calculation of
+//! Automotive Systems under Different Path Semantics, CRTS 2008; M. Günzel et al., Timing Analysis
+//! of Asynchronized Distributed Cause-Effect Chains, RTAS 2021, doi:10.1109/RTAS52030.2021.00012).
 //!
 //! # Words
 //!
-//! - A chain has *segments*: in each DAG that it passes, the subtask at which it enters and the
-//!   one at which it leaves. The last subtask of the last segment makes the *outputs*.
-//! - An output *goes back* to one job of the first DAG: the one whose value was sampled by the
-//!   job whose value was sampled ... by the job of the output. (An *immediate backward chain*.)
-//! - *Age of an output*: from the nominal release of the job that it goes back to, to its finish.
-//!   RTAS 2021 calls its maximum the *reduced* data age.
-//! - *Data age*: the same to the finish of the next output, for so long the old one is in force.
-//!   (*Last to last* of CRTS 2008.)
-//! - *Reaction time* to what happens just after a job of the first DAG has been released, and is
-//!   too late for it: from there to the finish of the first output that goes back to a later job.
-//!   (*First to first.*) The longest reaction time is the longest data age, but for what the end
-//!   of a run cuts off (M. Günzel et al., On the Equivalence of Maximum Reaction Time and Maximum
-//!   Data Age for Cause-Effect Chains, ECRTS 2023, doi:10.4230/LIPIcs.ECRTS.2023.10).
+//! - A chain has one *segment* in each DAG on its way: the subtask where the chain enters the DAG
+//!   and the subtask where the chain leaves. The last subtask of the last segment makes the
+//!   *outputs*.
+//! - An output *goes back* to a job of the first DAG: follow the samples backwards, from the job of
+//!   the output to the job whose value was sampled, and so on, hop by hop. (The literature calls
+//!   this an *immediate backward chain*.)
+//! - *Age of an output*: from the nominal release of the job to which the output goes back, to the
+//!   output's finish. RTAS 2021 calls the maximum the *reduced* data age.
+//! - *Data age*: the same, but to the finish of the next output, because the old output is in force
+//!   until then. (*Last to last* of CRTS 2008.)
+//! - *Reaction time*: from an input just after the release of a job of the first DAG, too late for
+//!   this job, to the finish of the first output going back to a later job. (*First to first.*) The
+//!   longest reaction time equals the longest data age, except for times cut off by the end of a
+//!   run (M. Günzel et al., On the Equivalence of Maximum Reaction Time and Maximum Data Age for
+//!   Cause-Effect Chains, ECRTS 2023, doi:10.4230/LIPIcs.ECRTS.2023.10).
 //!
-//! The first subtask counts as reading its sensor at the nominal release. It starts later, so
-//! what it reads is younger, and none of the times is longer than stated here.
+//! All times assume that the first subtask reads its sensor at the nominal release. In fact the
+//! subtask starts later and reads a younger value, so the true times are never longer.
 //!
 //! # Parts
 //!
-//! [`Chain::all`] and [`Chain::between`] find chains, [`Chain::latencies`] measures one in the
-//! events of a run, [`Chain::output_age_bound_ns`] and [`Chain::reaction_bound_ns`] bound it;
-//! [`Chain::output_age_bound_over_links_ns`] bounds one that crosses machines.
+//! [`Chain::all`] and [`Chain::between`] find chains. [`Chain::latencies`] measures a chain in the
+//! events of a run. [`Chain::output_age_bound_ns`] and [`Chain::reaction_bound_ns`] bound a chain,
+//! and [`Chain::output_age_bound_over_links_ns`] bounds a chain across machines.
 //!
 //! # Bounds: how long the times of a chain can be, where each of its DAGs has a bound
 //!
 //! Let DAG i of the chain, counted from 0 to n, have a proven response time R(i) from nominal
-//! releases on. Let T(i) be its period, or, where it survives faults, as many periods more as jobs
-//! in a row may be lost by those ([`Dag::renewal_ns`]). Then
+//! releases on. Let T(i) be the period. If the DAG survives faults, T(i) is longer by one period
+//! for each job that faults may lose in a row ([`Dag::renewal_ns`]). Then
 //!
 //! - the age of an output is at most T(0) + R(0) + ... + T(n-1) + R(n-1) + R(n);
 //! - data age and reaction time are at most T(n) longer.
 //!
-//! *Proof of the first.* Let job j of DAG i sample, at time t, the value of job k of DAG i-1.
-//! The next job that is not lost was not complete at t, and is so R(i-1) after its release, which is
-//! T(i-1) after that of k at most; so t < r(k) + T(i-1) + R(i-1). And r(j) <= t, as nothing of job j starts before its
-//! release. So from r(k) to r(j) it is less than T(i-1) + R(i-1). Summed up over the samplings,
-//! this leads from the release of the job that the output goes back to, to that of its own job,
-//! which takes R(n) more.
+//! *Proof of the first.* Let job j of DAG i sample, at time t, the value of job k of DAG i-1. At t,
+//! the next job not lost to a fault was not yet complete. Its release is at most T(i-1) after the
+//! release of k, and its completion at most R(i-1) later; so t < r(k) + T(i-1) + R(i-1). And r(j)
+//! <= t, as nothing of job j starts before its release. So the time from r(k) to r(j) is less than
+//! T(i-1) + R(i-1). The sum over all samplings leads from the release of the job to which the
+//! output goes back, to the release of the output's own job. The output's own job takes R(n) more.
 //!
-//! *Of the second.* The next output is that of the next job that is not lost, released T(n) later at
-//! most: that is the data age. With the longest data age goes the longest reaction time, as the words above say.
+//! *Of the second.* The next output comes from the next job not lost to a fault, released at most
+//! T(n) later: this gives the data age. The longest reaction time equals the longest data age, as
+//! stated under "Words".
 //!
 //! The sum of T + R over all DAGs is the bound of A. Davare et al., Period Optimization for Hard
-//! Real-time Distributed Automotive Systems, DAC 2007 (doi:10.1145/1278480.1278553). It is safe
-//! for any phases of the DAGs, so it is not tight for given ones.
+//! Real-time Distributed Automotive Systems, DAC 2007 (doi:10.1145/1278480.1278553). The bound is
+//! safe for any phases of the DAGs, so for given phases it is not tight.
 //!
-//! It holds for as long as jobs come: none is skipped in a pause, and the DAGs go on. (With bounds
-//! none is skipped or aborted for another reason.) A sporadic DAG has no longest distance of releases, so its T is none; as the last
-//! DAG of a chain it still has an age of outputs.
+//! The bound holds as long as jobs come: no job is skipped in a pause, and the DAGs go on. (DAGs
+//! with bounds skip or abort jobs for no other reason.) The releases of a sporadic DAG have no
+//! longest distance, so a sporadic DAG has no T. As the last DAG of a chain it still has an age of
+//! outputs.
 //!
 //! # Links: chains that cross machines
 //!
-//! A subtask of DAG i-1 sends a message when it is complete, and one of DAG i, on another machine,
-//! *receives* it: an edge that is a *link* instead of a sampling. The app *states* the link's delay
-//! N, from a message's writing to its arrival, which nothing proves. A bound with N in it holds of
-//! the outputs that go back over no message that took longer. For a link the first bound above has,
-//! in place of T(i-1) + R(i-1),
+//! A subtask of DAG i-1 sends a message when the subtask is complete, and a subtask of DAG i, on
+//! another machine, *receives* the message: this edge is a *link* instead of a sampling. The app
+//! *states* the link's delay N, from the writing of a message to its arrival; nothing proves N. A
+//! bound containing N is valid only for outputs whose messages all took at most N. For a link,
+//! replace T(i-1) + R(i-1) in the first bound above by
 //!
 //! - R(i-1) + N, if DAG i is sporadic, each message raises its signal, nothing else does, each job
-//!   takes all messages that have come, and T(i-1) by the slower clock is not less than T(i);
+//!   takes all messages arrived so far, and T(i-1) by the slower clock is not less than T(i);
 //! - R(i-1) + N + T(i), if DAG i is periodic; for the first job that has the message.
 //!
-//! *Proof.* The message of job k is sent r(k) + R(i-1) at the latest, and so arrives at d(k) = r(k) +
-//! R(i-1) + N at the latest. A *periodic* DAG has a job that is not lost, and whose release is T(i)
-//! after the arrival at most; the message is taken by this one, or by an earlier one.
+//! *Proof.* The message of job k is sent at r(k) + R(i-1) at the latest, and so arrives at d(k) =
+//! r(k) + R(i-1) + N at the latest. A *periodic* DAG releases a job not lost to a fault at most
+//! T(i) after the arrival. This job or an earlier job takes the message.
 //!
-//! Of a *sporadic* DAG the arrival may be nearer to the one before than T(i), and the job is then
-//! released later (`scheduler::signals`, S1). Let messages arrive each once, in the order of jobs;
-//! some may be lost. Message k is taken by the job whose signal it raised, or by an earlier one.
-//! That job is released at its signal, or T(i) after the job before; let q be the number of jobs
-//! since the latest one of the first kind, which was released at an arrival a. So this one is
-//! released at a + q T(i). The q + 1 jobs have the signals of as many messages, k the last of them.
-//! The first of these, k', came at a, so a <= d(k'). As releases of DAG i-1 are T(i-1) apart at least,
-//! d(k) >= d(k') + q T(i-1) >= a + q T(i): so T(i-1) has to be longer by what clocks drift, or each job
-//! would be put off a bit more. A signal that is dropped (S2) leaves its message to a job of
-//! an earlier message, which has not started: its release is d(k) at the latest all the more. ∎
+//! In a *sporadic* DAG, an arrival may follow the previous arrival by less than T(i); its job is
+//! then released later (`scheduler::signals`, S1). Let each message arrive once, in the order of
+//! jobs; some may be lost. Message k is taken by the job whose signal it raised, or by an earlier
+//! job. That job is released either at its signal, or T(i) after the previous job. Let q be the
+//! number of jobs since the latest job released at its signal, at an arrival a. So our job is
+//! released at a + q T(i). The q + 1 jobs have the signals of as many messages, with k the last.
+//! The first message, k', came at a, so a <= d(k'). As releases of DAG i-1 are at least T(i-1)
+//! apart, d(k) >= d(k') + q T(i-1) >= a + q T(i). So T(i-1) has to be longer by the drift of the
+//! clocks; otherwise each job would be put off a bit more. A dropped signal (S2) leaves its message
+//! to a job of an earlier message that has not started: then the release is at d(k) at the latest
+//! all the more. ∎
 //!
-//! After a message that took longer, jobs that are released T(i) after the one before may be late,
+//! After a message delayed by more than N, jobs released T(i) after the previous job may be late,
 //! too. Since messages may be lost, nothing bounds data age and reaction time over a link.
 //!
 //! # Which outputs count
 //!
-//! Outputs count up to the instant at which the next job of one of the chain's DAGs would have
-//! been due and did not come, because the DAG had ended: from then on what is sampled only gets
-//! older. In a pause and after it an output does not count as long as one of the values that it goes
-//! back through is of before, nor the time between two outputs with a pause of the last DAG between
-//! them. Outputs that go back to nothing, as the first ones of a run, do not count.
+//! Outputs count up to the first instant where the next job of a DAG of the chain would have been
+//! due and did not come, because the DAG had ended: from then on, sampled values only get older.
+//! During and after a pause, an output does not count while any value on its way back dates from
+//! before the pause. The time between two outputs does not count if the last DAG paused between
+//! them. Outputs going back to no job, such as the first outputs of a run, do not count.
 //!
-//! Let outputs m and m+1 follow each other and go back to jobs s(m) and s(m+1). The data age of
-//! m is f(m+1) - r(s(m)). If s(m+1) > s(m), this is the reaction time to what happens after the
-//! release of job s(m); else that is longer still. Conversely, the reaction time to what happens
-//! after the release of job k >= s(m), where m+1 is the first output that goes back to a later
-//! one, is f(m+1) - r(k) <= f(m+1) - r(s(m)). So the longest of each are the same, if the run
-//! does not end between.
+//! Let outputs m and m+1 follow each other and go back to jobs s(m) and s(m+1). The data age of m
+//! is f(m+1) - r(s(m)). If s(m+1) > s(m), this is also the reaction time to an input after the
+//! release of job s(m); otherwise the reaction time is longer still. Conversely, take an input
+//! after the release of job k >= s(m), and let m+1 be the first output going back to a later job
+//! than k. Its reaction time is f(m+1) - r(k) <= f(m+1) - r(s(m)). So the two maxima are the same,
+//! unless the run ends in between.
 //!
 //! # Samples
 //!
-//! An instance samples when it starts, and a value shows when its writer's instance is complete.
-//! Both are events of the journal, which stand in the order in which they happened under the
-//! scheduler's lock. So the value is that of the writer's last finish before the start. On a
-//! machine the function is called a little after its start was written; a writer that finishes
-//! in these instructions is taken for too late. In a replay samples are those of the recording,
-//! whatever has finished before.
+//! An instance samples when it starts, and a value becomes visible when its writer's instance is
+//! complete. The journal has an event for both, in the order of their occurrence under the
+//! scheduler's lock. So the sampled value is the value of the writer's last finish before the
+//! start. On a machine, the function is called a few instructions after the start was written; if a
+//! writer finishes in between, its value counts as too late. In a replay, samples are the recorded
+//! samples, no matter which writers have finished before.
 
 use alloc::collections::BTreeMap;
 use alloc::vec;
@@ -126,12 +130,12 @@ use crate::task_set::{Dag, Subtask, TaskSet};
 /// A subtask of a DAG.
 pub type SubtaskRef = (DagId, SubtaskId);
 
-/// The sampling of a topic: the subtask that writes it, and the one that samples it.
+/// A topic sampled across DAGs: the subtask writing the topic and the subtask sampling it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SampledEdge {
-    /// The subtask that writes the topic.
+    /// The subtask writing the topic.
     pub writer: SubtaskRef,
-    /// The subtask that samples it.
+    /// The subtask sampling the topic.
     pub reader: SubtaskRef,
 }
 
@@ -139,27 +143,28 @@ pub struct SampledEdge {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct ChainSegment {
     dag: DagId,
-    /// Where the chain enters: a sampling subtask, or where it begins.
+    /// The subtask where the chain enters the DAG, by sampling, or begins.
     entry: SubtaskId,
-    /// Where it leaves: the writer of what is sampled next, or of the outputs.
+    /// The subtask where the chain leaves the DAG: the writer of the next sampled value or of the
+    /// outputs.
     exit: SubtaskId,
 }
 
-/// A path from a subtask to another one, along edges within DAGs and samplings between them. It
-/// passes no DAG twice.
+/// A path between two subtasks, along edges within DAGs and samplings between DAGs. A chain passes
+/// no DAG twice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chain {
-    /// One for each DAG, at least one.
+    /// One segment for each DAG, at least one.
     segments: Vec<ChainSegment>,
 }
 
-/// Two clocks drift apart by one part in so many at most: each crystal by 100 millionths.
+/// Two clocks drift apart by at most one part in so many: each crystal by 100 millionths.
 const DRIFT: u64 = 5_000;
 
 impl Chain {
-    /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
+    /// Finds a subtask by a name `dag/subtask`; each part is a name or a number.
     pub fn find(task_set: &TaskSet, name: &str) -> Option<SubtaskRef> {
-        // Names may have a `/` in them.
+        // Names may contain a `/`, so every split is tried.
         let splits = name
             .match_indices('/')
             .map(|(at, _)| (&name[..at], &name[at + 1..]));
@@ -171,7 +176,7 @@ impl Chain {
         })
     }
 
-    /// Returns the names of the subtasks at which it enters and leaves DAGs, in its order, as
+    /// Returns the names of the subtasks where the chain enters and leaves DAGs, in order, as
     /// `dag/subtask`.
     pub fn names<'t>(&'t self, task_set: &'t TaskSet) -> impl Iterator<Item = impl fmt::Display> {
         self.segments.iter().flat_map(move |segment| {
@@ -182,12 +187,12 @@ impl Chain {
         })
     }
 
-    /// Returns the DAGs in which it begins and ends.
+    /// Returns the first and the last DAG of the chain.
     pub fn ends(&self) -> [DagId; 2] {
         [self.segments[0], self.segments[self.segments.len() - 1]].map(|segment| segment.dag)
     }
 
-    /// Returns the samplings by which it leads from DAG to DAG.
+    /// Returns the samplings between consecutive DAGs of the chain.
     pub fn edges(&self) -> impl Iterator<Item = SampledEdge> {
         self.segments.windows(2).map(|pair| SampledEdge {
             writer: (pair[0].dag, pair[0].exit),
@@ -195,12 +200,12 @@ impl Chain {
         })
     }
 
-    /// Returns how old an output can be at its finish.
+    /// Returns how old an output can be at its finish, in nanoseconds.
     ///
     /// # Errors
     ///
-    /// The first DAG that has no bound of its own in `responses_ns`, which are in the order of the
-    /// DAGs, or is sporadic and not the last one.
+    /// The first DAG without a bound of its own in `responses_ns` (in the order of the DAGs), or
+    /// the first sporadic DAG other than the last.
     pub fn output_age_bound_ns(
         &self,
         task_set: &TaskSet,
@@ -209,13 +214,12 @@ impl Chain {
         self.output_age_bound_over_links_ns(task_set, responses_ns, &[])
     }
 
-    /// Returns the same of a chain of which some edges are links between machines, each with its
-    /// stated delay.
+    /// Returns the same bound for a chain over links between machines, each with a stated delay.
     ///
     /// # Errors
     ///
-    /// As above; also a sporadic DAG behind a link, if its jobs may be rarer than messages, as clocks
-    /// drift.
+    /// As above; also a sporadic DAG behind a link, if clock drift may make its jobs rarer than
+    /// messages.
     pub fn output_age_bound_over_links_ns(
         &self,
         task_set: &TaskSet,
@@ -229,8 +233,8 @@ impl Chain {
             let [from, to] = dags.map(|dag| task_set.dag(dag));
             let response_ns = response(dags[0])?;
             let way_ns = match links.iter().find(|link| link.0 == edge) {
-                // Of a sporadic DAG nobody knows when the next job comes, so nothing bounds the
-                // way through it.
+                // Nobody knows when the next job of a sporadic DAG comes, so nothing bounds the way
+                // through the DAG.
                 None if from.is_sporadic() => return Err(dags[0]),
                 None => from.renewal_ns(),
                 Some((_, stated_ns)) if !to.is_sporadic() => {
@@ -246,11 +250,11 @@ impl Chain {
         Ok(sum.saturating_add(response(self.ends()[1])?))
     }
 
-    /// Returns the longest reaction time, which is the longest data age.
+    /// Returns the longest reaction time, equal to the longest data age.
     ///
     /// # Errors
     ///
-    /// The first DAG that has no bound of its own, or is sporadic.
+    /// The first DAG without a bound of its own, or the first sporadic DAG.
     pub fn reaction_bound_ns(
         &self,
         task_set: &TaskSet,
@@ -264,7 +268,7 @@ impl Chain {
     }
 }
 
-/// Returns the position of what has this name, or else the number that is written there.
+/// Returns the position of a name, or else the position written as a number.
 fn number_of<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> Option<u32> {
     // Names first: a name may be a number.
     let named = (0..).zip(names.clone()).find(|(_, name)| *name == wanted);
@@ -277,7 +281,7 @@ fn number_of<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> 
     named.map(|(at, _)| at).or_else(number)
 }
 
-/// A subtask as `dag/subtask`; what has no name has its number.
+/// A subtask as `dag/subtask`; DAGs and subtasks without a name show their number.
 struct SubtaskName<'t>(&'t TaskSet, SubtaskRef);
 
 impl fmt::Display for SubtaskName<'_> {
@@ -295,18 +299,18 @@ impl fmt::Display for SubtaskName<'_> {
     }
 }
 
-/// The most chains that are looked for: their number may double with each DAG.
+/// The maximum number of chains to search for: the number may double with each DAG.
 const MOST: usize = 1000;
 
 impl Chain {
-    /// Finds the chains that cross DAGs and are part of no longer one: from a source that samples
-    /// nothing to a sink that no DAG samples. At most 1000.
+    /// Finds all maximal chains across DAGs: from a source that samples nothing to a sink that no
+    /// DAG samples. Returns at most 1000.
     pub fn all(task_set: &TaskSet, samplings: &[SampledEdge]) -> Vec<Chain> {
         let mut search = ChainSearch::new(task_set, samplings);
         for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
             for &source in model.sources() {
                 let place = (dag, source);
-                // A source that samples goes on with another DAG's chain; it begins none.
+                // A sampling source continues the chain of another DAG and begins no chain.
                 if samplings.iter().all(|sampling| sampling.reader != place) {
                     search.go_on_from(place, &|search, exit| {
                         !search.path.is_empty()
@@ -319,8 +323,8 @@ impl Chain {
         search.found
     }
 
-    /// Finds the chains from a subtask to another one, of the same DAG or of another, at most
-    /// 1000. None, if nothing leads there.
+    /// Finds the chains from a subtask to another subtask, in the same DAG or another, at most
+    /// 1000. Returns none if no path leads there.
     pub fn between(
         task_set: &TaskSet,
         samplings: &[SampledEdge],
@@ -339,9 +343,9 @@ fn model_of<'t>(search: &ChainSearch<'t>, (dag, _): SubtaskRef) -> &'t Dag {
 
 struct ChainSearch<'t> {
     task_set: &'t TaskSet,
-    /// Each once: a subtask may sample a topic twice.
+    /// Without duplicates: a subtask may sample a topic twice.
     samplings: Vec<SampledEdge>,
-    /// The segments up to the one that is looked at.
+    /// The segments up to the current one.
     path: Vec<ChainSegment>,
     found: Vec<Chain>,
 }
@@ -359,7 +363,8 @@ impl<'t> ChainSearch<'t> {
         }
     }
 
-    /// Finds the chains that go on from a subtask. It calls itself at most once for each DAG.
+    /// Finds the chains continuing from a subtask. The recursion calls itself at most once for each
+    /// DAG.
     fn go_on_from(&mut self, (dag, entry): SubtaskRef, is_end: &dyn Fn(&Self, SubtaskRef) -> bool) {
         for exit in self.reached_from((dag, entry)) {
             // The number of paths may grow exponentially with the DAGs.
@@ -374,7 +379,7 @@ impl<'t> ChainSearch<'t> {
             self.path.push(segment);
             for at in 0..self.samplings.len() {
                 let SampledEdge { writer, reader } = self.samplings[at];
-                // DAGs may sample each other in a circle, which a chain passes once.
+                // DAGs may sample each other in a circle; a chain passes the circle once.
                 let is_new = self.path.iter().all(|passed| passed.dag != reader.0);
                 if writer == (dag, exit) && is_new {
                     self.go_on_from(reader, is_end);
@@ -384,7 +389,7 @@ impl<'t> ChainSearch<'t> {
         }
     }
 
-    /// Returns a subtask and all that follow it in its DAG.
+    /// Returns a subtask and all its successors, direct and indirect, in its DAG.
     fn reached_from(&self, (dag, entry): SubtaskRef) -> Vec<SubtaskId> {
         let model = self.task_set.dag(dag);
         let mut is_reached = vec![false; model.subtasks().len()];
@@ -402,19 +407,19 @@ impl<'t> ChainSearch<'t> {
     }
 }
 
-/// The times of a chain in one run, in nanoseconds; `chains` says what they are.
+/// The times of a chain in one run, in nanoseconds, as defined in the docs of module `chains`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ChainLatencies {
-    /// Of each output: its age at its finish.
+    /// For each output: its age at its finish.
     pub output_age_ns: Vec<u64>,
-    /// Of each output that was followed by another one: its data age.
+    /// For each output followed by another output: its data age.
     pub data_age_ns: Vec<u64>,
-    /// The reaction time to what happens just after each job's release, if it was seen.
+    /// The reaction time to an input just after each job's release, if observed.
     pub reaction_ns: Vec<u64>,
 }
 
 impl Chain {
-    /// Measures the chain in the events of a run, which are in the order of the journal.
+    /// Measures the chain in the events of a run, given in the order of the journal.
     pub fn latencies(
         &self,
         task_set: &TaskSet,
@@ -425,7 +430,7 @@ impl Chain {
         self.latencies_by(&sampled, task_set, events)
     }
 
-    /// Measures the chain as above, by what is known of the samples.
+    /// Measures the chain as above, with samples known beforehand.
     pub fn latencies_by(
         &self,
         sampled: &SampledJobs,
@@ -439,7 +444,7 @@ impl Chain {
             let model = task_set.dag(segment.dag);
             let last = releases.0.keys().rfind(|(dag, _)| *dag == segment.dag);
             match last {
-                // Beyond the last release the sampled values only grow older, which says nothing
+                // Beyond the last release, sampled values only grow older; their age says nothing
                 // about the chain.
                 Some((_, job)) if !model.is_sporadic() => model.grid_ns(job.saturating_add(1)),
                 _ => u64::MAX,
@@ -448,14 +453,14 @@ impl Chain {
         let end_ns = end_ns.min().unwrap_or(u64::MAX);
         let (first, last) = (self.segments[0], self.segments[self.segments.len() - 1]);
         let mut latencies = ChainLatencies::default();
-        // Of the output before: its job, that which it goes back to, and the release of that.
+        // Of the previous output: its job, the job it goes back to, and the release of the latter.
         let mut before: Option<(u64, u64, u64)> = None;
         let is_output = |event: &Event| {
             (event.what, event.dag, event.subtask) == (EventKind::Finish, last.dag, Some(last.exit))
                 && event.time_ns <= end_ns
         };
         for output in events.filter(is_output) {
-            // What it goes back to, hop by hop.
+            // The job to which the output goes back, hop by hop.
             let origin = hops.iter().rev().try_fold(output.job, |job, hop| {
                 let (dag, subtask) = hop.reader;
                 let job = sampled.job(Instance { dag, job, subtask }, hop.writer)?;
@@ -476,7 +481,7 @@ impl Chain {
                 && !pauses.has_come(last.dag, job, output.time_ns)
             {
                 latencies.data_age_ns.push(since(before_ns));
-                // Inputs between two origins reach no output earlier than this one.
+                // Inputs between the two origins reach no output earlier than the current one.
                 let missed = releases
                     .0
                     .range((first.dag, before)..(first.dag, origin.max(before)));
@@ -489,7 +494,7 @@ impl Chain {
     }
 }
 
-/// The nominal releases of all jobs that were released.
+/// The nominal releases of all released jobs.
 struct NominalReleases(BTreeMap<(DagId, u64), u64>);
 
 impl NominalReleases {
@@ -514,7 +519,7 @@ impl NominalReleases {
     }
 }
 
-/// When jobs were skipped because their DAGs were paused.
+/// The times when jobs were skipped because their DAGs were paused.
 struct PausedJobs(BTreeMap<(DagId, u64), u64>);
 
 impl PausedJobs {
@@ -533,7 +538,7 @@ impl PausedJobs {
                 EventKind::Off => _ = resumed_ns.insert(dag, u64::MAX),
                 EventKind::On => _ = resumed_ns.insert(dag, time_ns),
                 EventKind::Skipped => {
-                    // A driver that comes late may tell of the job after the pause.
+                    // A late driver may report the skipped job only after the pause.
                     let due_ns = task_set.dag(dag).grid_ns(job);
                     if resumed_ns.get(&dag).is_some_and(|&ns| due_ns < ns) {
                         skipped.insert((dag, job), time_ns);
@@ -545,7 +550,7 @@ impl PausedJobs {
         Self(skipped)
     }
 
-    /// Reports whether, after a job of a DAG, one has been skipped so by an instant.
+    /// Reports whether a later job of the DAG was skipped for a pause by an instant.
     fn has_come(&self, dag: DagId, job: u64, by_ns: u64) -> bool {
         let mut later = self.0.range((dag, job + 1)..=(dag, u64::MAX));
         later.next().is_some_and(|(_, &time_ns)| time_ns <= by_ns)
@@ -555,7 +560,7 @@ impl PausedJobs {
 /// The samples of a run.
 #[derive(Clone, Debug, Default)]
 pub struct SampledJobs {
-    /// By instance, and by the writer of what it samples: the job.
+    /// The sampled job, by reading instance and by the writer.
     jobs: BTreeMap<(Instance, SubtaskRef), u64>,
 }
 
@@ -563,7 +568,7 @@ impl SampledJobs {
     /// Follows the events of a run, in the order of the journal.
     pub fn new(samplings: &[SampledEdge], events: impl Iterator<Item = Event>) -> Self {
         let mut readers: BTreeMap<SubtaskRef, Vec<SubtaskRef>> = BTreeMap::new();
-        // Of the writers: the last job that is complete.
+        // For each writer: the last complete job.
         let mut latest: BTreeMap<SubtaskRef, Option<u64>> = BTreeMap::new();
         for sampling in samplings {
             let writers = readers.entry(sampling.reader).or_default();
@@ -595,19 +600,19 @@ impl SampledJobs {
         Self { jobs }
     }
 
-    /// Adds that an instance has got the value of another one, such as by a message.
+    /// Adds a value passed from one instance to another by other means, such as a message.
     pub fn add(&mut self, reader: Instance, writer: Instance) {
         let place = (writer.dag, writer.subtask);
         self.jobs.insert((reader, place), writer.job);
     }
 
-    /// Returns the job whose value an instance has sampled of a writer; `None`: it has not
-    /// started, or found nothing.
+    /// Returns the job whose value an instance has sampled from a writer. Returns `None` if the
+    /// instance has not started or found no value.
     pub fn job(&self, reader: Instance, writer: SubtaskRef) -> Option<u64> {
         self.jobs.get(&(reader, writer)).copied()
     }
 
-    /// Returns all that was sampled: by which instance, and whose value.
+    /// Returns all samples: the sampling instance and the instance whose value was sampled.
     pub fn all(&self) -> impl Iterator<Item = (Instance, Instance)> {
         self.jobs.iter().map(|((reader, (dag, subtask)), job)| {
             let (dag, job, subtask) = (*dag, *job, *subtask);
