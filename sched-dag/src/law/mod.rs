@@ -1,25 +1,23 @@
-//! The law: what follows from a run's journal.
+//! Judges and measures a run from its journal.
 //!
-//! All of it is computed from the [events](crate::journal) that a driver has written
-//! down:
+//! All results are computed from the [events](crate::journal) written down by a driver:
 //!
-//! - [`violations`]: every breach of the model's rules R1 to R4, and of what every
-//!   machine must keep: one life of each instance, one instance on each core;
+//! - [`violations`]: every breach of the model's rules R1 to R4, of the rules W1 and W2 for waits,
+//!   and of two rules for every machine: one life of each instance, one instance on each core;
 //! - [`dispatch_violations`]: every breach of R5 and of T1 to T4; [`sweep`] is its core;
-//! - [`MeasuredCosts`]: what the platform's own work has taken;
-//! - [`RunRecord::of_events`]: the times of every job and instance, of the latest whole
-//!   jobs if the oldest events are lost;
-//! - [`RunTally`]: statistics of a run of any length, in a fixed amount of memory, each of
-//!   which is read as a [`Distribution`].
+//! - [`MeasuredCosts`]: the time taken by the platform's own work;
+//! - [`RunRecord::of_events`]: the times of every job and instance; if the oldest events are lost,
+//!   of the latest whole jobs only;
+//! - [`RunTally`]: statistics of a run of any length, in a fixed amount of memory; each is read as
+//!   a [`Distribution`].
 //!
-//! How strictly a journal is judged is said by [`JudgeOptions`]. Times are in nanoseconds from
-//! the run's epoch.
+//! [`JudgeOptions`] says how strictly to judge a journal. Times are in nanoseconds from the run's
+//! epoch.
 //!
-//! These are the only checks of the rules after a run: in virtual time, on threads, in
-//! the kernel, and of a trace that is read from a file. They are written from the rules
-//! alone and share no code with the scheduler, so that an error there cannot hide here.
-//! They do not find what leaves no event: that values went astray, or that a rule was
-//! broken before the events that are left.
+//! Nothing else checks the rules after a run: in virtual time, on threads, in the kernel, or for a
+//! trace read from a file. The checks are written from the rules alone and share no code with the
+//! scheduler, so an error in the scheduler cannot hide here. The checks miss faults that leave no
+//! event: values gone astray, or a rule broken before the first remaining event.
 
 mod costs;
 mod dispatch;
@@ -45,76 +43,77 @@ use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::policy::JobOutcome;
 use crate::task_set::TaskSet;
 
-/// The times of one instance; each `None` until it has happened.
+/// The times of one instance; each `None` until its event has happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InstanceRecord {
-    /// When all that it waits for had happened.
+    /// When all conditions for its readiness had been met.
     pub ready_ns: Option<u64>,
     /// When its function was called.
     pub start_ns: Option<u64>,
     /// When its function had returned.
     pub finish_ns: Option<u64>,
-    /// When a fault had ended it instead; `None` also if that is not recorded.
+    /// When a fault had ended the instance instead; `None` also if no event records the fault.
     pub failed_ns: Option<u64>,
-    /// The core on which it finished.
+    /// The core where the instance finished.
     pub core: Option<CoreId>,
     /// How many times its function has returned; more than 1 is a violation.
     pub runs: u32,
-    /// How many times the scheduler has taken its core away.
+    /// How many times the scheduler has preempted the instance.
     pub preemptions: u32,
 }
 
-/// The times of one job; each `None` until it has happened.
+/// The times of one job; each `None` until its event has happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JobRecord {
     /// The nominal release time, once the job is released.
     pub release_ns: Option<u64>,
     /// When the release was carried out.
     pub released_ns: Option<u64>,
-    /// When it was cut, because it was aborted, had a fault, or its DAG was ended: from
-    /// then on it starts no instance.
+    /// When the job was cut, because it was aborted, had a fault, or its DAG was ended. A job that
+    /// was cut starts no further instance.
     pub cut_ns: Option<u64>,
-    /// Whether a fault has cut it while its DAG went on.
+    /// Whether a fault has cut the job while its DAG went on.
     pub has_failed: bool,
-    /// When its deadline was seen to have passed without it being complete.
+    /// When the scheduler noticed that the deadline had passed with the job incomplete.
     pub missed_ns: Option<u64>,
-    /// When no instance of it was left.
+    /// When no instance of the job was left.
     pub ended_ns: Option<u64>,
-    /// How it ended; `None` if it was in flight at the end of the record.
+    /// How the job ended; `None` if it was in flight at the end of the record.
     pub outcome: Option<JobOutcome>,
 }
 
 impl JobRecord {
-    /// Returns the time from the nominal release to the end, if there was one.
+    /// Returns the time from the nominal release to the end, or `None` without both.
     pub fn response_time_ns(&self) -> Option<u64> {
         Some(self.ended_ns?.saturating_sub(self.release_ns?))
     }
 }
 
-/// Options of the judge: whether a journal is whole and complete, and the tolerance.
+/// Options of the judge: whether the journal is whole, whether the run is complete, and tolerances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JudgeOptions {
-    /// Whether no event is missing. Else the oldest ones are, and of what they may have
-    /// been about, nothing is concluded from an event that is not there.
+    /// Whether no event is missing. Otherwise the oldest events are missing, and the judge
+    /// concludes nothing from the absence of an event that may be among them.
     pub is_whole: bool,
     /// Whether the run went on until every job had ended.
     pub is_complete: bool,
-    /// For how long what is owed may be owed, in nanoseconds: a machine takes time from a
-    /// finish to what follows from it, and from a decision to what a core does. Nothing
-    /// may come too early. How late a timer is, is judged of waits only.
+    /// How long an obligation may stay unfulfilled, in nanoseconds: a machine takes time from a
+    /// finish to its consequences, and from a decision to the action of a core. Nothing may come
+    /// too early. The lateness of timers is judged for waits only.
     ///
-    /// 0: everything has the very time at which the model lets it happen, as in virtual
-    /// time; then timers are punctual, too. [`u64::MAX`]: only order counts.
+    /// 0 means exact times, as in virtual time: everything happens at the very time given by the
+    /// model, and timers are punctual, too. With [`u64::MAX`], only order counts.
     pub tolerance_ns: u64,
-    /// How late a timer may be that ends a wait at its limit, besides the tolerance, in nanoseconds.
+    /// How late a timer may end a wait at its limit, in addition to the tolerance, in nanoseconds.
     pub late_ns: u64,
 }
 
 impl JudgeOptions {
-    /// Those of a whole run in virtual time.
+    /// The options for a whole run in virtual time.
     pub const EXACT: Self = Self::whole(0);
 
-    /// Returns those of a run of which no event is missing, and jobs may be in flight.
+    /// Returns the options for a run without missing events, perhaps with jobs in flight at its
+    /// end.
     #[must_use]
     pub const fn whole(tolerance_ns: u64) -> Self {
         Self {
@@ -135,16 +134,15 @@ pub struct RunRecord {
 #[derive(Clone, Debug)]
 struct DagRecord {
     subtasks: usize,
-    /// The number of the first job that is recorded.
+    /// The number of the first recorded job.
     first_job: u64,
     jobs: Vec<JobRecord>,
-    /// Job by job, within a job by subtask.
+    /// Ordered by job, then by subtask.
     instances: Vec<InstanceRecord>,
 }
 
 impl RunRecord {
-    /// Makes an empty record with room for the jobs of each DAG whose numbers are in
-    /// `jobs(dag)`.
+    /// Makes an empty record with room for the jobs `jobs(dag)` of each DAG.
     ///
     /// Returns `None` if there is no memory for so many jobs.
     fn with_jobs(task_set: &TaskSet, jobs: impl Fn(DagId) -> Range<u64>) -> Option<Self> {
@@ -165,8 +163,8 @@ impl RunRecord {
         })
     }
 
-    /// Returns the recorded jobs of a DAG, one number after the other from
-    /// [`first_job`](Self::first_job) on.
+    /// Returns the recorded jobs of a DAG, in the order of their numbers, from
+    /// [`first_job`](Self::first_job) on without gaps.
     ///
     /// # Panics
     ///
@@ -175,8 +173,8 @@ impl RunRecord {
         &self.dags[dag.index()].jobs
     }
 
-    /// Returns the number of the first recorded job of a DAG; not 0 if the memory did
-    /// not hold all jobs.
+    /// Returns the number of the first recorded job of a DAG. Not the DAG's own first job if the
+    /// memory did not hold all jobs.
     ///
     /// # Panics
     ///
@@ -194,13 +192,13 @@ impl RunRecord {
         (self.first_job(dag)..).zip(self.jobs(dag))
     }
 
-    /// Returns one job, `None` if it is not recorded.
+    /// Returns one job, or `None` if the record does not contain the job.
     pub fn job(&self, dag: DagId, job: u64) -> Option<&JobRecord> {
         let dag = self.dags.get(dag.index())?;
         Some(&dag.jobs[dag.position(job)?])
     }
 
-    /// Returns the instances of a job by subtask; empty if it is not recorded.
+    /// Returns the instances of a job by subtask; empty if the job is not recorded.
     ///
     /// # Panics
     ///
@@ -211,13 +209,13 @@ impl RunRecord {
         dag.position(job).map_or(&[], of_job)
     }
 
-    /// Returns an instance's times, `None` if it is not recorded.
+    /// Returns the times of an instance, or `None` if the instance is not recorded.
     pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
         self.instances(instance.dag, instance.job)
             .get(instance.subtask.index())
     }
 
-    /// Returns an instance's times to be filled in, `None` if it is not recorded.
+    /// Returns the times of an instance for filling in, or `None` if the instance is not recorded.
     fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
         let dag = self.dags.get_mut(instance.dag.index())?;
         let first = dag.position(instance.job)? * dag.subtasks;
@@ -225,16 +223,16 @@ impl RunRecord {
         of_job.get_mut(instance.subtask.index())
     }
 
-    /// Returns a job's times to be filled in, `None` if it is not recorded.
+    /// Returns the times of a job for filling in, or `None` if the job is not recorded.
     fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
         let dag = self.dags.get_mut(dag.index())?;
         let place = dag.position(job)?;
         Some(&mut dag.jobs[place])
     }
 
-    /// Returns when all predecessors of a subtask had finished their part of
-    /// the job: the earliest time at which the model lets it become ready by R2.
-    /// `None` if it has no predecessor, or one has not finished.
+    /// Returns when the last predecessor of an instance finished in the same job: the earliest time
+    /// at which R2 lets the instance become ready. Returns `None` for a source, or if a predecessor
+    /// has not finished.
     pub fn join_ns(&self, task_set: &TaskSet, instance: Instance) -> Option<u64> {
         let Instance { dag, job, subtask } = instance;
         let job = self.instances(dag, job);
@@ -242,14 +240,14 @@ impl RunRecord {
         latest(predecessors.iter().map(|u| job.get(u.index())?.finish_ns))
     }
 
-    /// Returns when a job was complete (R4): the latest finish of its subtasks.
-    /// `None` if one has not finished.
+    /// Returns when a job was complete (R4): the latest finish of its subtasks. Returns `None` if a
+    /// subtask has not finished.
     pub fn completion_ns(&self, dag: DagId, job: u64) -> Option<u64> {
         let instances = self.instances(dag, job).iter();
         latest(instances.map(|instance| instance.finish_ns))
     }
 
-    /// Returns every recorded instance with its times: by DAG, job, subtask.
+    /// Returns every recorded instance with its times, ordered by DAG, job, subtask.
     pub fn all_instances<'a>(
         &'a self,
         task_set: &'a TaskSet,
@@ -270,7 +268,7 @@ impl DagRecord {
     }
 }
 
-/// Returns so many values that tell of nothing, `None` if there is no memory for them.
+/// Returns so many default values, or `None` if there is no memory for them.
 fn filled<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;
@@ -278,7 +276,7 @@ fn filled<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
     Some(values)
 }
 
-/// Returns the latest of some times, `None` if one is missing or there are none.
+/// Returns the latest of some times, or `None` if any is missing or there are none.
 fn latest(times: impl Iterator<Item = Option<u64>>) -> Option<u64> {
     times
         .reduce(|latest, time| Some(latest?.max(time?)))

@@ -1,24 +1,31 @@
 //! R5: did the right instances run?
 //!
-//! At every instant the rule says which instances *should* run: with m cores, those
-//! that have started and keep their core; on each other core the entry of its table that is due
-//! (T1, T3); and of all others that are eligible those with the smallest keys, until m are reached. Where DAGs have affinities, the last
-//! holds for each group of cores by itself, and for the instances of its DAGs. An eligible instance that should run
-//! and does not is *owed* a core. In virtual time that never lasts. On a machine it is
-//! never 0: the scheduler is told, decides, and interrupts a core. So it is a breach
-//! only if it lasts for longer than a stated *bound*. The blame is what was the case
-//! when the bound was exceeded: an instance of lower priority runs, or a core is idle.
+//! At every instant, the rule says which instances *should* run. With m cores, these are
 //!
-//! Besides, at the start of an instance that will keep its core: those of higher
-//! priority that have been waiting for longer than the bound must have idle cores to
-//! go to, and no entry may be due on its core. Without that, a wrong choice would show no longer than it takes to make. Where times
-//! are exact, so must those that wait since an earlier event, be it of the same instant.
+//! - the started instances that keep their cores;
+//! - on each other core, the entry of its table that is due (T1, T3);
+//! - among all other eligible instances, those with the smallest keys, until m instances are
+//!   reached.
 //!
-//! A sweep takes changes one after the other and keeps only what waits and what
-//! runs, so it judges a run of any length.
+//! Where DAGs have affinities, the last point is valid for each group of cores by itself, and for
+//! the instances of the group's DAGs.
 //!
-//! Not checked: what happens within one instant. An instance that executes for no time
-//! is eligible and gone at one instant, so its order among others is not seen.
+//! An eligible instance that should run but does not is *owed* a core. In virtual time this state
+//! never lasts. On a machine its length is never 0: the scheduler is told, decides, and interrupts
+//! a core. So waiting is a breach only beyond a stated *bound*. The blame names the situation when
+//! the bound was exceeded: a running instance of lower priority, or an idle core.
+//!
+//! The sweep also judges each start of an instance that will keep its core. Every instance of
+//! higher priority waiting for longer than the bound must have an idle core to go to, and no entry
+//! may be due on the core of the start. Without this check, a wrong choice would show only for the
+//! time taken by making it. Where times are exact, the check includes instances waiting since an
+//! earlier event, even an event at the same instant.
+//!
+//! A sweep takes changes one after the other and keeps only waiting and running instances, so it
+//! judges a run of any length.
+//!
+//! Not checked: the order of events within one instant. An instance that executes for no time is
+//! eligible and gone at one instant, so its order among others is not seen.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
@@ -32,20 +39,20 @@ use crate::policies::SchedulerOptions;
 use crate::policy::Preemption;
 use crate::task_set::TaskSet;
 
-/// The key of R5: the smaller one goes first. No two instances have the same.
+/// The key of R5: the smaller key goes first. No two instances have the same key.
 pub(super) type Key = (u64, Instance);
 
-/// The model and the options of a run, and the cores of the cluster in hand.
+/// The model and the options of a run, and the cores of the current cluster.
 pub(super) struct DispatchModel<'a> {
     pub(super) task_set: &'a TaskSet,
     pub(super) options: &'a SchedulerOptions,
-    /// By DAG and subtask the policy's number.
+    /// The policy's number, by DAG and subtask.
     pub(super) numbers: Vec<Vec<u64>>,
     pub(super) cores: Range<u32>,
-    /// The affinities of its DAGs, each once.
+    /// The affinities of its DAGs, without duplicates.
     pub(super) groups: Vec<&'a [u32]>,
     pub(super) lists: CoreLists<'a>,
-    /// When sporadic jobs were due.
+    /// When sporadic jobs were due, in nanoseconds.
     pub(super) due_ns: BTreeMap<(DagId, u64), u64>,
 }
 
@@ -54,13 +61,13 @@ pub(super) struct DispatchModel<'a> {
 pub(super) enum Place<'a> {
     /// The core of its entry in a table.
     Core(CoreId),
-    /// Those of its DAG's affinity.
+    /// The cores of its DAG's affinity.
     Group(&'a [u32]),
 }
 
 impl<'a> DispatchModel<'a> {
-    /// Returns an instance's place in the order of dispatch: (the policy's number, with the job's
-    /// release if that is added, DAG, job, subtask).
+    /// Returns the key of an instance: (the policy's number, plus the job's release if the policy
+    /// adds the release, DAG, job, subtask).
     pub(super) fn key(&self, instance: Instance) -> Key {
         let Instance { dag, job, subtask } = instance;
         let model = self.task_set.dag(dag);
@@ -69,7 +76,7 @@ impl<'a> DispatchModel<'a> {
             return (number, instance);
         }
         let due_ns = self.due_ns.get(&(dag, job)).copied();
-        // A sporadic job whose signal is lost has the least urgent key: it is blamed for nothing.
+        // A sporadic job with a lost signal gets the least urgent key, so it is blamed for nothing.
         let release_ns = model.release_ns(job, due_ns.unwrap_or(u64::MAX));
         (release_ns.saturating_add(number), instance)
     }
@@ -82,7 +89,7 @@ impl<'a> DispatchModel<'a> {
         }
     }
 
-    /// Reports whether a core is one of an affinity.
+    /// Reports whether a core belongs to an affinity.
     pub(super) fn is_of(&self, group: &[u32], core: CoreId) -> bool {
         let number = core.0.checked_sub(self.cores.start);
         group.is_empty() || number.is_some_and(|number| group.contains(&number))
@@ -99,28 +106,27 @@ impl<'a> DispatchModel<'a> {
 /// The state of an instance for the dispatch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DispatchState {
-    /// No event has made it ready yet.
+    /// No event has made the instance ready yet.
     #[default]
     Absent,
-    /// It waits for a core and has not started.
+    /// The instance waits for a core and has not started.
     Ready,
-    /// It runs.
+    /// The instance runs.
     Running(CoreId),
-    /// It waits for a core and has started.
+    /// The instance waits for a core and has started.
     Suspended,
-    /// It has started, and its wait has not ended.
+    /// The instance has started, and its wait has not ended.
     Waiting,
-    /// It has finished, or will never run.
+    /// The instance has finished, or will never run.
     Over,
 }
 
-/// The reason for a breach: an instance that runs, or a core that idles, while another
-/// instance should run.
+/// The reason for a breach: a running instance, or an idle core, while another instance should run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DispatchFault {
     /// An instance, on this core.
     Runs(Instance, CoreId),
-    /// A core is idle; the first one, unless it is not known which.
+    /// A core is idle: the first idle core, or `None` if unknown.
     Idle(Option<CoreId>),
 }
 
@@ -138,7 +144,7 @@ pub enum DispatchBreach {
         /// The instance that ran meanwhile, or the core that idled.
         blame: DispatchFault,
     },
-    /// An instance started and keeps its core, although another one went first.
+    /// An instance started and keeps its core, although another instance went first.
     OutOfTurn {
         /// The instance.
         started: Instance,
@@ -146,27 +152,26 @@ pub enum DispatchBreach {
         core: CoreId,
         /// When it started.
         at_ns: u64,
-        /// The one that goes first.
+        /// The instance that goes first.
         first: Instance,
-        /// Since when that has been waiting.
+        /// Since when the first instance has been waiting.
         since_ns: u64,
     },
 }
 
-/// Waiting times that R5 tells about a run, besides breaches.
+/// Waiting times measured during the judgement of R5, besides breaches.
 #[derive(Clone, Debug, Default)]
 pub struct WaitCounts {
     /// The longest time for which an instance was owed a core.
     pub longest_owed_ns: u64,
-    /// From readiness to start, where a core was idle for the instance and no
-    /// other one came first.
+    /// From readiness to start, for instances that found an idle core and were not overtaken.
     pub ready_to_start_ns: Vec<u64>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct OwedDispatch {
     since_ns: u64,
-    /// Whether it has just become ready and found an idle core for it.
+    /// Whether the instance has just become ready and found an idle core.
     finds_idle_core: bool,
     blame: Option<DispatchFault>,
 }
@@ -176,19 +181,19 @@ pub(super) struct DispatchSweep<'m> {
     model: &'m DispatchModel<'m>,
     bound_ns: u64,
     now_ns: u64,
-    /// The cores of which it is known what they do.
+    /// The cores whose state is known.
     pub(super) known_cores: BTreeSet<CoreId>,
-    /// How many events there were.
+    /// The number of events so far.
     events: u64,
-    /// Since when each waits, and since which event.
+    /// For each waiting instance: since when it waits, and since which event.
     waiting: BTreeMap<Key, (u64, u64)>,
     running: BTreeMap<Key, CoreId>,
     ended_dags: BTreeSet<DagId>,
     owed: BTreeMap<Key, OwedDispatch>,
-    /// Became ready, or started, at this instant.
+    /// The instances that became ready at this instant.
     fresh: Vec<Key>,
     started: Vec<(Key, CoreId, u64)>,
-    /// Keys of the instances that have not started yet.
+    /// Keys of instances that have not started yet.
     unstarted: BTreeSet<Key>,
     wrong: Vec<DispatchBreach>,
     waits: &'m mut WaitCounts,
@@ -196,7 +201,7 @@ pub(super) struct DispatchSweep<'m> {
 }
 
 impl<'m> DispatchSweep<'m> {
-    /// Begins at an instant; what is found of waits is added to the ones given.
+    /// Begins at an instant; measured waits are added to `waits`.
     pub(super) fn new(
         model: &'m DispatchModel<'m>,
         terms: JudgeOptions,
@@ -222,9 +227,9 @@ impl<'m> DispatchSweep<'m> {
         }
     }
 
-    /// Judges what has been the case up to an instant; one that is past counts as now.
+    /// Judges the time from now until an instant; a past instant counts as now.
     pub(super) fn go_on_to(&mut self, until_ns: u64) {
-        // Only a stretch of time is settled: within an instant the order of events says nothing
+        // Only a stretch of time is settled: within an instant, the order of events says nothing
         // about the dispatch.
         if until_ns > self.now_ns {
             self.settle(until_ns);
@@ -242,15 +247,15 @@ impl<'m> DispatchSweep<'m> {
         self.wrong
     }
 
-    /// The waiting instances of a DAG are owed nothing any more.
+    /// Ends a DAG: its waiting instances are owed nothing any more.
     pub(super) fn end_dag(&mut self, dag: DagId) {
-        // E3: what has not started never will; what has started may go on.
+        // E3: unstarted instances never start; started instances may go on.
         self.waiting.retain(|(_, instance), _| instance.dag != dag);
         self.ended_dags.insert(dag);
         self.tables.end_dag(dag);
     }
 
-    /// An instance enters a stage.
+    /// Moves an instance to a stage.
     pub(super) fn enter(&mut self, instance: Instance, stage: DispatchState) {
         let key = self.model.key(instance);
         self.events += 1;
@@ -270,7 +275,7 @@ impl<'m> DispatchSweep<'m> {
             }
             DispatchState::Suspended => {
                 self.waiting.insert(key, since);
-                // It begins a segment, whose core it keeps.
+                // Its next segment keeps the core, so its resume is judged like a start.
                 if self.model.keeps_its_core(instance) {
                     self.unstarted.insert(key);
                 }
@@ -285,9 +290,9 @@ impl<'m> DispatchSweep<'m> {
         }
     }
 
-    /// Judges what is the case from now until then.
+    /// Judges the time from now until `until_ns`, during which nothing changes.
     fn settle(&mut self, until_ns: u64) {
-        // A core that has not been seen yet may not be there: only seen ones count.
+        // An unseen core may not exist: only cores seen so far count.
         let claims = self.claims();
         for place in 0..self.started.len() {
             let wrong = self.out_of_turn(self.started[place], &claims);
@@ -324,7 +329,7 @@ impl<'m> DispatchSweep<'m> {
         self.running.values().all(|busy| busy != core)
     }
 
-    /// Returns how many of these cores are of a group.
+    /// Returns how many of the given cores belong to a group.
     fn count<'c>(&self, group: &[u32], cores: impl Iterator<Item = &'c CoreId>) -> usize {
         cores.filter(|core| self.model.is_of(group, **core)).count()
     }
@@ -336,7 +341,7 @@ impl<'m> DispatchSweep<'m> {
         (self.count(group, self.known_cores.iter())).saturating_sub(taken)
     }
 
-    /// Holds an event against the tables, before its instance enters a stage.
+    /// Checks an event against the tables, before its instance enters a stage.
     pub(super) fn take_entry(&mut self, event: &Event) -> Option<Violation> {
         let Self {
             tables,
@@ -347,8 +352,8 @@ impl<'m> DispatchSweep<'m> {
         tables.take(event, |of| waiting.contains_key(&model.key(of)))
     }
 
-    /// Returns the entry that should run on each core for which one is due and ready, and that no
-    /// instance keeps.
+    /// Returns, by core, the entry that is due and ready there. Cores kept by an instance are left
+    /// out.
     fn claims(&self) -> BTreeMap<CoreId, Key> {
         let mut claims = self.due();
         let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
@@ -368,8 +373,8 @@ impl<'m> DispatchSweep<'m> {
         due.collect()
     }
 
-    /// Returns the waiting instances that should run, and whether a core is idle for each: the
-    /// entries, and then, group by group in the order of keys, the others.
+    /// Returns the waiting instances that should run, and whether a core is idle for each: first
+    /// the entries, then the others, group by group in the order of keys.
     fn should_run(&self, claims: &BTreeMap<CoreId, Key>) -> Vec<(Key, bool)> {
         let claimed = claims.iter();
         let claimed = claimed.filter(|(_, key)| self.waiting.contains_key(key));
@@ -382,11 +387,12 @@ impl<'m> DispatchSweep<'m> {
         owed
     }
 
-    /// Adds those of a group.
+    /// Adds the waiting instances of a group that should run.
     fn add_owed(&self, group: &[u32], claims: &BTreeMap<CoreId, Key>, owed: &mut Vec<(Key, bool)>) {
         let is_of_it = |key: &Key| self.model.place(key.1) == Place::Group(group);
         let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
-        // It has its core whatever waits, so the others share those that are left.
+        // An instance that keeps its core has it whatever waits, so the others share the remaining
+        // cores.
         let taken = self.count(group, claims.keys().chain(kept.map(|(_, core)| core)));
         let free = self.count(group, self.known_cores.iter());
         let movable = self.running.keys().filter(|key| is_of_it(key));
@@ -397,7 +403,7 @@ impl<'m> DispatchSweep<'m> {
         let mut idle = self.idle(group, claims);
         for _ in taken..free {
             match (waiting.peek(), movable.peek()) {
-                // One that runs and goes first has its core by right.
+                // A running instance that goes first has its core by right.
                 (Some(waits), Some(runs)) if runs < waits => {
                     movable.next();
                 }
@@ -411,7 +417,8 @@ impl<'m> DispatchSweep<'m> {
         }
     }
 
-    /// Says what runs instead of an instance that is owed a core.
+    /// Finds the cause of a wait: the instance running instead of an owed instance, or an idle
+    /// core.
     fn blame(&self, owed: Key, is_idle: bool, claims: &BTreeMap<CoreId, Key>) -> DispatchFault {
         let place = self.model.place(owed.1);
         let mut running = self.running.iter().rev();
@@ -422,7 +429,7 @@ impl<'m> DispatchSweep<'m> {
             }
         });
         match movable {
-            // The least urgent one is blamed: it is the one that a dispatch would have preempted.
+            // The least urgent instance is to blame: a dispatch would have preempted it.
             Some((key, core)) if !is_idle => DispatchFault::Runs(key.1, *core),
             _ => {
                 let is_left = |core: &CoreId| self.is_idle(core) && !claims.contains_key(core);
@@ -438,12 +445,12 @@ impl<'m> DispatchSweep<'m> {
         }
     }
 
-    /// Takes note that an instance is owed nothing any more.
+    /// Closes the record of an instance that is owed nothing any more.
     fn close(&mut self, key: Key, owed: &OwedDispatch) {
         let length_ns = self.now_ns.saturating_sub(owed.since_ns);
         self.waits.longest_owed_ns = self.waits.longest_owed_ns.max(length_ns);
         let mut started = self.started.iter();
-        // Started, and not overtaken: only then is the time that of a wake-up alone.
+        // Started, and not overtaken: only then is the time due to the wake-up alone.
         if owed.finds_idle_core && started.any(|(started, ..)| *started == key) {
             self.waits.ready_to_start_ns.push(length_ns);
         }
@@ -466,7 +473,7 @@ impl<'m> DispatchSweep<'m> {
         if !self.model.keeps_its_core(key.1) {
             return None;
         }
-        // On a machine the one may have become ready when the other was chosen already.
+        // On a machine, an instance may have become ready after the other was already chosen.
         let is_before = |(since_ns, event): &(u64, u64)| {
             let longest_ns = self.now_ns.saturating_sub(*since_ns);
             longest_ns > self.bound_ns || self.bound_ns == 0 && *event < start

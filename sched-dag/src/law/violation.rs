@@ -1,10 +1,10 @@
-//! Violations that a journal can show: the rules, and one row for each breach.
+//! Violations visible in a journal: the rules, and one row for each kind of breach.
 //!
-//! A row has the code of a breach, the rule, when or by which event it shows, and the text:
-//! what happened, where, and why it must not be. Its documentation begins with the rule.
+//! A row has the breach's code, its rule, the time or event showing the breach, and the text: the
+//! fact, its place, and the reason against it. The documentation of a row begins with the rule.
 //!
-//! The phrases of the texts of violations: how they name DAGs and subtasks, and all that
-//! depends on what is wrong.
+//! The module also has the phrases for the texts of violations: names of DAGs and subtasks, and all
+//! words depending on the kind of breach.
 
 use core::fmt::{self, Display};
 
@@ -21,105 +21,104 @@ use crate::worded;
 use crate::worded::texts;
 
 texts! {
-    /// A rule of the task model, which the [crate] states, or one of two that every
-    /// machine must keep whatever the model says. Its text is its name.
+    /// A rule of the task model (stated in the [crate] documentation), or one of two rules for
+    /// every machine, independent of the model. Its text is its name.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
     pub enum Rule {
-        /// R1: jobs are released on the nominal grid, and nothing of one runs before.
+        /// R1: jobs are released on the nominal grid, and nothing of a job runs before its release.
         Release = "R1 release";
-        /// R2: an instance is ready exactly when all that it waits for has happened.
+        /// R2: an instance is ready exactly when all its conditions have been met.
         AndJoin = "R2 join";
-        /// R3: what waits for an instance is released when that has finished, all at once.
+        /// R3: a finish releases all instances waiting for it, at once.
         CompletionBoundary = "R3 completion boundary";
         /// R4: a job is complete with its last instance, and meets its deadline or not.
         JobCompletion = "R4 completion";
         /// R5: the instances with the smallest keys run.
         Dispatch = "R5 dispatch";
-        /// T1 to T4: a core runs the entries of its table, and members on what these leave.
+        /// T1 to T4: a core runs the entries of its table, and members in the time left over.
         Table = "T1 table";
-        /// W1 and W2: an instance takes the waits that its subtask states, each within its limit.
+        /// W1 and W2: an instance takes the waits stated by its subtask, each within its limit.
         Waiting = "W1 waiting";
-        /// An instance becomes ready, starts and finishes once, is suspended and resumed in
-        /// turns, and is on one core at a time.
+        /// An instance becomes ready, starts and finishes once, is suspended and resumed in turns,
+        /// and is on one core at a time.
         OneLife = "one life";
         /// A core runs one instance at a time.
         OneCore = "one core";
     }
 }
 
-/// When a violation shows.
+/// The time or event at which a violation shows.
 #[derive(Clone, Copy)]
 enum DetectionTime<'v> {
     /// At a time, in nanoseconds from the run's epoch.
     At(u64),
-    /// By an event, with which its text begins.
+    /// At the time of an event; the text of the violation begins with the event.
     By(&'v Event),
 }
 
 worded! {
     /// A breach of a rule in a journal.
     ///
-    /// Its text has the names of DAGs and subtasks if it is printed
+    /// Its text contains the names of DAGs and subtasks if printed
     /// [`with_names`](Self::with_names).
     #[derive(Copy)]
     pub enum Violation[names: NamedSubject<'_>] -> (Rule, DetectionTime<'_>) {
-        /// R1: something of a job happened before its nominal release.
+        /// R1: an event of a job happened before the job's nominal release.
         BeforeRelease { event: Event, release_ns: u64 } = "before_release", (Release, By(event)),
             " before its release time {release_ns} ns";
-        /// R1: something of a job happened before its release was carried out.
+        /// R1: an event of a job happened before the job's release was carried out.
         BeforeReleased { event: Event, released_ns: u64 } = "before_released", (Release, By(event)),
             " before its release was made at {released_ns} ns";
-        /// R1: something of a job happened that was not released; nothing more of it is judged.
+        /// R1: an event belongs to an unreleased job; later events of the job are not judged.
         NotReleased { event: Event } = "not_released", (Release, By(event)),
             " although its job was never released";
-        /// R1: something happened of a job that is over, and a later one is, too.
+        /// R1: an event belongs to a job already over, and a later job is over, too.
         Forgotten { event: Event } = "forgotten", (Release, By(event)),
             " although its job is over, and a later one, too";
-        /// R1: nothing says when a sporadic job was due.
+        /// R1: no event says when a sporadic job was due.
         NotDue { event: Event } = "not_due", (Release, By(event)),
             ", and nothing says when it was due";
-        /// R1: a job was released of a DAG that was paused or closed.
+        /// R1: a job was released while its DAG was paused or closed.
         WhileOff { event: Event } = "while_off", (Release, By(event)),
             " although its DAG is paused or closed";
         /// R1: a sporadic job's release is less than one minimum inter-arrival time after the
-        /// one before it, or before the offset.
+        /// previous job's release, or before the offset.
         TooSoon { dag: DagId, job: u64, release_ns: u64, earliest_ns: u64 } =
             "too_soon", (Release, At(*release_ns)),
             "{} is due before {earliest_ns} ns, the earliest by its DAG's distance",
             names.job(*dag, *job);
-        /// R1: a job was released after a later one.
+        /// R1: a job was released after a later job.
         OutOfOrder { event: Event, later: u64 } = "out_of_order", (Release, By(event)),
             " after job {later}";
-        /// R1: a job was released while as many were in flight as may be.
+        /// R1: a job was released while the maximum number of jobs was in flight.
         TooMany { event: Event, in_flight: u32 } = "too_many", (Release, By(event)),
             " although {in_flight} jobs are in flight, the most there may be";
-        /// R1: where times are exact, the release was carried out at another time than the
-        /// nominal one, or, if it was queued, than the end of an older job.
+        /// R1: where times are exact, the release was not carried out at its nominal time or, after
+        /// queueing, at the end of an older job.
         Unpunctual { event: Event, expected_ns: u64 } = "unpunctual", (Release, By(event)),
             ", which was due at {expected_ns} ns";
-        /// R1: where times are exact, a queued release was carried out before any job had
-        /// ended.
+        /// R1: where times are exact, a queued release was carried out before any job had ended.
         StillQueued { event: Event } = "still_queued", (Release, By(event)),
             " although it waits, and no job has ended";
-        /// R1: a job was released, queued or skipped once more, or after what excludes it.
+        /// R1: a job was released, queued or skipped once more, or after an event excluding this.
         ReleasedAgain { event: Event, before: EventKind, before_ns: u64 } =
             "released_again", (Release, By(event)),
             " although it was {before} at {before_ns} ns";
-        /// R2: an instance was ready, or started, before one was over that it waits for.
+        /// R2: an instance was ready, or started, before an awaited instance was over.
         BeforeJoin { event: Event, awaited: Instance, over: Option<(u64, CoreId)> } =
             "before_join", (AndJoin, By(event)),
             "; {}, {}", names.instance(*awaited), comes(event, *awaited, *over);
-        /// R3: an instance became ready in a step that nothing brought about that it waits for.
+        /// R3: an instance became ready in a scheduler step not caused by any of its conditions.
         ReadyOutOfStep { event: Event, last_ns: u64, last_core: CoreId } =
             "ready_out_of_step", (CompletionBoundary, At(event.time_ns)),
             "{} in a step on core {} that nothing it waits for brought about; the last of that was \
              over at {last_ns} ns on core {}", names.event(event), event.core.0, last_core.0;
-        /// R3: an instance became ready too late after the last of what it waits for.
+        /// R3: an instance became ready too late after the last of its conditions was met.
         ReadyLate { event: Event, since_ns: u64 } =
             "ready_late", (CompletionBoundary, At(event.time_ns)),
             "{} {} ns after the last of what it waits for was over at {since_ns} ns",
             names.event(event), event.time_ns.saturating_sub(*since_ns);
-        /// R3: an instance never became ready although all that it waits for was over.
+        /// R3: an instance never became ready although all its conditions were met.
         NeverReady { instance: Instance, since_ns: u64, core: CoreId } =
             "never_ready", (CompletionBoundary, At(*since_ns)),
             "{} is never ready although all that it waits for was over at {since_ns} ns on core {}",
@@ -128,11 +127,11 @@ worded! {
         EndedAgain { event: Event, before: EventKind, before_ns: u64 } =
             "ended_again", (JobCompletion, By(event)),
             " although it was {before} at {before_ns} ns";
-        /// R4: a job was completed before one of its instances was over.
+        /// R4: a job was completed before all its instances were over.
         BeforeItsEnd { event: Event, awaited: Instance, over_ns: Option<u64> } =
             "before_its_end", (JobCompletion, By(event)),
             " although {} is {}", names.instance(*awaited), over(*over_ns);
-        /// R4: a job was completed in a step that ended none of its instances.
+        /// R4: a job was completed in a scheduler step that ended none of its instances.
         CompletedOutOfStep { event: Event, last_ns: u64, last_core: CoreId } =
             "completed_out_of_step", (JobCompletion, By(event)),
             " in a step on core {} that no instance of it brought about; the last of that was over \
@@ -147,73 +146,74 @@ worded! {
             "never_completed", (JobCompletion, At(*over_ns)),
             "{} is not completed although all of it was over at {over_ns} ns",
             names.job(*dag, *job);
-        /// R4: a job is not completed at the end of a run in which all are.
+        /// R4: a job is not completed although the run claims to have completed all jobs.
         Unfinished { dag: DagId, job: u64, end_ns: u64 } =
             "unfinished", (JobCompletion, At(*end_ns)),
             "{} is not completed although the run says that it is", names.job(*dag, *job);
         /// R4: a deadline was missed before it had passed.
         MissedEarly { event: Event, deadline_ns: u64 } = "missed_early", (JobCompletion, By(event)),
             " before its deadline {deadline_ns} ns has passed";
-        /// R4: a job was missed that finished in time.
+        /// R4: a job was missed although it finished in time.
         MissedInTime { event: Event, finish_ns: u64, deadline_ns: u64 } =
             "missed_in_time", (JobCompletion, By(event)),
             " although its last instance finished at {finish_ns} ns, by its deadline \
              {deadline_ns} ns";
-        /// R4: where times are exact, a job was missed later than right after its deadline.
+        /// R4: where times are exact, a miss was noticed later than right after the deadline.
         MissedLate { event: Event, deadline_ns: u64 } = "missed_late", (JobCompletion, By(event)),
             " {} ns after its deadline at {deadline_ns} ns",
             event.time_ns.saturating_sub(*deadline_ns);
-        /// R4: a job was not missed that finished late.
+        /// R4: a job finished late without a miss.
         NotMissed { dag: DagId, job: u64, finish_ns: u64, deadline_ns: u64 } =
             "not_missed", (JobCompletion, At(*finish_ns)),
             "{} is not missed although its last instance finished at {finish_ns} ns, after its \
              deadline {deadline_ns} ns", names.job(*dag, *job);
-        /// R4: a job was not missed that did not finish, and its deadline has passed.
+        /// R4: a job did not finish, its deadline has passed, and no event notes the miss.
         NeverMissed { dag: DagId, job: u64, deadline_ns: u64, end_ns: u64 } =
             "never_missed", (JobCompletion, At(*end_ns)),
             "{} is not missed although its deadline {deadline_ns} ns has passed",
             names.job(*dag, *job);
-        /// W1: a wait ended later than its limit lets it.
+        /// W1: a wait ended later than its limit allows.
         WaitBeyondLimit { event: Event, since_ns: u64, limit_ns: u64 } =
             "wait_beyond_limit", (Waiting, By(event)),
             ", which began at {since_ns} ns and has a limit of {limit_ns} ns";
-        /// W1: an instance began a wait more than its subtask states, or finished without one.
+        /// W1: an instance began more waits than its subtask states, or finished without a stated
+        /// wait.
         OtherWaits { event: Event, waits: usize, stated: usize } =
             "other_waits", (Waiting, By(event)),
             " after {waits} waits, and its subtask states {stated}";
-        /// R5: an instance waited although a core was idle, or ran an instance that it outranks
-        /// and could have replaced.
+        /// R5: an instance waited although a core was idle, or ran an instance with a larger key
+        /// that the waiting instance could have replaced.
         PassedOver(wrong: DispatchBreach) = "passed_over", (Dispatch, At(shown_ns(wrong))),
             "{}", names.passed_over(wrong);
-        /// R5: an instance was on a core that is not its cluster's.
+        /// R5: an instance was on a core outside its cluster.
         OutsideItsCluster { event: Event } = "outside_its_cluster", (Dispatch, By(event)),
             ", outside its cluster";
-        /// T1: an entry was on another core than the table's.
+        /// T1: an entry was on another core than its table states.
         OffItsCore { event: Event, core: CoreId } = "off_its_core", (Table, By(event)),
             ", and its table has it on core {}", core.0;
-        /// T1, T3, T4: an instance ran on the core of a table before an entry that goes first.
+        /// T1, T3, T4: an instance ran on a core with a table before an entry that goes first.
         OutOfPlace { event: Event, first: Instance } = "out_of_place", (Table, By(event)),
             " and is out of the order that its table has for {}", names.instance(*first);
-        /// T4: an instance without a table was on a core to which its DAG has no affinity.
+        /// T4: an instance without a table was on a core outside its DAG's affinity.
         OutsideItsAffinity { event: Event } = "outside_its_affinity", (Table, By(event)),
             ", to which its DAG has no affinity";
-        /// R5: an instance that keeps its core lost it.
+        /// R5: an instance lost the core that it keeps until its finish.
         LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),
             " although it keeps its core until it finishes";
-        /// One life: what happened to an instance does not follow from what it was.
+        /// One life: an event does not follow from the previous state of its instance.
         OutOfTurn { event: Event, stage: DispatchState } = "out_of_turn", (OneLife, By(event)),
             " although it {}", does(*stage);
-        /// One life: something happened to an instance before the event that comes first.
+        /// One life: an event of an instance has an earlier time than the event before it.
         Backwards { event: Event, before: EventKind, before_ns: u64 } =
             "backwards", (OneLife, By(event)),
             " before its `{before}` at {before_ns} ns, which comes first";
-        /// One life: an instance was cancelled of a job that nothing had cut.
+        /// One life: an instance was cancelled although nothing had cut its job.
         CancelledUncut { event: Event } = "cancelled_uncut", (OneLife, By(event)),
             " although its job was not cut, nor its DAG ended";
-        /// One life: a DAG went on after a fault that it does not survive (D1).
+        /// One life: a DAG went on after a fault beyond its limit (D1).
         FaultBeyondLimit { event: Event } = "fault_beyond_limit", (OneLife, By(event)),
             " although its DAG does not survive that fault";
-        /// One core: an instance began on a core that still ran another one.
+        /// One core: an instance began on a core that still ran another instance.
         CoreNotFree { event: Event, occupant: Instance } =
             "core_not_free", (OneCore, At(event.time_ns)),
             "core {} runs {} while it still runs {}",
@@ -222,12 +222,12 @@ worded! {
 }
 
 impl Violation {
-    /// Returns the rule that is broken.
+    /// Returns the broken rule.
     pub const fn rule(&self) -> Rule {
         self.columns().0
     }
 
-    /// Returns when it shows, in nanoseconds from the run's epoch.
+    /// Returns when the violation shows, in nanoseconds from the run's epoch.
     pub const fn time_ns(&self) -> u64 {
         match self.columns().1 {
             At(time_ns) => time_ns,
@@ -235,7 +235,7 @@ impl Violation {
         }
     }
 
-    /// Returns its text with the names of the model that was run, instead of numbers.
+    /// Returns the text with the names of the model instead of numbers.
     pub fn with_names(self, task_set: &TaskSet) -> impl fmt::Display {
         fmt::from_fn(move |f| self.tell(NamedSubject(Some(task_set)), f))
     }
@@ -256,7 +256,7 @@ impl fmt::Display for Violation {
     }
 }
 
-/// Writes a job or an instance with the names that it has, for people.
+/// Writes a job or an instance for people, with its name if it has one.
 #[derive(Clone, Copy)]
 pub(super) struct NamedSubject<'a>(pub(super) Option<&'a TaskSet>);
 
@@ -274,7 +274,7 @@ impl NamedSubject<'_> {
         fmt::from_fn(move |f| write!(f, "{subtask} of {}", self.job(dag, job)))
     }
 
-    /// Writes the instance or the job that an event happens to.
+    /// Writes the instance or the job of an event.
     pub(super) fn subject(self, event: &Event) -> impl Display {
         fmt::from_fn(move |f| match event.instance() {
             Some(instance) => write!(f, "{}", self.instance(instance)),
@@ -300,7 +300,7 @@ impl NamedSubject<'_> {
         })
     }
 
-    /// Writes an event, and on which core an instance was at it.
+    /// Writes an event, and the core of its instance.
     fn on_its_core(self, event: &Event) -> impl Display {
         fmt::from_fn(move |f| {
             write!(f, "{}", self.event(event))?;
@@ -355,7 +355,7 @@ const fn shown_ns(wrong: &DispatchBreach) -> u64 {
     }
 }
 
-/// Returns the relation of an awaited instance to that of an event, and when and where it is over.
+/// Returns the awaited instance's relation to an event's instance, and when and where it is over.
 pub(super) fn comes(event: &Event, awaited: Instance, over: Option<(u64, CoreId)>) -> impl Display {
     fmt::from_fn(move |f| {
         f.write_str(match awaited.job == event.job {
@@ -369,7 +369,7 @@ pub(super) fn comes(event: &Event, awaited: Instance, over: Option<(u64, CoreId)
     })
 }
 
-/// Returns that an instance is over too late, or not.
+/// Returns the words for an instance over too late, or not over.
 pub(super) fn over(over_ns: Option<u64>) -> impl Display {
     fmt::from_fn(move |f| match over_ns {
         Some(over_ns) => write!(f, "over only at {over_ns} ns"),
