@@ -1,23 +1,22 @@
-//! The journal that a driver keeps of a run: what happened when, on all cores, in one list.
+//! The journal of a run, kept by a driver: events with their times, on all cores, in one list.
 //!
-//! (If the cores are divided, each cluster keeps one of its own, and the run's is what they
-//! come to together.)
+//! (If the cores are divided into clusters, each cluster keeps its own journal, and the run's
+//! journal merges all of them.)
 //!
-//! Every event but a core's clock is read and written under the scheduler's lock, so
-//! the list is in the order in which the scheduler learnt of things, and needs neither
-//! atomics nor a lock of its own. It is written once a moment and read after the run:
-//! all times, breaches of the rules and statistics are computed from it then, by
-//! [`law`](crate::law).
+//! Every event except a core's clock is read and written under the scheduler's lock. So the list is
+//! in the order in which the scheduler learnt of the events, and needs neither atomics nor a lock
+//! of its own. Events are written once as they happen and read after the run: [`law`](crate::law)
+//! then computes all times, breaches of the rules and statistics from the journal.
 //!
 //! # Memory
 //!
-//! Its memory is taken at commit: as much as the events of all jobs can need (a newly
-//! ready instance preempts at most one other, so an instance has at most six events, and
-//! five more for each wait),
-//! or a quarter of what is free, if that is less, or no job is the last: the times that
-//! are computed from it after the run take up to half as much again. When it is
-//! full, the oldest event makes way for each new one. Before it goes, it is counted in
-//! the [`RunTally`], so statistics remain those of the whole run.
+//! The memory is taken at commit: as much as the events of all jobs can need. (A newly ready
+//! instance preempts at most one other instance, so an instance has at most six events, and five
+//! more for each wait.) If this is more than a quarter of the free memory, the journal takes only
+//! the quarter, since the times computed after the run take up to half as much again. If there is
+//! no last job, the need is unknown, and a fixed number of events takes its place. When the journal
+//! is full, the oldest event makes way for each new event. The [`RunTally`] first counts the oldest
+//! event, so statistics cover the whole run.
 //!
 //! Times are nanoseconds since the run's epoch.
 
@@ -29,36 +28,36 @@ use crate::journal::{Event, EventKind, EventSubject};
 use crate::law::{MeasuredCosts, RunTally};
 use crate::task_set::{Dag, TaskSet};
 
-/// Where a run has no last job, as many events as make sense: 6 MiB.
+/// The number of events worth keeping in a run without a last job: 6 MiB.
 const EVENTS_WITHOUT_END: usize = 1 << 18;
 
-/// The finest resolution of statistics: 32 buckets a doubling.
+/// The finest resolution of statistics: 32 buckets for each doubling.
 pub(crate) const FINEST: u32 = 5;
 
-/// The events of a run, the latest ones if it is long.
+/// The events of a run, or only the latest events of a long run.
 #[derive(Clone, Debug, Default)]
 pub struct Journal {
-    /// As many as there is room for; none while nothing is recorded.
+    /// The room for events, and the events in it; no room while recording is off.
     events: Vec<[u64; 3]>,
-    /// The room while nothing is recorded.
+    /// The room while recording is off.
     put_away: Vec<[u64; 3]>,
-    /// Where the oldest event is, once all room is taken.
+    /// The index of the oldest event, once all room is taken.
     oldest: usize,
-    /// How many events are not there any more, or never were.
+    /// The number of events dropped or never recorded.
     lost: u64,
-    /// Statistics of the lost ones, if there can be any.
+    /// Statistics of the dropped events, if any event can be dropped.
     tally: Option<RunTally>,
-    /// Whether a lost event is not counted in the tally.
+    /// Whether the tally has missed a lost event.
     is_incomplete: bool,
-    /// Whether there is room for all, as much as there is memory.
+    /// Whether the journal grows to keep all events, as long as there is memory.
     grows: bool,
-    /// Whether nothing more is written down.
+    /// Whether the journal accepts no more events.
     is_closed: bool,
 }
 
 impl Journal {
-    /// Takes the memory for what happens to the DAGs of one cluster, of `free_bytes`, and for
-    /// at most `most_events` events.
+    /// Takes the memory for the events of one cluster's DAGs, out of `free_bytes`, and for at most
+    /// `most_events` events.
     #[inline(never)]
     pub fn of_cluster(
         task_set: &Arc<TaskSet>,
@@ -74,11 +73,11 @@ impl Journal {
         let room = needed.unwrap_or(EVENTS_WITHOUT_END);
         let mut room = room.min(wished).min(affordable);
         let mut events = Vec::new();
-        // What is free may be in pieces.
+        // Free memory may be in pieces.
         while events.try_reserve_exact(room).is_err() {
             room /= 2;
         }
-        // Nothing says how many signals are dropped.
+        // The number of dropped signals has no bound.
         let has_signals = here.any(Dag::is_sporadic);
         let is_enough = needed.is_some_and(|needed| needed <= room && !has_signals);
         let tally = (!is_enough && room > 0).then(|| tally(task_set, free_bytes / 8));
@@ -89,13 +88,13 @@ impl Journal {
         }
     }
 
-    /// Writes nothing down any more.
+    /// Closes the journal: later events are not written down.
     pub fn close(&mut self) {
         self.events.shrink_to_fit();
         self.is_closed = true;
     }
 
-    /// Makes one that keeps all, as long as there is memory.
+    /// Makes a journal that keeps all events, as long as there is memory.
     pub fn growing() -> Self {
         Self {
             grows: true,
@@ -103,14 +102,13 @@ impl Journal {
         }
     }
 
-    /// Writes down that something has happened.
+    /// Writes down an event.
     #[inline]
     pub fn write(&mut self, core: CoreId, what: EventKind, time_ns: u64, subject: EventSubject) {
         self.write_all(core, [(what, time_ns, subject)]);
     }
 
-    /// Writes down several things that have happened on one core: room for all is looked
-    /// at once.
+    /// Writes down several events on one core, and checks the room for all of them at once.
     #[inline(always)]
     pub fn write_all<const N: usize>(
         &mut self,
@@ -125,14 +123,14 @@ impl Journal {
             self.lost += N as u64;
             self.is_incomplete = true;
         } else {
-            // By values, so that the words need not lie in memory for the other case.
+            // Passed by value, so that the words need not lie in memory for the other case.
             for [time_ns, job, rest] in words {
                 self.replace_oldest(time_ns, job, rest);
             }
         }
     }
 
-    /// Writes an event in place of the oldest one, if no room is left.
+    /// Writes an event in place of the oldest, if no room is left.
     #[cold]
     #[inline(never)]
     fn replace_oldest(&mut self, time_ns: u64, job: u64, rest: u64) {
@@ -159,7 +157,7 @@ impl Journal {
         }
     }
 
-    /// Records events from now on, or forgets those so far and records no more.
+    /// Starts recording events, or forgets the events so far and stops recording.
     pub fn record_events(&mut self, on: bool) {
         if on == self.is_recording() {
             return;
@@ -184,12 +182,12 @@ impl Journal {
         self.is_recording() || self.put_away.capacity() > 0
     }
 
-    /// Returns how many events are not there any more, or were not recorded.
+    /// Returns the number of events dropped or never recorded.
     pub const fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Returns the events that are left, in their order.
+    /// Returns the remaining events, in their order.
     pub fn events(&self) -> impl DoubleEndedIterator<Item = Event> + Clone {
         self.words().filter_map(|words| Event::unpack(*words))
     }
@@ -199,13 +197,13 @@ impl Journal {
         older.iter().chain(newer)
     }
 
-    /// Returns how many events were written, and so the number of the next one.
+    /// Returns the number of events written, equal to the number of the next event.
     pub const fn written(&self) -> u64 {
         self.lost + self.events.len() as u64
     }
 
-    /// Copies the words of events from number `from` on, the oldest first, and returns the number
-    /// of the first one that is left, and how many were copied.
+    /// Copies the words of events from number `from` on, oldest first. Returns the number of the
+    /// first remaining event, and the number of copied events.
     pub fn copy_from(&self, from: u64, buffer: &mut [[u64; 3]]) -> (u64, usize) {
         let first = from.max(self.lost);
         let skipped = usize::try_from(first - self.lost).unwrap_or(usize::MAX);
@@ -219,8 +217,8 @@ impl Journal {
         (first, count)
     }
 
-    /// Copies the events before number `end`, from the latest of them back, and returns
-    /// the number of the oldest one copied.
+    /// Copies the events before number `end`, from the latest backwards, and returns the number of
+    /// the oldest event copied.
     pub fn copy_back(&self, end: u64, buffer: &mut [Option<Event>]) -> u64 {
         let before = |count: usize| {
             let number = end.checked_sub(count as u64 + 1)?;
@@ -242,8 +240,9 @@ impl Journal {
         self.lost == 0
     }
 
-    /// Computes the statistics of the run, in histograms of so many bits unless others were
-    /// kept; `None` if events were neither kept nor counted.
+    /// Computes the statistics of the run, in histograms of `2^bits` buckets for each doubling, or
+    /// in the resolution of the existing tally. Returns `None` if events were neither kept nor
+    /// counted.
     #[inline(never)]
     pub fn statistics(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<RunTally> {
         let mut tally = match &self.tally {
@@ -254,19 +253,20 @@ impl Journal {
         (!self.is_incomplete).then_some(tally)
     }
 
-    /// Measures what the platform's own work has cost, core by core; `None` if events are lost.
+    /// Measures the cost of the platform's own work, core by core; `None` if events are lost.
     #[inline(never)]
     pub fn costs(&self, task_set: &TaskSet) -> Option<MeasuredCosts> {
         let measure = || MeasuredCosts::of_cores(task_set, self.events());
         self.is_whole().then(measure)
     }
 
-    /// Takes over what another cluster's journal of the same run holds, which counts its cores
-    /// from the cluster's first one. If there is no memory for both, that counts as lost.
+    /// Takes over the journal of another cluster in the same run, whose cores are numbered from the
+    /// cluster's first core. Without memory for both journals, the other's events count as lost.
     ///
-    /// Each is in the order in which its scheduler learnt of things, and stays so: of the next
-    /// events of two, the earlier one goes first. Nothing in one depends on another, since each
-    /// DAG and each core is in one cluster; so any order between them tells the same run.
+    /// Each journal is in the order in which its scheduler learnt of the events, and the merge
+    /// keeps this order: of the two next events, the earlier goes first. No event depends on an
+    /// event of another cluster, since each DAG and each core is in one cluster; so any order
+    /// between them tells the same run.
     #[inline(never)]
     pub fn absorb(&mut self, other: Self, cluster: ClusterId, first_core: u32) {
         let mut merged = Vec::new();
@@ -293,13 +293,13 @@ impl Journal {
         self.is_incomplete |= other.is_incomplete;
         match (&mut self.tally, other.tally) {
             (Some(ours), Some(theirs)) => ours.adopt(theirs, cluster),
-            // A cluster that has lost nothing has counted nothing yet.
+            // A cluster without lost events has counted nothing yet.
             (none, theirs) => *none = none.take().or(theirs),
         }
     }
 }
 
-/// Returns how many events a run can have; `None` if there is no last job.
+/// Returns the maximum number of events in a run; `None` if there is no last job.
 fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
     let of_dag = |dag: &Dag| {
         // Released, due, queued or skipped, aborted, missed, completed, signalled.
@@ -314,7 +314,7 @@ fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
     dags.try_fold(0usize, |sum, dag| sum.checked_add(of_dag(dag)?))
 }
 
-/// Makes the finest tally that takes at most `most_bytes`, or else the coarsest.
+/// Makes the finest tally with at most `most_bytes`, or else the coarsest.
 fn tally(task_set: &Arc<TaskSet>, most_bytes: usize) -> RunTally {
     let mut finest = (0..=FINEST).rev();
     let bits = finest.find(|&bits| RunTally::size_of(task_set, bits) <= most_bytes);

@@ -1,13 +1,12 @@
-//! The cost of the platform's own work in a run: two figures of its journal.
+//! The cost of the platform's own work in a run: two figures from its journal.
 //!
-//! An instance is *owed* a core as long as it should run by R5 and does not: from its
-//! readiness, or from the finish of what preempted it, until its first (or next)
-//! instruction. In theory that takes no time. On a machine it is all that the platform does
-//! between two instances: the interrupt, the scheduler's step, the journal, the hand-off to
-//! another core, the switch of contexts, the alarm of a budget. So the longest time for which
-//! one was owed a core is what each of these moments costs at most, however its parts share
-//! it. The time before a readiness is the release's *lateness*, from the nominal to the
-//! actual release.
+//! An instance is *owed* a core as long as R5 says to run it and it does not run: from its
+//! readiness, or from the finish of the preempting instance, until its first (or next) instruction.
+//! In theory this takes no time. On a machine the time covers all the platform's work between two
+//! instances: the interrupt, the scheduler's step, the journal, the hand-off to another core, the
+//! switch of contexts, the alarm of a budget. So the longest time owed is an upper bound for the
+//! cost of each such moment, however its parts share the cost. The time before a readiness is the
+//! release's *lateness*, from the nominal to the actual release.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -19,26 +18,26 @@ use crate::task_set::TaskSet;
 /// Measured costs of the platform, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeasuredCosts {
-    /// How many instances were dispatched.
+    /// The number of dispatched instances.
     pub dispatches: u64,
-    /// The longest time for which one was owed a core.
+    /// The longest time for which an instance was owed a core.
     pub owed_ns: u64,
-    /// How many jobs were released.
+    /// The number of released jobs.
     pub releases: u64,
-    /// The longest time from the nominal to the actual release.
+    /// The longest time from a nominal to an actual release.
     pub late_ns: u64,
 }
 
 impl MeasuredCosts {
-    /// Measures the events of a whole run, which are in their order, core by core:
-    /// an instance is owed a core from when it waits and the core on which it goes on has
-    /// finished another one, or has begun one that a fault ended: all of that one's time counts as
-    /// what the fault took. ([`judge_dispatch`](super::judge_dispatch) asks the rule itself,
-    /// with ten times the code: which instance was to run, whichever core took it.)
+    /// Measures the events of a whole run, given in their order, core by core. An instance is owed
+    /// a core as soon as the instance waits and its next core has finished another instance. If a
+    /// fault ended that other instance, the time since its begin counts as the cost of the fault.
+    /// ([`judge_dispatch`](super::judge_dispatch) asks the rule itself, with ten times the code:
+    /// the instance to be run, on any core.)
     pub fn of_cores(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
         let mut costs = Self::of_releases(task_set, events.clone());
         let mut waiting: Vec<(Instance, u64)> = Vec::new();
-        // When each core finished an instance last, and began one.
+        // By core: when it last finished an instance, and when it last began one.
         let mut cores: Vec<(u64, u64)> = Vec::new();
         for event in events {
             let Some(instance) = event.instance() else {
@@ -58,7 +57,7 @@ impl MeasuredCosts {
                     *begun_ns = event.time_ns;
                     let waits = waiting.iter().position(|(other, _)| *other == instance);
                     let since_ns = waits.map(|place| waiting.swap_remove(place).1.max(*free_ns));
-                    // One that was not seen to become ready, or be suspended, is owed nothing.
+                    // An instance without a known readiness or suspension is owed nothing.
                     let owed_ns = event.time_ns.saturating_sub(since_ns.unwrap_or(u64::MAX));
                     costs.owed_ns = costs.owed_ns.max(owed_ns);
                 }
@@ -78,8 +77,8 @@ impl MeasuredCosts {
             costs.releases += 1;
             let dag = task_set.dag(event.dag);
             let late_ns = event.time_ns.saturating_sub(dag.grid_ns(event.job));
-            // A sporadic job's nominal release is its signal, which the step has seen; one that
-            // was queued waited for an older job.
+            // A sporadic job's nominal release is its signal, already seen by the step; a queued
+            // job waited for an older job.
             let is_longer = late_ns > costs.late_ns && !dag.is_sporadic();
             let waited = |other: Event| {
                 other.what == EventKind::Queued && (other.dag, other.job) == (event.dag, event.job)
@@ -92,7 +91,7 @@ impl MeasuredCosts {
     }
 }
 
-/// Says it in words.
+/// Writes the costs as a phrase.
 impl fmt::Display for MeasuredCosts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {

@@ -1,18 +1,17 @@
 //! A distribution of times by its order statistics.
 //!
-//! It has its values in ascending order, each with how many there are of it. They are exact,
-//! or they were counted in *buckets*, as a [`Histogram`] does: then each
-//! stands for its bucket's, none of which is larger. Ranks are nearest ranks: the value for
-//! so many thousandths is the smallest one that at least these do not exceed.
+//! A [`Distribution`] has its values in ascending order, each with the number of its samples. The
+//! values are either exact, or come from the *buckets* of a [`Histogram`]: then each value is the
+//! upper end of a bucket, and no sample in the bucket is larger. Ranks are nearest ranks: the value
+//! for a number of thousandths is the smallest value not exceeded by at least that part of the
+//! samples.
 //!
-//! A [`Histogram`] counts values in a fixed amount of memory.
-//!
-//! Values are counted in *buckets*. Those below 2^b are exact; above, each doubling
-//! of the value is divided into 2^b buckets of equal width. So a bucket is at most
-//! 1/2^b of its values wide, and a percentile, which is given by the largest value of
-//! its bucket, is never too small and too large by that part at most: with b = 5 by
-//! 3.2 %. The count, the minimum and the maximum are exact. Values from 2^40 on, 18
-//! minutes in nanoseconds, share the last bucket, whose largest value is the maximum.
+//! A [`Histogram`] counts values in *buckets*, in a fixed amount of memory. Values below 2^b are
+//! exact; above, each doubling of the value is divided into 2^b buckets of equal width. So a bucket
+//! is at most 1/2^b of its values wide. A percentile is the largest value of its bucket: never too
+//! small, and too large by that part at most, with b = 5 by 3.2 %. The count, the minimum and the
+//! maximum are exact. Values from 2^40 on, 18 minutes in nanoseconds, share the last bucket,
+//! represented by the maximum.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -34,19 +33,19 @@ use crate::order::sorted;
 pub struct Distribution {
     count: u64,
     min_ns: Option<u64>,
-    /// Ascending.
+    /// In ascending order, each value with the number of its samples.
     values: Vec<(u64, u64)>,
 }
 
 impl Distribution {
-    /// Orders the samples.
+    /// Makes a distribution of samples, given in any order.
     pub fn new(samples_ns: impl IntoIterator<Item = u64>) -> Self {
         let samples = samples_ns.into_iter().map(|ns| (ns, 1));
         Self::counted(u64::MAX, samples.collect())
     }
 
-    /// Takes samples that were counted, in any order: values, and how many samples each
-    /// stands for, none of which is larger. The smallest of all is known besides.
+    /// Makes a distribution of counted samples, in any order: values, and the number of samples for
+    /// each, none larger than the value. `min_ns` is the smallest sample.
     ///
     /// ```
     /// use sched_dag::law::Distribution;
@@ -68,7 +67,7 @@ impl Distribution {
         }
     }
 
-    /// Adds another one's samples.
+    /// Adds the samples of another distribution.
     ///
     /// ```
     /// use sched_dag::law::Distribution;
@@ -88,8 +87,8 @@ impl Distribution {
         self.count
     }
 
-    /// Returns the values in ascending order, and how many samples each stands for. The last
-    /// one is the largest sample.
+    /// Returns the values in ascending order, each with the number of its samples. The last value
+    /// is the largest sample.
     ///
     /// ```
     /// use sched_dag::law::Distribution;
@@ -101,8 +100,8 @@ impl Distribution {
         self.values.iter().copied()
     }
 
-    /// Returns the smallest value that at least so many thousandths of the samples do not
-    /// exceed (nearest rank); 0 without samples.
+    /// Returns the smallest value not exceeded by at least so many thousandths of the samples
+    /// (nearest rank); 0 without samples.
     ///
     /// ```
     /// use sched_dag::law::Distribution;
@@ -131,7 +130,7 @@ impl Distribution {
         self.per_mille(500)
     }
 
-    /// Returns the sample that 99 per cent do not exceed, or 0.
+    /// Returns the 99th percentile, or 0.
     pub fn p99(&self) -> u64 {
         self.per_mille(990)
     }
@@ -142,10 +141,10 @@ impl Distribution {
     }
 }
 
-/// From this power of two on, values are not told apart.
+/// From this power of two on, all values share one bucket.
 const LAST_BIT: u32 = 40;
 
-/// A number of values, by buckets.
+/// A histogram: the number of values in each bucket.
 ///
 /// ```
 /// use sched_dag::law::Histogram;
@@ -168,7 +167,7 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Makes an empty one with `2^bits` buckets in each doubling.
+    /// Makes an empty histogram with `2^bits` buckets in each doubling.
     ///
     /// # Panics
     ///
@@ -183,7 +182,7 @@ impl Histogram {
         }
     }
 
-    /// Returns the bytes that one takes.
+    /// Returns the size of a histogram in bytes.
     pub const fn size_of(bits: u32) -> usize {
         size_of::<Self>() + Self::buckets(bits) * size_of::<u32>()
     }
@@ -208,7 +207,7 @@ impl Histogram {
     #[allow(clippy::cast_possible_truncation, reason = "buckets are few")]
     fn bucket(&self, value: u64) -> usize {
         let value = value.min((1 << LAST_BIT) - 1);
-        // How many bits the bucket is wide.
+        // The logarithm of the bucket's width.
         let shift = (u64::BITS - value.leading_zeros()).saturating_sub(self.bits + 1);
         ((u64::from(shift) << self.bits) + (value >> shift)) as usize
     }
@@ -221,8 +220,8 @@ impl Histogram {
         first + (1 << shift) - 1
     }
 
-    /// Returns the distribution. Its values are the largest ones of the buckets that are not
-    /// empty, the last of them the maximum.
+    /// Returns the distribution. Its values are the largest values of the non-empty buckets; the
+    /// last is the maximum.
     pub fn distribution(&self) -> Distribution {
         let counts = self.counts.iter().copied().enumerate();
         let filled = counts.filter(|(_, count)| *count > 0);
@@ -231,7 +230,7 @@ impl Histogram {
             false => (self.top(bucket).min(self.max), count.into()),
         });
         let mut distribution = Distribution::counted(self.min, values.collect());
-        // A bucket may have had more than it can count.
+        // The counters of a bucket saturate, so their sum may be too small.
         distribution.count = self.count;
         distribution
     }

@@ -1,4 +1,4 @@
-//! From events to times: the facts that the rules are about.
+//! From events to times: the facts judged by the rules.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -11,10 +11,10 @@ use crate::policy::JobOutcome;
 use crate::task_set::TaskSet;
 
 impl RunRecord {
-    /// Computes the times from a journal's events, in their order.
+    /// Computes the times from a journal's events, given in their order.
     ///
-    /// If the oldest events are lost (`is_whole` is false), it has the jobs that were
-    /// due at or after the first event that is left: of these no event is missing.
+    /// If the oldest events are lost (`is_whole` is false), the record holds only the jobs due
+    /// after the first remaining event: no event of these jobs is missing.
     ///
     /// Returns `None` if there is no memory for so many jobs.
     pub fn of_events(
@@ -49,7 +49,7 @@ impl RunRecord {
                 },
             }
         }
-        // What was in flight at the end of its DAG is cut by it.
+        // The end of a DAG cuts its jobs in flight.
         for (dag, ended_ns) in (0..).map(DagId).zip(ended_ns) {
             for job in &mut record.dags[dag.index()].jobs {
                 let was_in_flight = job.release_ns.is_some()
@@ -88,7 +88,7 @@ impl RunRecord {
         }
     }
 
-    /// Takes note that a fault has cut a job, unless it was cut before.
+    /// Records that a fault has cut a job, unless the job was cut before.
     fn note_failure(&mut self, event: &Event) {
         if let Some(job) = self.job_mut(event.dag, event.job) {
             job.has_failed |= job.cut_ns.is_none();
@@ -120,13 +120,13 @@ impl RunRecord {
     }
 }
 
-/// Returns for each DAG the numbers of the jobs of which no event is missing.
+/// Returns, for each DAG, the numbers of the jobs without missing events.
 fn jobs(
     task_set: &TaskSet,
     is_whole: bool,
     events: impl Iterator<Item = Event> + Clone,
 ) -> Vec<Range<u64>> {
-    // The first one, and the one after the last.
+    // The first number, and the number after the last.
     let mut jobs = vec![(u64::MAX, 0); task_set.dags().len()];
     let mut due_ns = vec![0; jobs.len()];
     let oldest_ns = events.clone().next().map_or(0, |event| event.time_ns);

@@ -1,10 +1,10 @@
-//! T1 to T4 for a journal: how far each core is in its list, as far as the events tell.
+//! T1 to T4 for a journal: follows each core through its list, as far as the events tell.
 //!
 //! A *place* is an entry in a lap, counted over all laps of its core's list.
 //!
-//! A machine follows its scheduler later. So a core may start an inner entry first: the scheduler
-//! had the outer one begin and give way before the core came to either. An outer entry that is ready
-//! may therefore be passed by an inner one, and starts afterwards.
+//! A machine follows its scheduler with a delay. So a core may start an inner entry first, because
+//! the scheduler let the outer entry begin and give way before the core came to either. Therefore
+//! an inner entry may pass an outer entry that is ready; the outer entry starts afterwards.
 
 use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, BTreeSet};
@@ -18,16 +18,16 @@ use crate::task_set::TaskSet;
 
 /// The lists of a cluster.
 pub(super) struct CoreLists<'m> {
-    /// The entries of each list, with the jobs of their DAGs in a lap.
+    /// The entries of each list, each with the number of its DAG's jobs in a lap.
     lists: BTreeMap<CoreId, Box<[(&'m TableEntry, u64)]>>,
-    /// By DAG, subtask and job in the lap, where the entry is.
+    /// The entry's core and index, by DAG, subtask and job in the lap.
     places: BTreeMap<(DagId, SubtaskId, u64), (CoreId, u64)>,
-    /// By DAG, the jobs in a lap.
+    /// The number of jobs in a lap, by DAG.
     jobs: BTreeMap<DagId, u64>,
 }
 
 impl<'m> CoreLists<'m> {
-    /// Finds the lists of the cluster that has these cores.
+    /// Collects the lists of the cluster with the given cores.
     pub(super) fn new(task_set: &'m TaskSet, cores: &Range<u32>, all_cores: u32) -> Self {
         let mut found = Self {
             lists: BTreeMap::new(),
@@ -55,7 +55,8 @@ impl<'m> CoreLists<'m> {
         found
     }
 
-    /// Returns the core and the place of an instance, and the depth; `None`: its DAG is in no table.
+    /// Returns the core and place of an instance, and its depth; `None` if no table contains its
+    /// DAG.
     pub(super) fn place(&self, of: Instance) -> Option<((CoreId, u64), u32)> {
         let jobs = *self.jobs.get(&of.dag)?;
         let key = (of.dag, of.subtask, of.job % jobs);
@@ -68,7 +69,7 @@ impl<'m> CoreLists<'m> {
         Some(((core, place), entry.depth))
     }
 
-    /// Returns the instance and the depth of a place; `None`: its job does not exist.
+    /// Returns the instance and depth of a place; `None` for a job that does not exist.
     fn entry(&self, core: CoreId, place: u64) -> (Option<Instance>, u32) {
         let list = &self.lists[&core];
         let length = list.len() as u64;
@@ -80,31 +81,31 @@ impl<'m> CoreLists<'m> {
     }
 }
 
-/// How far the cores of a cluster are in their lists.
+/// The progress of a cluster's cores in their lists.
 ///
-/// An entry that never starts is a void one: that a job's instances all run is the other rules'.
+/// An entry that never starts is treated as void: other rules check that all instances of a job
+/// run.
 pub(super) struct TableReplay<'m> {
     task_set: &'m TaskSet,
     lists: &'m CoreLists<'m>,
     cores: BTreeMap<CoreId, ListPosition>,
-    /// Skipped jobs, and cancelled instances, of the latest laps.
+    /// Skipped jobs and cancelled instances of the latest laps.
     voids: BTreeSet<(DagId, u64, Option<SubtaskId>)>,
     ended: BTreeSet<DagId>,
 }
 
 #[derive(Default)]
 struct ListPosition {
-    /// The first place that has neither begun nor been passed; `None`: the events that tell it are
-    /// lost.
+    /// The first place neither begun nor passed; `None` if the events to know it are lost.
     next: Option<u64>,
-    /// The depths and places that have begun and not finished.
+    /// The depths and places of entries begun and not finished.
     begun: BTreeSet<(u32, u64)>,
-    /// Of these, the ones that have given way before they started.
+    /// The subset of `begun` that gave way before starting.
     unstarted: BTreeSet<(u32, u64)>,
 }
 
 impl<'m> TableReplay<'m> {
-    /// Begins with a journal, which may be a whole one.
+    /// Begins at the start of a journal, which may be whole or not.
     pub(super) fn new(task_set: &'m TaskSet, lists: &'m CoreLists<'m>, is_whole: bool) -> Self {
         let of_core = |core: &CoreId| {
             let list = &lists.lists[core];
@@ -127,7 +128,7 @@ impl<'m> TableReplay<'m> {
         }
     }
 
-    /// Returns the instance of its table that a core should run, if that is ready or has begun.
+    /// Returns the instance of the table that a core should run, if ready or begun.
     pub(super) fn due(
         &self,
         core: CoreId,
@@ -137,7 +138,7 @@ impl<'m> TableReplay<'m> {
         let innermost = position.begun.last();
         let ahead = (position.next?..).take(self.lists.lists[&core].len());
         let ahead = ahead.map(|place| self.lists.entry(core, place));
-        // A void entry is passed where it might start.
+        // A void entry is passed at the point where it might start.
         let mut open = ahead.take_while(|(_, depth)| innermost.is_none_or(|(it, _)| it < depth));
         let starts = open.find_map(|(of, _)| of.filter(|of| !self.is_void(*of)));
         match (starts.filter(|of| is_ready(*of)), innermost) {
@@ -153,7 +154,7 @@ impl<'m> TableReplay<'m> {
         is_beyond || self.ended.contains(&of.dag) || has(None) || has(Some(of.subtask))
     }
 
-    /// Takes an event; `is_ready` is about the time before.
+    /// Judges an event; `is_ready` refers to the time before the event.
     pub(super) fn take(
         &mut self,
         event: &Event,
@@ -186,12 +187,12 @@ impl<'m> TableReplay<'m> {
         }
     }
 
-    /// Nothing of a DAG starts any more.
+    /// Ends a DAG: nothing of the DAG starts any more.
     pub(super) fn end_dag(&mut self, dag: DagId) {
         self.ended.insert(dag);
     }
 
-    /// An entry starts on its core.
+    /// Judges the start of an entry on its core.
     fn start(
         &mut self,
         event: &Event,
@@ -204,12 +205,12 @@ impl<'m> TableReplay<'m> {
         let next = position.next.unwrap_or(place);
         position.next = Some(next.max(place.saturating_add(1)));
         let is_late = place < next && !position.unstarted.remove(&of);
-        // More than a lap has entries of all depths that one lap has.
+        // One lap back is enough: a lap has entries of all depths.
         let passed = next.max(place.saturating_sub(list.len() as u64))..place;
         let mut first = is_late.then_some(next.saturating_sub(1));
         for before in passed {
             let (instance, outer) = self.lists.entry(core, before);
-            // A void entry is passed where it might start (T2).
+            // A void entry is passed at the point where it might start (T2).
             let open = position.begun.last().filter(|(inner, _)| *inner >= outer);
             first = first.or(open.map(|of| of.1));
             if outer < depth && instance.is_some_and(&is_ready) {
@@ -224,8 +225,8 @@ impl<'m> TableReplay<'m> {
         }
     }
 
-    /// Returns the breach that an instance runs on a core where an entry has begun that goes first:
-    /// any but itself if it is as deep.
+    /// Returns the breach if an instance runs on a core where another entry has begun that goes
+    /// first: any other entry at least as deep.
     fn innermost_but(&self, event: &Event, of: (u32, u64)) -> Option<Violation> {
         let position = self.cores.get(&event.core)?;
         let goes_first = |other: &&(u32, u64)| {

@@ -1,18 +1,18 @@
-//! Statistics of a run of any length, in memory that is taken before it begins.
+//! Statistics of a run of any length, in memory allocated before the run begins.
 //!
-//! A [`RunTally`] takes the events of a journal in their order, each once, and forgets
-//! each job with its end. It keeps a [`Histogram`] of each time that is asked
-//! about, and the times of the jobs in flight.
+//! A [`RunTally`] takes each event of a journal once, in order, and forgets each job at its end.
+//! The tally keeps a [`Histogram`] of each of the following times, and the times of the jobs in
+//! flight.
 //!
-//! - *Response time*, of a DAG's jobs: from the nominal release to the last finish. If a
-//!   DAG has several sinks, also of each sink's instances, to its finish.
+//! - *Response time*, of a DAG's jobs: from the nominal release to the last finish. If a DAG has
+//!   several sinks, also of each sink's instances, to the instance's finish.
 //! - *Release jitter*, of a DAG's jobs: from the nominal release to the release.
-//! - *Join latency*, of a subtask's instances: from the last predecessor's finish to
-//!   the start. A source has none.
-//! - *Execution time*, of a subtask's instances: from the start to the finish, without
-//!   the time for which it was suspended. Those above the WCET are counted, too.
+//! - *Join latency*, of a subtask's instances: from the last predecessor's finish to the start. A
+//!   source has none.
+//! - *Execution time*, of a subtask's instances: from the start to the finish, without suspensions
+//!   and waits. Execution times above the WCET are counted, too.
 //!
-//! Only complete jobs count in a DAG's response time: none that was cut.
+//! Only complete jobs count in a DAG's response time, and no jobs that were cut.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -38,13 +38,13 @@ pub struct DagTally {
     pub response_time: Histogram,
     /// From the nominal release of a job to its release.
     pub release_jitter: Histogram,
-    /// The longest response time, and the job that had it.
+    /// The longest response time, and the number of its job.
     longest: (u64, u64),
-    /// The nominal release of the sporadic job that is being released.
+    /// The nominal release of the sporadic job being released.
     due_ns: u64,
-    /// The jobs in flight, each at the first free place from its number's on.
+    /// The jobs in flight, each in the first free place at or after the place of its number.
     open: Box<[JobInFlight]>,
-    /// The instances of these jobs.
+    /// The instances of the jobs in flight.
     instances: Box<[InstanceTimes]>,
 }
 
@@ -53,17 +53,17 @@ pub struct DagTally {
 pub struct SubtaskTally {
     /// From the last predecessor's finish to the start.
     pub join_latency: Histogram,
-    /// From the start to the finish, without the time of suspensions.
+    /// From the start to the finish, without suspensions and waits.
     pub execution_time: Histogram,
-    /// How many of these are above the WCET.
+    /// The number of execution times above the WCET.
     pub beyond_wcet: u64,
-    /// From the nominal release to the finish, of each of several sinks.
+    /// From the nominal release to the finish, for a sink of a DAG with several sinks.
     pub response_time: Option<Histogram>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct JobInFlight {
-    /// Its number and 1 more; 0: the place is free.
+    /// The job's number plus 1, or 0 if the place is free.
     number: u64,
     release_ns: u64,
     last_finish_ns: u64,
@@ -72,15 +72,15 @@ struct JobInFlight {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct InstanceTimes {
-    /// When it started or was resumed.
+    /// When the instance started or was resumed.
     since_ns: u64,
     executed_ns: u64,
-    /// The latest finish of its predecessors.
+    /// The latest finish of the predecessors.
     join_ns: u64,
 }
 
 impl RunTally {
-    /// Makes an empty one whose histograms have `2^bits` buckets a doubling.
+    /// Makes an empty tally with histograms of `2^bits` buckets for each doubling.
     pub fn new(task_set: &Arc<TaskSet>, bits: u32) -> Self {
         let of_dag = |dag: &Dag| DagTally {
             response_time: Histogram::new(bits),
@@ -111,7 +111,7 @@ impl RunTally {
         }
     }
 
-    /// Returns the bytes that one takes.
+    /// Returns the size of a tally in bytes.
     pub fn size_of(task_set: &TaskSet, bits: u32) -> usize {
         let in_flight = |dag: &Dag| {
             let job = size_of::<JobInFlight>() + dag.subtasks().len() * size_of::<InstanceTimes>();
@@ -141,7 +141,7 @@ impl RunTally {
         &self.subtasks[vertex.index()]
     }
 
-    /// Takes over what another one says of the DAGs of a cluster.
+    /// Takes over another tally's statistics for the DAGs of a cluster.
     pub(crate) fn adopt(&mut self, other: Self, cluster: ClusterId) {
         let of_dags = self.dags.iter_mut().zip(other.dags);
         let mut subtasks = self.subtasks.iter_mut().zip(other.subtasks);
@@ -157,15 +157,14 @@ impl RunTally {
         }
     }
 
-    /// Forgets the jobs in flight, because events of them are missing.
+    /// Forgets the jobs in flight, because events of these jobs are missing.
     pub fn skip(&mut self) {
         for dag in &mut self.dags {
             dag.open.fill(JobInFlight::default());
         }
     }
 
-    /// Takes the next event. Those of a job whose release it has not seen are passed
-    /// over.
+    /// Takes the next event. Events of a job without a known release are ignored.
     pub fn add(&mut self, event: &Event) {
         let model = self.task_set.dag(event.dag);
         let dag = &mut self.dags[event.dag.index()];
@@ -179,7 +178,7 @@ impl RunTally {
                 dag.open_job(event, release_ns, model.subtasks().len());
                 return;
             }
-            // Times of a job that was cut say nothing about those of whole ones.
+            // Times of a job that was cut say nothing about the times of whole jobs.
             EventKind::DagEnded => {
                 for job in &mut dag.open {
                     job.is_cut = true;
@@ -210,7 +209,7 @@ impl DagTally {
         self.longest
     }
 
-    /// Returns where a job in flight is.
+    /// Returns the place of a job in flight.
     fn slot(&self, job: u64) -> Option<usize> {
         let places = self.open.len();
         // Less than the number of places.
@@ -223,7 +222,7 @@ impl DagTally {
         let places = self.open.len();
         let first = usize::try_from(event.job % places as u64).unwrap_or(0);
         let mut order = (first..places).chain(0..first);
-        // There is a free place, for no more are in flight.
+        // There is always a free place, for no more jobs are in flight than places exist.
         let free = order.find(|&place| self.open[place].number == 0);
         let place = free.unwrap_or(first);
         self.open[place] = JobInFlight {
@@ -281,7 +280,8 @@ impl DagTally {
                 statistics.execution_time.add(executed_ns);
                 let wcet_ns = model.subtask(instance.subtask).wcet_ns();
                 statistics.beyond_wcet += u64::from(wcet_ns.is_some_and(|wcet| executed_ns > wcet));
-                // The latest of its predecessors counts, and which that is the next finish may change.
+                // The latest predecessor counts; the next finish may make another predecessor the
+                // latest.
                 for next in model.successors(instance.subtask) {
                     let join_ns = &mut instances[next.index()].join_ns;
                     *join_ns = event.time_ns.max(*join_ns);

@@ -1,9 +1,9 @@
-//! The checks of what is stated of DAGs and subtasks by itself: periods, deadlines, WCETs,
-//! counts, priorities, clusters, names.
+//! Checks the attributes of DAGs and subtasks one by one: periods, deadlines, WCETs, counts,
+//! priorities, clusters, names.
 //!
-//! Every sum and product is checked, so that a time or a count that does not
-//! fit is a fault and never wraps. A name is for people, so it may be left out; given twice
-//! within one DAG it would make every message about it ambiguous.
+//! Every sum and product is checked, so that an overflowing time or count is a fault and never
+//! wraps. Names are for people, so a name may be left out. Given twice within one DAG, a name would
+//! make every message about its subtask ambiguous.
 
 use alloc::vec::Vec;
 
@@ -16,7 +16,7 @@ use crate::order::sorted;
 use crate::policy::{OnFault, Priority};
 use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
-/// Checks the attributes of the whole commit; `tables` has the table of each DAG.
+/// Checks the attributes of the whole commit; `tables` has each DAG's table.
 pub(super) fn check(
     options: &CommitOptions,
     tables: &[Option<usize>],
@@ -57,7 +57,7 @@ fn check_instances(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     if instances <= u128::from(options.instance_limit) {
         return;
     }
-    // The sum is too large, which is no single DAG's fault; a change helps most in the largest one.
+    // The sum is too large, through no single DAG's fault; a change helps most in the largest DAG.
     if let Some(most) = (0..specs.len()).max_by_key(|&dag| of(specs[dag])) {
         findings
             .findings_of(most)
@@ -99,7 +99,7 @@ fn check_counts(page: &mut DagFindings<'_, '_>) {
 #[inline(never)]
 fn check_times(page: &mut DagFindings<'_, '_>) {
     let spec = page.spec;
-    // An app that registers subtasks states both with them.
+    // An app that registers subtasks states period and deadline with them.
     let has_subtasks = !spec.subtasks.is_empty();
     match spec.period_ns {
         None if has_subtasks => page.fault(|dag| DagFault::MissingPeriod { dag }),
@@ -133,8 +133,8 @@ fn check_times(page: &mut DagFindings<'_, '_>) {
     }
 }
 
-/// Returns the absolute deadline of a job, or `None` if not even the instant
-/// after it, at which a miss is noticed, is a time.
+/// Returns the absolute deadline of a job, or `None` if the next nanosecond, when a miss is
+/// noticed, exceeds 64 bits.
 fn deadline_of(spec: &DagSpec, job: u64) -> Option<u64> {
     let since_offset_ns = spec.period_ns.unwrap_or(0).checked_mul(job)?;
     let release_ns = spec.offset_ns.checked_add(since_offset_ns)?;
@@ -165,7 +165,7 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
             }
             _ => {}
         }
-        // An observed WCET has a margin, which may well be beyond the budget.
+        // An observed WCET has a margin, and the sum may well be beyond the budget.
         if let (Some(wcet_ns), None) = (stated.wcet_ns, stated.wcet_margin_percent)
             && let Some(budget_ns) = stated.budget_ns.filter(|&budget_ns| budget_ns < wcet_ns)
         {
@@ -202,7 +202,7 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
     }
 }
 
-/// Checks the WCETs of a subtask's segments: all are given or none is, and each is above 0.
+/// Checks the WCETs of a subtask's segments: all or none must be given, and each must be above 0.
 fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
     let stated = &page.spec.subtasks[index];
     let count = stated.waits.len();
@@ -222,7 +222,7 @@ fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
     );
     let first_ns = later_ns.and_then(|later_ns| stated.wcet_ns?.checked_sub(later_ns));
     let are_sound = match count {
-        // Of the sum alone, as observed, nothing follows for the segments.
+        // A sum alone, as observed, says nothing about single segments.
         0 => true,
         _ => count == stated.waits.len() && first_ns > Some(0) && given.min() > Some(0),
     };
@@ -232,8 +232,7 @@ fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
     }
 }
 
-/// Checks what a subtask states of its own deadline. That it is a sink's is checked with
-/// the graph.
+/// Checks a subtask's own deadline. Whether the subtask is a sink is checked with the graph.
 fn check_sink_deadline(page: &mut DagFindings<'_, '_>, index: usize) {
     let spec = page.spec;
     let Some(relative_deadline_ns) = spec.subtasks[index].relative_deadline_ns else {
@@ -241,7 +240,7 @@ fn check_sink_deadline(page: &mut DagFindings<'_, '_>, index: usize) {
     };
     let sink = page.subtask(index);
     let of_dag_ns = spec.relative_deadline_ns;
-    // A DAG's deadline of 0 is told once, by itself, and not again for each sink.
+    // A DAG's deadline of 0 is reported once, and not again for each sink.
     if relative_deadline_ns == 0 && of_dag_ns != Some(0) {
         page.fault(|dag| DagFault::ZeroSinkDeadline { dag, sink });
     } else if let Some(of_dag_ns @ 1..) = of_dag_ns
@@ -260,7 +259,7 @@ fn check_priorities_given(page: &mut DagFindings<'_, '_>) {
     let subtasks = &page.spec.subtasks;
     let without = (0..subtasks.len()).filter(|&index| subtasks[index].priority.is_none());
     let without: Vec<_> = without.map(|index| page.subtask(index)).collect();
-    // None at all is a choice: the commit derives priorities then.
+    // No priority at all is a choice: the commit then derives priorities.
     if !without.is_empty() && without.len() < subtasks.len() {
         page.fault(|dag| DagFault::PrioritiesPartlyGiven { dag, without });
     }
@@ -289,7 +288,7 @@ fn warn_of_equal_priorities(findings: &mut VerifyFindings<'_>) {
     }
 }
 
-/// Checks the clusters' cores, and the one that each DAG is in.
+/// Checks the clusters' cores, and the cluster of each DAG.
 #[inline(never)]
 fn check_clusters(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     let sizes = options.clusters.sizes();
@@ -320,21 +319,21 @@ fn check_clusters(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     }
 }
 
-/// Returns how many cores the cluster has that a DAG states.
+/// Returns the number of cores in a DAG's cluster.
 fn cores_of(options: &CommitOptions, spec: &DagSpec) -> u32 {
     let sizes = options.clusters.sizes();
     let cluster = spec.cluster.unwrap_or_default();
     match sizes.is_empty() {
         true => options.cores,
-        // A cluster that there is not is a fault of its own.
+        // A cluster that does not exist is a fault of its own.
         false => sizes.get(cluster.index()).copied().unwrap_or(u32::MAX),
     }
 }
 
-/// Checks the cores that a DAG states.
+/// Checks the cores stated by a DAG.
 fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     let cores = cores_of(options, page.spec);
-    // The scheduler has a line for each, and two more, in 16 bits.
+    // The scheduler has a line for each core, and two more, in 16 bits.
     let most = cores.min(0xfffe);
     let largest = page.spec.affinity.iter().copied().max();
     if let Some(core) = largest.filter(|&core| core >= most) {
@@ -342,8 +341,8 @@ fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     }
 }
 
-/// Returns the cores that a DAG has an affinity to, each once, ascending; none if these are all of
-/// its cluster.
+/// Returns the cores of a DAG's affinity without duplicates, in ascending order. Returns none if
+/// they are all cores of the cluster.
 pub(super) fn affinity(options: &CommitOptions, spec: &DagSpec) -> Vec<u32> {
     let mut cores = sorted(&spec.affinity);
     cores.dedup();
@@ -353,7 +352,8 @@ pub(super) fn affinity(options: &CommitOptions, spec: &DagSpec) -> Vec<u32> {
     cores
 }
 
-/// Checks that DAGs of a cluster without a table execute on the same cores, or on others.
+/// Checks that any two DAGs without a table in one cluster execute on the same cores, or share no
+/// core.
 fn check_affinities(
     options: &CommitOptions,
     tables: &[Option<usize>],
@@ -363,7 +363,7 @@ fn check_affinities(
     if specs.iter().all(|spec| spec.affinity.is_empty()) {
         return;
     }
-    // Each affinity of a cluster, and the first DAG that has it.
+    // Each affinity of a cluster, and the first DAG with this affinity.
     let mut groups: Vec<(ClusterId, Vec<u32>, usize)> = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
         if tables[dag].is_some() {
@@ -374,7 +374,7 @@ fn check_affinities(
         if others.clone().any(|(_, cores, _)| *cores == own) {
             continue;
         }
-        // None means all.
+        // An empty affinity means all cores.
         let has = |cores: &[u32], core| cores.is_empty() || cores.contains(core);
         let shared = others.find_map(|(_, cores, other)| {
             let mut shared = own.iter().chain(cores);
@@ -412,14 +412,15 @@ fn check_names(findings: &mut VerifyFindings<'_>) {
     }
 }
 
-/// Returns each position whose name, unless empty, stands at an earlier one, after that one.
+/// Returns the positions of repeated non-empty names, each after the position of the first such
+/// name.
 fn duplicates<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> Vec<(usize, usize)> {
     let mut interner = Interner::new(names.len());
     let mut first_positions: Vec<usize> = Vec::with_capacity(names.len());
     let mut found = Vec::new();
     for (position, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
         let number = interner.intern(name);
-        // New names are numbered in their order, so an unknown number is the next one in the list.
+        // New names are numbered in order, so an unknown number is the next index of the list.
         match first_positions.get(number) {
             Some(&first) => found.push((first, position)),
             None => first_positions.push(position),

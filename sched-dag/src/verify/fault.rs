@@ -1,10 +1,9 @@
-//! Reasons why a commit is impossible, one row a kind; and oddities that its author may not
-//! have meant, and that prevent nothing.
+//! Reasons for the rejection of a commit, one row per kind; and oddities that prevent nothing, but
+//! that the author may not have intended.
 //!
-//! A fault names everything that a message or a tool needs: the DAG, the
-//! subtasks, the topic, the numbers. Its text states the fact, the offender and
-//! the remedy in one line. Times stand in it as a `Duration` prints them, in the
-//! unit that a person reads and with every digit: `20ms`, `6.000001ms`.
+//! A fault names everything needed by a message or a tool: the DAG, the subtasks, the topic, the
+//! numbers. Its text states the fact, the offender and the remedy in one line. Times are printed
+//! like a `Duration`, in a readable unit and with every digit: `20ms`, `6.000001ms`.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -23,8 +22,8 @@ use crate::{MAX_ARITY, worded};
 worded! {
     /// One reason why DAGs cannot be scheduled as described.
     ///
-    /// In every variant `dag` is the DAG and `subtask` the subtask at fault;
-    /// `meant` is the topic that was probably meant.
+    /// In every variant, `dag` is the DAG and `subtask` the subtask at fault; `meant` is the topic
+    /// probably meant.
     pub enum DagFault {
         /// There is no DAG to schedule.
         NoDags = "no_dags",
@@ -34,13 +33,13 @@ worded! {
         /// A cluster of 0 cores.
         ClusterWithoutCores { cluster: ClusterId } = "cluster_without_cores",
             "cluster {} has no cores; give it one", cluster.0;
-        /// The clusters have more cores than there are.
+        /// The clusters have more cores than the machine.
         ClustersBeyondCores { wanted: u64, cores: u32 } = "clusters_beyond_cores",
             "the clusters have {wanted} cores, and the machine has {cores}; give them fewer";
         /// The cores are divided, and a DAG states no cluster.
         NoCluster { dag: DagLabel, clusters: usize } = "no_cluster",
             "{dag} is in no cluster, and the cores are divided; {}", one_up_to(*clusters);
-        /// There is no such cluster. If the cores are not divided, there are 0.
+        /// The stated cluster does not exist. If the cores are not divided, there are 0 clusters.
         UnknownCluster { dag: DagLabel, cluster: ClusterId, clusters: usize } = "unknown_cluster",
             "{dag} is in cluster {}, and {}", cluster.0, undivided(*clusters);
         /// More DAGs than a `u32` counts.
@@ -52,8 +51,8 @@ worded! {
         /// More subtasks than a `u32` counts.
         TooManySubtasks { dag: DagLabel, count: usize } = "too_many_subtasks",
             "{dag} has {count} subtasks, more than {}; split it", u32::MAX;
-        /// The jobs in flight of all DAGs have more instances than the options
-        /// allow; `dag` is the one that has most.
+        /// The jobs in flight of all DAGs have more instances than the options allow; `dag` has the
+        /// most.
         TooManyInstances { dag: DagLabel, in_flight: u64, instances: u128, limit: u32 } =
             "too_many_instances",
             "the jobs in flight need {instances} instances, more than the limit of {limit}, and \
@@ -64,8 +63,8 @@ worded! {
             "duplicate_subtask",
             "{dag} has two subtasks named `{}` (registered as number {} and {}); rename one",
             first.name, first.id.0, second.id.0;
-        /// A cycle of two or more subtasks, from the smallest index on; the last
-        /// one precedes the first.
+        /// A cycle of two or more subtasks, from the smallest index on; the last subtask precedes
+        /// the first.
         Cycle { dag: DagLabel, hops: Vec<SubtaskLabel> } = "cycle",
             "{dag} has a cycle: {}; remove one of these edges", ring(hops);
         /// A subtask that precedes itself, by a topic or by an edge without one.
@@ -84,37 +83,37 @@ worded! {
         /// Every subtask has a predecessor or an input.
         NoSource { dag: DagLabel } = "no_source",
             "{dag} has no source: every subtask has an input; register a periodic subtask";
-        /// Several subtasks without predecessor where the policy wants one.
+        /// Several subtasks without predecessor, where the policy allows only a single source.
         SeveralSources { dag: DagLabel, sources: Vec<SubtaskLabel> } = "several_sources",
             "{dag} has {} sources: {}; keep one, or choose a construction policy with several",
             sources.len(), list(sources);
         /// Every subtask has a successor.
         NoSink { dag: DagLabel } = "no_sink",
             "{dag} has no sink: every subtask has a successor; register a sink subtask";
-        /// Several subtasks without successor where the policy wants one.
+        /// Several subtasks without successor, where the policy allows only a single sink.
         SeveralSinks { dag: DagLabel, sinks: Vec<SubtaskLabel> } = "several_sinks",
             "{dag} has {} sinks: {}; keep one, or choose a construction policy with several",
             sinks.len(), list(sinks);
-        /// A topic that is written and never read.
+        /// A topic with a writer and no reader.
         UnreadTopic {
             dag: DagLabel, topic: String, writer: SubtaskLabel, meant: Option<String>
         } = "unread_topic",
             "{writer} of {dag} writes topic `{topic}`, which no subtask reads; {}register a reader \
              or drop the output", question(meant.as_ref());
-        /// A topic that is read and never written.
+        /// A topic with a reader and no writer.
         UnwrittenTopic {
             dag: DagLabel, topic: String, reader: SubtaskLabel, meant: Option<String>
         } = "unwritten_topic",
             "{reader} of {dag} reads topic `{topic}`, which no subtask writes; {}register a writer \
              or drop the input", question(meant.as_ref());
-        /// A reader that expects another type than the writer writes.
+        /// A reader expects another type than the writer's.
         TypeMismatch {
             dag: DagLabel, topic: String, writer: SubtaskLabel, written: &'static str,
             reader: SubtaskLabel, read: &'static str
         } = "type_mismatch",
             "topic `{topic}` of {dag} is written as `{written}` by {writer} and read as `{read}` \
              by {reader}; make both the same type";
-        /// Several writers of one topic where the policy wants one.
+        /// Several writers of one topic, where the policy allows only a single writer.
         SeveralWriters { dag: DagLabel, topic: String, writers: Vec<SubtaskLabel> } =
             "several_writers",
             "topic `{topic}` of {dag} has {} writers: {}; give each a topic of its own",
@@ -157,7 +156,7 @@ worded! {
         /// A sink with a relative deadline of 0.
         ZeroSinkDeadline { dag: DagLabel, sink: SubtaskLabel } = "zero_sink_deadline",
             "{sink} of {dag} has a relative deadline of 0; give it at least 1 ns";
-        /// A sink whose relative deadline is longer than its DAG's.
+        /// A sink with a longer relative deadline than its DAG.
         SinkDeadlineBeyondDag {
             dag: DagLabel, sink: SubtaskLabel, relative_deadline_ns: u64, of_dag_ns: u64
         } = "sink_deadline_beyond_dag",
@@ -168,31 +167,31 @@ worded! {
             "deadline_of_no_sink",
             "{subtask} of {dag} has a relative deadline and is no sink, for {successor} follows \
              it; give the deadline to a sink";
-        /// A subtask that alone cannot meet the deadline.
+        /// A subtask that cannot meet the deadline even alone.
         WcetExceedsDeadline {
             dag: DagLabel, subtask: SubtaskLabel, wcet_ns: u64, relative_deadline_ns: u64
         } = "wcet_exceeds_deadline",
             "{subtask} of {dag} has a WCET of {:?}, longer than the relative deadline of {:?}; \
              shorten it or extend the deadline", ns(*wcet_ns), ns(*relative_deadline_ns);
-        /// A subtask that its budget would end within its stated WCET.
+        /// A subtask with a budget smaller than its stated WCET: the budget would end it too early.
         WcetExceedsBudget {
             dag: DagLabel, subtask: SubtaskLabel, wcet_ns: u64, budget_ns: u64
         } = "wcet_exceeds_budget",
             "{subtask} of {dag} has a WCET of {:?}, longer than its budget of {:?}, beyond which it \
              is ended; give it a longer budget, or correct the WCET", ns(*wcet_ns), ns(*budget_ns);
-        /// A subtask that waits, some of whose segments have a WCET, or one of 0.
+        /// A waiting subtask where only some segments have a WCET, or a segment has a WCET of 0.
         SegmentsPartlyGiven { dag: DagLabel, subtask: SubtaskLabel } = "segments_partly_given",
             "{subtask} of {dag} waits, and not each of its segments has a WCET above 0; give one to \
              each, or to none";
-        /// More waits of a subtask than are told apart.
+        /// A subtask with more waits than can be told apart.
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
             "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
         /// A list of a core cannot be enforced; `list` names the core.
         CoreList { list: String, why: ListFault } = "core_list", "the list of {list}: {why}";
-        /// A DAG with an affinity to a core which its cluster does not have.
+        /// A DAG with an affinity to a core outside its cluster.
         AffinityOutOfRange { dag: DagLabel, core: u32, cores: u32 } = "affinity_out_of_range",
             "{dag} has an affinity to core {core}, and {}", counted_from_0(*cores);
-        /// Two DAGs of a cluster share some of their cores, and not all.
+        /// Two DAGs of a cluster share some of their cores, but not all.
         AffinitiesOverlap { dag: DagLabel, other: DagLabel, core: u32 } = "affinities_overlap",
             "{other} and {dag} share core {core} and not all others (without an affinity a DAG has \
              every core); give both the same affinity, or no core in common";
@@ -207,23 +206,23 @@ worded! {
         /// A DAG with room for 0 jobs in flight.
         ZeroInFlight { dag: DagLabel } = "zero_in_flight",
             "{dag} has room for 0 jobs in flight; give at least 1, or leave it out";
-        /// A DAG drops jobs at faults, at most 0 times.
+        /// A DAG drops jobs at faults, but at most 0 times.
         ZeroFaults { dag: DagLabel } = "zero_faults",
             "{dag} survives 0 faults; let it survive at least 1, or end it by a fault";
         /// A DAG survives faults within a window of 0 jobs.
         ZeroWindow { dag: DagLabel } = "zero_window",
             "{dag} survives faults within a window of 0 jobs; give the window at least 1";
-        /// A time that 64 bits of nanoseconds do not hold.
+        /// A time too large for 64 bits of nanoseconds.
         TimeOverflow { dag: DagLabel, time: OverflowingTime } = "time_overflow",
             "{} of {dag} exceeds {} ns, the last time there is; {}",
             time.noun_and_remedy()[0], u64::MAX, time.noun_and_remedy()[1];
-        /// Under static priority: some subtasks of a DAG have a priority, these not.
+        /// Under static priority: some subtasks of a DAG have a priority, these do not.
         PrioritiesPartlyGiven { dag: DagLabel, without: Vec<SubtaskLabel> } =
             "priorities_partly_given",
             "{dag} has subtasks with and {} without priority: {}; give each a priority, or none",
             without.len(), list(without);
-        /// Priorities were to be derived below those given elsewhere, and the
-        /// numbers up to `u32::MAX` do not suffice.
+        /// Derived priorities must come after the priorities given in other DAGs, but the numbers
+        /// up to `u32::MAX` do not suffice.
         PrioritiesExhausted { dag: DagLabel } = "priorities_exhausted",
             "the priorities of {dag}, which follow those given to other dags, exceed {}; give \
              smaller numbers there", u32::MAX;
@@ -233,7 +232,7 @@ worded! {
         /// A state that no subtask uses.
         UnusedState { dag: DagLabel, state: String } = "unused_state",
             "no subtask uses state `{state}` of {dag}; register a user or drop the state";
-        /// A state that is read and never updated.
+        /// A state with readers and no updater.
         StateNeverUpdated { dag: DagLabel, state: String, reader: SubtaskLabel } =
             "state_never_updated",
             "{reader} of {dag} reads state `{state}`, which no subtask updates; register an \
@@ -248,19 +247,19 @@ worded! {
         } = "state_over_jobs",
             "{dag} allows {in_flight} jobs in flight, and state `{state}` is shared by {}; allow 1 \
              job in flight, or let one subtask own the state", list(users);
-        /// The latest value of a topic that no subtask writes.
+        /// The latest value of a topic without a writer.
         LatestUnwritten { dag: DagLabel, topic: String, meant: Option<String> } =
             "latest_unwritten",
             "the latest value of topic `{topic}` of {dag} is asked for, and no subtask writes that \
              topic; {}register a writer or correct the name", question(meant.as_ref());
-        /// The latest value of a topic is read as another type than is written.
+        /// The latest value of a topic is read as a type other than the written type.
         LatestTypeMismatch {
             dag: DagLabel, topic: String, writer: SubtaskLabel, written: &'static str,
             read: &'static str
         } = "latest_type_mismatch",
             "topic `{topic}` of {dag} is written as `{written}` by {writer} and its latest value \
              read as `{read}`; make both the same type";
-        /// The latest value of a topic, which no subtask reads.
+        /// The latest value of a topic without any reader.
         LatestUnread { dag: DagLabel, topic: String } = "latest_unread",
             "the latest value of topic `{topic}` of {dag} is used by no subtask; let one sample it \
              or drop it";
@@ -277,16 +276,16 @@ worded! {
 worded! {
     /// One oddity that does not prevent scheduling.
     pub enum Warning {
-        /// A WCET of 0, on which no bound can rest.
+        /// A WCET of 0; no bound can rest on it.
         ZeroWcet { dag: DagLabel, subtask: SubtaskLabel } = "zero_wcet",
             "{subtask} of {dag} has a WCET of 0 ns; measure it, or leave the WCET out";
-        /// Under static priority: subtasks with the same priority, so that the
-        /// order of registration decides.
+        /// Under static priority: subtasks with the same priority. The order of registration
+        /// decides.
         EqualPriorities { priority: Priority, subtasks: Vec<(DagLabel, SubtaskLabel)> } =
             "equal_priorities",
             "priority {} is given {} times: to {}; the order of registration decides between them",
             priority.0, subtasks.len(), list(&members(subtasks));
-        /// A sink writes a topic that no subtask reads.
+        /// A sink writes a topic without a reader.
         UnreadSinkValue {
             dag: DagLabel,
             subtask: SubtaskLabel,
@@ -299,17 +298,16 @@ worded! {
         DuplicateDagName { first: DagLabel, second: DagLabel } = "duplicate_dag_name",
             "two DAGs are named `{}` (number {} and {}); rename one",
             first.name, first.id.0, second.id.0;
-        /// The analysis is certain that the DAG cannot keep its deadlines when
-        /// every instance takes its WCET; `reason` says why, with the remedy. Not
-        /// from [`verify`](crate::verify()), which does not analyse, but from a
-        /// caller that does.
+        /// The analysis is certain that the DAG cannot keep its deadlines when every instance takes
+        /// its WCET; `reason` says why, with the remedy. Comes from callers with an analysis, not
+        /// from [`verify`](crate::verify()), which has none.
         CertainMiss { dag: DagLabel, reason: String } = "certain_miss",
             "{dag} cannot keep its deadlines at its WCETs: {reason}";
     }
 }
 
 texts! {
-    /// Why a list of a core cannot be enforced. `word` is a subtask, as in lists.
+    /// The reason why a list of a core cannot be enforced. `word` is a subtask, as in lists.
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub enum ListFault {
         /// The text is no list.
@@ -323,7 +321,7 @@ texts! {
         /// Several subtasks may be meant.
         AmbiguousWord { word: String } =
             "`{word}` may be several subtasks; name one by numbers, as 0.1, or rename one";
-        /// Another list is of the same core.
+        /// Another list is for the same core.
         CoreTwice = "another one is of that core; join both";
         /// The core is not in the DAG's cluster.
         OutOfRange { dag: DagLabel, first: u32, cores: u32 } =
@@ -347,19 +345,19 @@ texts! {
         TooManyEntries { count: u64 } =
             "a lap of its DAGs has {count} entries, more than {ENTRY_LIMIT}; choose periods on a \
              grid";
-        /// An entry is of no job of the lap.
+        /// An entry names no job of the lap.
         UnknownJob { word: String, job: i64, jobs: i64 } =
             "`{word}#{job}` is of no job, as a lap has {jobs}, counted from 0; correct the number";
-        /// An entry stands there a second time.
+        /// An entry appears a second time.
         EntryTwice { word: String, job: i64 } =
             "`{word}#{job}` stands twice in a lap; leave one out, or correct a number";
         /// A subtask has no entry for a job.
         EntryMissing { dag: DagLabel, word: String, job: usize } =
             "`{word}#{job}` is in none; add it, or leave all of {dag} out of the lists";
-        /// Entries of a subtask are on several cores, without a number.
+        /// Entries of a subtask without a job number are on several cores.
         NotNumbered { word: String } =
             "`{word}` stands on several cores; number its jobs, as in `{word}#1`";
-        /// Some entries have times, and others not.
+        /// Some entries have times, others have none.
         PartlyTimed =
             "some of its entries have times within the lap, and others not; give times to all, or \
              to none";
@@ -370,7 +368,7 @@ texts! {
     }
 }
 
-/// Which side of a subtask a topic stands on.
+/// The side of a subtask where a topic is connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TopicSide {
     /// The subtask reads the topic.

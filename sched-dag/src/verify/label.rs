@@ -1,7 +1,7 @@
-//! How messages name DAGs and subtasks.
+//! The names of DAGs and subtasks in messages.
 //!
-//! A *label* is an id together with the name that the app gave. Its text is
-//! "subtask `fuse`", or "subtask 3" if the app gave no name.
+//! A *label* is an id together with the name given by the app. Its text is "subtask `fuse`", or
+//! "subtask 3" if the app gave no name.
 
 use alloc::format;
 use alloc::string::String;
@@ -13,7 +13,7 @@ use crate::ids::{DagId, SubtaskId, named};
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 
-/// A DAG as messages name it.
+/// A DAG, as messages name it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DagLabel {
     /// The DAG.
@@ -22,7 +22,7 @@ pub struct DagLabel {
     pub name: String,
 }
 
-/// A subtask as messages name it.
+/// A subtask, as messages name it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SubtaskLabel {
     /// The subtask.
@@ -41,7 +41,7 @@ impl DagLabel {
 }
 
 impl TaskSet {
-    /// Returns a DAG as messages name it.
+    /// Returns the label of a DAG for messages.
     ///
     /// # Panics
     ///
@@ -51,7 +51,7 @@ impl TaskSet {
         DagLabel { id, name }
     }
 
-    /// Returns a subtask as messages name it.
+    /// Returns the label of a subtask for messages.
     ///
     /// # Panics
     ///
@@ -71,8 +71,8 @@ impl SubtaskLabel {
     }
 }
 
-/// Returns an index as an id's number. A count that does not fit is a fault of
-/// its own, so a label with `u32::MAX` never stands alone.
+/// Returns an index as an id's number. A count beyond `u32` is a separate fault, so a label with
+/// `u32::MAX` never appears alone.
 fn saturating_u32(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(u32::MAX)
 }
@@ -89,15 +89,15 @@ impl fmt::Display for SubtaskLabel {
     }
 }
 
-/// How many subtasks a message lists before it only counts the rest.
+/// The maximum number of subtasks listed in a message.
 const LISTED: usize = 8;
 
-/// Returns a time as messages print it.
+/// Returns a time in the form printed by messages.
 pub(super) const fn ns(ns: u64) -> Duration {
     Duration::from_nanos(ns)
 }
 
-/// Returns the text before the remedy: whether another topic was meant.
+/// Returns the text before the remedy: the question whether another topic was meant.
 pub(super) fn question(meant: Option<&String>) -> impl Display {
     fmt::from_fn(move |f| match meant {
         Some(topic) => write!(f, "did you mean `{topic}`? If not, "),
@@ -121,7 +121,7 @@ pub(super) fn list<L: Display>(labels: &[L]) -> String {
     text
 }
 
-/// Returns subtasks of several DAGs as a list names them.
+/// Returns subtasks of several DAGs in the form printed by a list.
 pub(super) fn members(subtasks: &[(DagLabel, SubtaskLabel)]) -> Vec<String> {
     let named = |(dag, subtask): &(DagLabel, SubtaskLabel)| format!("{subtask} of {dag}");
     subtasks.iter().map(named).collect()
@@ -149,12 +149,12 @@ pub(super) fn own_input(topic: Option<&String>) -> impl Display {
     })
 }
 
-/// Returns which clusters can be stated, of so many.
+/// Returns the range of valid clusters.
 pub(super) fn one_up_to(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| write!(f, "state one up to cluster {}", clusters.saturating_sub(1)))
 }
 
-/// Returns which cores can be stated in a cluster of so many.
+/// Returns the range of valid cores in a cluster.
 pub(super) fn counted_from_0(cores: u32) -> impl Display {
     fmt::from_fn(move |f| {
         write!(
@@ -164,7 +164,7 @@ pub(super) fn counted_from_0(cores: u32) -> impl Display {
     })
 }
 
-/// Returns why a cluster does not exist where there are so many, and the remedy.
+/// Returns why a cluster does not exist, and the remedy; `clusters` is their number.
 pub(super) fn undivided(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| match clusters {
         0 => f.write_str("this machine's cores are not divided; leave its cluster out"),

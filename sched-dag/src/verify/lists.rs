@@ -1,13 +1,14 @@
-//! Lists of cores, stated as text, and the tables of these.
+//! Reads lists of cores, stated as text, and makes tables of the lists.
 //!
 //! A list is a line: `core 0: sense.read control.steer ( log.write#1 ) sense.read#1`. The number is
-//! a core's of the machine, as in answers and pictures; the cluster follows. Each other word
-//! is an *entry*: `DAG.SUBTASK`, by names or by numbers. `#N` says the job, counted from the first
-//! release of a lap on (`#-1`: of the lap before); without, the entries of a subtask are those of
-//! jobs 0, 1, .. in turn. Entries in parentheses are nested in the entry before these. `@START+LENGTH`
-//! says the times in nanoseconds; without, [timed](TaskSet::timed) finds them.
+//! a core of the machine, as in answers and pictures; the cluster follows from the core. Each other
+//! word is an *entry*: `DAG.SUBTASK`, by names or by numbers. `#N` gives the job, counted from the
+//! first release of a lap on (`#-1`: the last job of the lap before). Without `#N`, the entries of
+//! a subtask belong to jobs 0, 1, .. in turn. Entries in parentheses are nested in the entry before
+//! the parenthesis. `@START+LENGTH` gives the times in nanoseconds. Without times,
+//! [timed](TaskSet::timed) finds them.
 //!
-//! Lists with DAGs in common are a table. A DAG is in a table whole.
+//! Lists with DAGs in common form one table. A table contains a DAG as a whole or not at all.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -30,10 +31,10 @@ use crate::table::{CoreList, ENTRY_LIMIT, Table, TableEntry};
 use crate::table_times::first_in_lap;
 use crate::task_set::TaskSet;
 
-/// The longest lap, 9 years: some laps are run to find times.
+/// The longest lap, 9 years: finding times runs some laps.
 const LONGEST_LAP_NS: u64 = 1 << 58;
 
-/// The most laps from a job's release to its entry.
+/// The maximum number of laps from a job's release to its entry.
 const MOST_LAPS_BACK: i64 = 8;
 
 /// A list as stated.
@@ -58,7 +59,7 @@ struct StatedEntry {
 /// The tables of a commit, and the DAGs in them.
 pub(super) struct StatedTables {
     pub(super) tables: Vec<Table>,
-    /// By DAG, the number of its table.
+    /// The number of each DAG's table.
     pub(super) of_dags: Vec<Option<usize>>,
 }
 
@@ -84,7 +85,7 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
             Err(why) => findings.core_list(title, why),
         }
     }
-    // What is missing in a list that cannot be read is not told.
+    // An unreadable list would make other entries seem missing, so the checks end here.
     if lists.len() < options.lists.len() {
         return stated;
     }
@@ -113,7 +114,7 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
     stated
 }
 
-/// Gives the tables times, unless those are stated, and has them enforced.
+/// Gives the tables times, unless stated, and has the tables enforced.
 pub(super) fn enforce(
     task_set: &mut TaskSet,
     tables: Vec<Table>,
@@ -163,7 +164,7 @@ fn read(text: &str, specs: &[&DagSpec]) -> Result<StatedList, ListFault> {
 }
 
 fn read_entry(word: &str, depth: u32, specs: &[&DagSpec]) -> Result<StatedEntry, ListFault> {
-    // A name may have these characters, too.
+    // Names may contain `@` and `#`, too, so only a valid suffix is cut off.
     let times = word.rsplit_once('@').and_then(|(rest, times)| {
         let (start, length) = times.split_once('+')?;
         Some((rest, (start.parse().ok()?, length.parse().ok()?)))
@@ -175,7 +176,7 @@ fn read_entry(word: &str, depth: u32, specs: &[&DagSpec]) -> Result<StatedEntry,
     let is_called =
         |called: &str, number: usize, part: &str| called == part || part.parse() == Ok(number);
     let mut found = Vec::new();
-    // Two numbers are no names, or a record could not be read where names are numbers.
+    // Two numbers are no names; otherwise a record could not be read if DAGs have numbers as names.
     let numbers = name.split_once('.').and_then(|(dag, subtask)| {
         let (dag, subtask) = (dag.parse().ok()?, subtask.parse().ok()?);
         (subtask < specs.get::<usize>(dag)?.subtasks.len()).then_some((dag, subtask))
@@ -225,7 +226,7 @@ fn word(specs: &[&DagSpec], dag: usize, subtask: usize) -> String {
     named(&spec.name, dag) + "." + &named(&spec.subtasks[subtask].name, subtask)
 }
 
-/// Makes the table of the lists of these DAGs; none if a period is missing, a fault of its own.
+/// Makes the table from the lists of some DAGs; none if a period is missing, a fault of its own.
 fn table(
     options: &CommitOptions,
     specs: &[&DagSpec],
@@ -271,7 +272,7 @@ fn table(
     }))
 }
 
-/// Returns the length of a lap of DAGs, if all state a period.
+/// Returns the length of a lap of DAGs, if all DAGs state a period.
 fn lap_ns(specs: &[&DagSpec], dags: &[usize]) -> Result<Option<u64>, ListFault> {
     let mut lap_ns = 1_u64;
     for &number in dags {
@@ -306,13 +307,13 @@ fn cores_of(options: &CommitOptions, spec: &DagSpec) -> Range<u32> {
     first..rest.first().map_or(options.cores, |size| first + size)
 }
 
-/// The jobs of the subtasks of a table's DAGs in a lap.
+/// The jobs in a lap, for the subtasks of a table's DAGs.
 struct LapJobs<'s> {
     specs: &'s [&'s DagSpec],
     lap_ns: u64,
     is_alone: bool,
-    /// By DAG, and by subtask: the core of the latest entry, the number of entries, and for each
-    /// job whether there is an entry.
+    /// By DAG and subtask: the core of the latest entry, the number of entries, and for each job
+    /// whether an entry exists.
     of_dags: Vec<Vec<(u32, i64, Vec<bool>)>>,
 }
 
@@ -338,7 +339,7 @@ impl<'s> LapJobs<'s> {
         Ok(jobs)
     }
 
-    /// Returns how many jobs a DAG has in a lap.
+    /// Returns the number of a DAG's jobs in a lap.
     fn count(&self, dag: usize) -> u64 {
         self.lap_ns / self.specs[dag].period_ns.unwrap_or(self.lap_ns)
     }
@@ -394,8 +395,8 @@ impl<'s> LapJobs<'s> {
 }
 
 impl TaskSet {
-    /// Returns the lists of the tables as text, by the numbers of DAGs and subtasks, with their
-    /// times where there are any.
+    /// Returns the lists of the tables as text, with numbers for DAGs and subtasks, and with times
+    /// if there are any.
     pub fn core_lists(&self) -> Vec<String> {
         let of = |table| move |list| self.list_text(table, list);
         let tables = self.tables().iter();

@@ -1,16 +1,16 @@
 //! The verification of DAGs at commit.
 //!
-//! After it nothing can be added, and the holder of the [`TaskSet`] may rely on
-//! what it says. All faults of all DAGs are reported at once, so an app's
-//! author needs one run to see them; warnings stand apart and prevent nothing.
+//! After the verification nothing can be added, and the holder of the [`TaskSet`] may rely on its
+//! statements. All faults of all DAGs are reported at once, so an app's author needs one run to see
+//! them. Warnings are reported separately and prevent nothing.
 //!
-//! Each check goes on after a fault with what the author most likely meant, so
-//! that one slip is one fault and hides no other. The whole costs time linear
-//! in subtasks, ports and edges, but for sorting numbers; nothing recurs.
+//! After a fault, each check goes on with the author's most likely intention. So one slip is one
+//! fault and hides no other. The whole verification takes time linear in subtasks, ports and edges,
+//! except for sorting numbers; there is no recursion.
 //!
-//! Words: the *construction policy* says which shapes of graph are wanted. Its
-//! default is the paper's: exactly one source and one sink, connected, and one
-//! writer a topic. Every relaxation is a choice that the caller writes down.
+//! Words: the *construction policy* says which shapes of graph are wanted. The default is the
+//! paper's policy: exactly one source and one sink, connected, and one writer per topic. The caller
+//! must write down every relaxation.
 
 mod attributes;
 mod fault;
@@ -35,7 +35,7 @@ use crate::task_set::TaskSet;
 pub use fault::{DagFault, ListFault, OverflowingTime, TopicSide, Warning};
 pub use label::{DagLabel, SubtaskLabel};
 
-/// The most inputs and the most outputs that a subtask may have.
+/// The maximum number of inputs, and of outputs, of a subtask.
 pub const MAX_ARITY: usize = 16;
 
 /// DAGs that can be scheduled.
@@ -43,7 +43,7 @@ pub const MAX_ARITY: usize = 16;
 pub struct VerifiedDags {
     /// The model for the scheduler.
     pub task_set: TaskSet,
-    /// Oddities that the apps' authors may not have meant.
+    /// Oddities, perhaps not intended by the apps' authors.
     pub warnings: Vec<Warning>,
 }
 
@@ -101,35 +101,35 @@ impl RejectedDags {
         &self.faults
     }
 
-    /// Returns the warnings: oddities that the apps' authors may not have meant.
+    /// Returns the warnings: oddities, perhaps not intended by the apps' authors.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
-    /// Returns faults and warnings to keep.
+    /// Returns faults and warnings by value.
     #[must_use]
     pub fn into_parts(self) -> (Vec<DagFault>, Vec<Warning>) {
         (self.faults, self.warnings)
     }
 }
 
-/// Writes as [`write_faults`] does.
+/// Writes the faults with [`write_faults`].
 impl fmt::Display for RejectedDags {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write_faults(&self.faults, f)
     }
 }
 
-/// The most faults that a message tells; what is left shows when these are mended.
+/// The maximum number of faults in a message; further faults show once these are corrected.
 pub const MOST_FAULTS: usize = 20;
 
-/// Writes one line a fault, without a newline at the end; of very many the first
-/// [`MOST_FAULTS`], and how many more there are.
+/// Writes one line per fault, without a newline at the end. Writes at most [`MOST_FAULTS`] faults,
+/// and then the number of the others.
 ///
 /// # Errors
 ///
-/// The formatter's.
+/// Errors of the formatter.
 pub fn write_faults(faults: &[impl fmt::Display], f: &mut fmt::Formatter<'_>) -> fmt::Result {
     for (position, fault) in faults.iter().take(MOST_FAULTS).enumerate() {
         if position > 0 {
@@ -145,7 +145,7 @@ pub fn write_faults(faults: &[impl fmt::Display], f: &mut fmt::Formatter<'_>) ->
 
 impl core::error::Error for RejectedDags {}
 
-/// The DAGs, and what has been found so far.
+/// The DAGs, and the findings so far.
 struct VerifyFindings<'s> {
     specs: &'s [&'s DagSpec],
     /// Each fault with the position of its DAG.
@@ -153,7 +153,7 @@ struct VerifyFindings<'s> {
     warnings: Vec<Warning>,
 }
 
-/// The page of one DAG.
+/// The findings about one DAG.
 struct DagFindings<'f, 's> {
     dag: usize,
     spec: &'s DagSpec,
@@ -169,7 +169,7 @@ impl<'s> VerifyFindings<'s> {
         }
     }
 
-    /// Opens the page of a DAG.
+    /// Opens the findings about a DAG.
     fn findings_of(&mut self, dag: usize) -> DagFindings<'_, 's> {
         let spec = self.specs[dag];
         let findings = self;
@@ -184,12 +184,12 @@ impl<'s> VerifyFindings<'s> {
         DagLabel::new(self.specs, dag)
     }
 
-    /// Notes a fault of the whole commit, which counts as DAG 0's.
+    /// Records a fault of the whole commit, under DAG 0.
     fn fault(&mut self, fault: DagFault) {
         self.faults.push((0, fault));
     }
 
-    /// Notes a fault of the list of a core.
+    /// Records a fault in the list of a core.
     fn core_list(&mut self, list: &str, why: ListFault) {
         let list = list.into();
         self.fault(DagFault::CoreList { list, why });
@@ -199,8 +199,7 @@ impl<'s> VerifyFindings<'s> {
         !self.faults.is_empty()
     }
 
-    /// Returns the faults in the order of the DAGs and, within a DAG, in the
-    /// order of the checks.
+    /// Returns the faults ordered by DAG and, within a DAG, in the order of the checks.
     fn into_parts(self) -> (Vec<DagFault>, Vec<Warning>) {
         let order = sorted_by_key(self.faults.len(), |fault| self.faults[fault].0);
         let faults = self.faults.into_iter().map(|(_, fault)| Some(fault));
@@ -219,13 +218,13 @@ impl DagFindings<'_, '_> {
         SubtaskLabel::new(self.spec, subtask)
     }
 
-    /// Notes a fault, which names the DAG.
+    /// Records a fault, with the label of the DAG.
     fn fault(&mut self, fault: impl FnOnce(DagLabel) -> DagFault) {
         let fault = fault(self.label());
         self.findings.faults.push((self.dag, fault));
     }
 
-    /// Notes a warning, which names the DAG.
+    /// Records a warning, with the label of the DAG.
     fn warn(&mut self, warning: impl FnOnce(DagLabel) -> Warning) {
         let warning = warning(self.label());
         self.findings.warnings.push(warning);
@@ -237,42 +236,41 @@ impl DagFindings<'_, '_> {
 #[non_exhaustive]
 #[must_use = "options have no effect until something is verified by them"]
 pub struct CommitOptions {
-    /// How ready instances will be ordered; decides which attributes are needed.
+    /// The order for ready instances; decides which attributes are needed.
     pub policy: Policy,
-    /// The number of cores that the scheduler will serve, at least 1.
+    /// The number of cores for the scheduler, at least 1.
     pub cores: u32,
-    /// How these are divided.
+    /// The division of the cores into clusters.
     pub clusters: CoreDivision,
-    /// The lists of cores, a text each, as `core 0: dag.a dag.b#1`;
-    /// `docs/dag-file.md` has the notation.
+    /// The lists of cores, one text for each, such as `core 0: dag.a dag.b#1`; `docs/dag-file.md`
+    /// describes the notation.
     pub lists: Vec<String>,
-    /// Which shapes of graph are wanted.
+    /// The wanted shapes of graph.
     pub construction: ConstructionPolicy,
-    /// The most instances that the jobs in flight of all DAGs may have: the sum
-    /// over the DAGs of jobs in flight times subtasks. It bounds the memory that
-    /// the scheduler and the edges' slots take. Default: 2^20.
+    /// The maximum number of instances for the jobs in flight of all DAGs: the sum over the DAGs of
+    /// jobs in flight times subtasks. This bounds the memory of the scheduler and of the edges'
+    /// slots. Default: 2^20.
     pub instance_limit: u32,
 }
 
-/// Which shapes of graph a commit accepts.
+/// The shapes of graph accepted by a commit.
 ///
-/// The default is the paper's: one source, one sink, one writer a topic, and
-/// every subtask connected with every other when the edges' directions are
-/// ignored.
+/// The default is the paper's policy: one source, one sink, one writer per topic, and all subtasks
+/// connected with each other if the edges' directions are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub struct ConstructionPolicy {
-    /// How many subtasks may have no predecessor.
+    /// How many subtasks may lack a predecessor.
     pub sources: CountLimit,
-    /// How many subtasks may have no successor.
+    /// How many subtasks may lack a successor.
     pub sinks: CountLimit,
-    /// How many subtasks may write one topic. With [`CountLimit::Several`] a reader
-    /// waits for all of them.
+    /// How many subtasks may write one topic. With [`CountLimit::Several`], a reader waits for all
+    /// writers.
     pub writers: CountLimit,
-    /// How many parts without an edge between them a DAG may fall into.
+    /// Into how many parts, without an edge between them, a DAG may fall.
     pub parts: CountLimit,
 }
 
-/// How many of something a DAG may have.
+/// How many sources, sinks, writers or parts a DAG may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum CountLimit {
     /// Exactly one.
@@ -321,7 +319,7 @@ impl CommitOptions {
 }
 
 impl ConstructionPolicy {
-    /// Returns the paper's policy, which is the default.
+    /// Returns the paper's policy, the default.
     pub const fn paper() -> Self {
         Self::all(CountLimit::One)
     }

@@ -1,17 +1,17 @@
-//! From specs without fault to the model.
+//! Makes the model from specs without fault.
 //!
-//! A DAG without priorities gets them from its graph. A subtask's *remaining path* is the longest
-//! path from its start to the end of the DAG, its own WCET included. The subtask with the longest
-//! remaining path comes first (the "highest level first" order; T. C. Hu, Operations Research 9,
-//! 1961, and, as upward rank, Topcuoglu, Hariri and Wu, IEEE TPDS 13, 2002); between equal paths the
-//! order of registration decides. If the WCET of any subtask of the DAG is unknown, every subtask
-//! counts 1, so that the path's number of subtasks decides: to mix known and invented times would
-//! favour those that happened to be measured.
+//! A DAG without priorities gets priorities derived from its graph. A subtask's *remaining path* is
+//! the longest path from its start to the end of the DAG, including its own WCET. The subtask with
+//! the longest remaining path comes first (the "highest level first" order; T. C. Hu, Operations
+//! Research 9, 1961, and, as upward rank, Topcuoglu, Hariri and Wu, IEEE TPDS 13, 2002); between
+//! equal paths, the order of registration decides. If the WCET of any subtask of the DAG is
+//! unknown, every subtask counts 1, and the number of subtasks on a path decides. Mixing known and
+//! invented times would favour the subtasks that happened to be measured.
 //!
-//! Between DAGs, derived priorities are deadline monotonic: all subtasks of the DAG with the shorter
-//! relative deadline come before all of the other (then the order of the commit), which is the order
-//! that the fixed-priority tests assume. Where some DAGs have priorities and others have not, the
-//! derived ones come after all that are given.
+//! Between DAGs, derived priorities are deadline monotonic, as the fixed-priority tests assume: all
+//! subtasks of the DAG with the shorter relative deadline come before all subtasks of the other
+//! (then in the order of the commit). If only some DAGs have given priorities, derived priorities
+//! come after all given priorities.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -30,11 +30,11 @@ use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
 
-/// Makes the model, or notes that the derived priorities do not fit.
+/// Makes the model, or reports that the derived priorities do not fit.
 ///
 /// # Panics
 ///
-/// If the specs have a fault that an earlier check finds.
+/// If the specs have a fault already found by an earlier check.
 pub(super) fn build(
     options: &CommitOptions,
     shapes: Vec<(Graph, Vec<StatePrecedence>)>,
@@ -58,7 +58,7 @@ pub(super) fn build(
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
 }
 
-/// Returns a DAG's uses of locks, with whether there are others.
+/// Returns a DAG's uses of locks, each marked if the lock has other users.
 fn locks(spec: &DagSpec, all: &[&DagSpec]) -> Box<[LockUse]> {
     let of = spec.locks.iter().map(|of| {
         let others = all.iter().flat_map(|spec| &spec.locks);
@@ -70,8 +70,8 @@ fn locks(spec: &DagSpec, all: &[&DagSpec]) -> Box<[LockUse]> {
     of.collect()
 }
 
-/// Returns for each DAG without priorities the number of its first one:
-/// deadline monotonic, after all that are given.
+/// Returns the first priority number for each DAG without priorities: deadline monotonic, after all
+/// given priorities.
 #[inline(never)]
 fn priority_bases(findings: &mut VerifyFindings<'_>) -> Vec<u32> {
     let specs = findings.specs;
@@ -150,7 +150,7 @@ fn build_dag(
             relative_deadline_ns: deadlines_ns[index],
             lock_wait_ns: 0,
         });
-    // One that states a deadline is a sink, though a shared state may put it before another.
+    // A subtask with a stated deadline is a sink, though a shared state may put it before another.
     let is_sink = |subtask: &SubtaskId| {
         let states_deadline = spec.subtasks[subtask.index()]
             .relative_deadline_ns
@@ -183,7 +183,7 @@ fn build_dag(
     }
 }
 
-/// Returns for each subtask the least relative deadline of the sinks that it reaches.
+/// Returns, for each subtask, the least relative deadline of the sinks reachable from the subtask.
 fn deadlines_ns(spec: &DagSpec, graph: &Graph) -> Vec<u64> {
     let whole_ns = spec.relative_deadline_ns.expect("verified to be given");
     let stated = spec

@@ -1,17 +1,15 @@
-//! Names: numbers for them in the order of their first appearance, and what a wrong one meant.
+//! Numbers names in the order of their first appearance, and suggests corrections for wrong names.
 //!
-//! Commits of many thousand subtasks and topics look up every name once, so the
-//! table is a hash table with open addressing, sized once; a tree or a sort
-//! would dominate the whole commit. The hash is FNV-1a with a final mix, enough for names that
-//! an app's author chose.
+//! Commits of many thousand subtasks and topics look up every name once. So the table is a hash
+//! table with open addressing, sized once; a tree or a sort would dominate the whole commit. The
+//! hash is FNV-1a with a final mix, sufficient for names chosen by an app's author.
 //!
-//! # A topic that has one end only
+//! # A topic with only one end
 //!
-//! A topic that is read and that no subtask writes, or the other way round, is often
-//! another one's name with a slip of the pen. Its fault then names the nearest topic of
-//! the DAG that would mend it: for a reader a topic that is written, for a writer one
-//! that is read and not written. Only the faults that a message tells are looked at,
-//! as each is compared with every topic of its DAG.
+//! A topic with a reader but no writer, or with a writer but no reader, is often another topic's
+//! name with a slip of the pen. Its fault then suggests the nearest topic of the DAG as a remedy:
+//! for a reader a written topic, for a writer a topic read but not written. Only the faults shown
+//! in a message get suggestions, as each is compared with every topic of its DAG.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -23,7 +21,7 @@ use crate::ids::SubtaskId;
 use crate::nearest::nearest;
 use crate::spec::{DagSpec, SubtaskSpec};
 
-/// No entry.
+/// An empty slot of the table.
 const FREE: u32 = u32::MAX;
 
 /// A table of distinct names.
@@ -43,7 +41,7 @@ impl<'a> Interner<'a> {
         }
     }
 
-    /// Returns the name's number, counted from 0, a new one if it is new.
+    /// Returns the name's number, counted from 0; an unknown name gets the next number.
     pub(super) fn intern(&mut self, name: &'a str) -> usize {
         let hash = fnv_1a(EMPTY, name.as_bytes());
         let hash = hash ^ (hash >> 32);
@@ -68,10 +66,10 @@ impl<'a> Interner<'a> {
     }
 }
 
-/// Adds to the first faults which topic was probably meant.
+/// Adds the topic that was probably meant to each of the first faults.
 #[inline(never)]
 pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [DagFault]) {
-    // Faults that no message tells need no advice.
+    // Faults that no message shows need no advice.
     for index in 0..faults.len().min(MOST_FAULTS) {
         let found = match &faults[index] {
             DagFault::UnwrittenTopic {
@@ -112,8 +110,8 @@ pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [DagFault]) {
     }
 }
 
-/// Adds to the first warnings of a sink's value the topic of the DAG that was probably meant: one
-/// that is read.
+/// Adds, to the first warnings about a sink's unread value, the topic of the DAG that was probably
+/// meant: a topic with a reader.
 #[inline(never)]
 pub(super) fn suggest_for_sinks(specs: &[&DagSpec], warnings: &mut [Warning]) {
     for warning in warnings.iter_mut().take(MOST_FAULTS) {
@@ -134,7 +132,7 @@ pub(super) fn suggest_for_sinks(specs: &[&DagSpec], warnings: &mut [Warning]) {
     }
 }
 
-/// Returns the topics that a subtask has already, on either side.
+/// Returns the topics already used by a subtask, on either side.
 fn own_topics(spec: &DagSpec, subtask: SubtaskId) -> Vec<&str> {
     let SubtaskSpec {
         inputs, outputs, ..
@@ -143,7 +141,7 @@ fn own_topics(spec: &DagSpec, subtask: SubtaskId) -> Vec<&str> {
     ports.map(|port| port.topic.as_str()).collect()
 }
 
-/// Returns the topics of a DAG that are written, but for those of one subtask.
+/// Returns the written topics of a DAG, except for the given ones.
 fn written<'s>(spec: &'s DagSpec, own: &[&str]) -> Vec<&'s str> {
     let outputs = spec.subtasks.iter().flat_map(|subtask| &subtask.outputs);
     let topics = outputs.map(|port| port.topic.as_str());

@@ -1,18 +1,16 @@
-//! The checks of one DAG's graph as a whole: edges in range, sources, sinks,
-//! connection, cycles.
+//! Checks one DAG's graph as a whole: edges in range, sources, sinks, connection, cycles.
 //!
 //! # One shortest cycle for each knot of a graph
 //!
-//! A *knot* is a strongly connected component of two or more subtasks: a set in
-//! which each precedes each, found by Kosaraju's two walks (Sharir, Computers and
-//! Mathematics 7, 1981) without recursion. One cycle a knot is reported, because
-//! the number of cycles may be exponential, and the shortest, because it is the
-//! easiest to read.
+//! A *knot* is a strongly connected component of two or more subtasks: a set in which each subtask
+//! precedes each other. Knots are found by Kosaraju's two walks (Sharir, Computers and Mathematics
+//! 7, 1981), without recursion. Each knot gets a single report, because the number of cycles may be
+//! exponential. The report shows the shortest cycle, because that is the easiest to read.
 //!
-//! Finding it takes one breadth-first search from each subtask of the knot. So
-//! that a wrong graph of any size is refused in bounded time, the searches of
-//! one graph share a budget of visited edges; beyond it the shortest cycle
-//! found so far is reported. Knots up to about a thousand subtasks stay below.
+//! Finding the shortest cycle takes one breadth-first search from each subtask of the knot. All
+//! searches of one graph share a budget of visited edges, so a wrong graph of any size is refused
+//! in bounded time. When the budget is used up, the shortest cycle found so far is reported. Knots
+//! of up to about a thousand subtasks stay within the budget.
 
 use alloc::collections::VecDeque;
 use alloc::vec;
@@ -37,21 +35,21 @@ pub(super) fn check(
 ) -> (Graph, Vec<StatePrecedence>) {
     let page = &mut findings.findings_of(dag);
     let spec = page.spec;
-    // Edges without topics, and those of topics: from here on they are alike.
+    // Edges without topics and edges of topics are treated alike from here on.
     add_plain_edges(&mut topology.edges, page);
     let mut graph = Graph::new(spec.subtasks.len(), &topology.edges);
     check_connection(&graph, policy, page);
     check_sources(&graph, policy, page);
     check_sinks(&graph, policy, &topology.unread, page);
     check_deadlines(&graph, page);
-    // One cycle for each knot: every edge that breaks it has to be found by the author anyway.
+    // One cycle for each knot: the author has to find the right edge to remove anyway.
     if !graph.is_acyclic() {
         for cycle in shortest_cycles(&graph) {
             let hops = labels(page, &cycle);
             page.fault(|dag| DagFault::Cycle { dag, hops });
         }
     }
-    // Last, so that all other checks judge the graph that the author stated.
+    // Last, so that all other checks judge the graph stated by the author.
     let mut state_precedences = Vec::new();
     if graph.is_acyclic() {
         state_precedences = topics::order_users(spec, &graph);
@@ -65,7 +63,7 @@ pub(super) fn check(
     (graph, state_precedences)
 }
 
-/// Adds the edges that are given without a topic.
+/// Adds the edges stated without a topic.
 fn add_plain_edges(edges: &mut Vec<(u32, u32)>, page: &mut DagFindings<'_, '_>) {
     let subtasks = page.spec.subtasks.len();
     edges.reserve(page.spec.edges.len());
@@ -95,7 +93,7 @@ fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFin
         return;
     }
     let (part_of, parts) = graph.parts();
-    // Subtask 0 is in part 0, so any other part lacks a way to it.
+    // Subtask 0 is in part 0, so no path connects it with any other part.
     if let Some(other) = part_of.iter().position(|&part| part != 0) {
         let (one, other) = (page.subtask(0), page.subtask(other));
         page.fault(|dag| DagFault::NotConnected {
@@ -107,12 +105,12 @@ fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFin
     }
 }
 
-/// A subtask that only reads topics without writer has no predecessor, but
-/// its author did not mean a source: that fault is reported by itself.
+/// Checks the sources. A subtask whose only inputs are topics without a writer has no predecessor,
+/// but its author did not mean a source; the missing writer is reported by itself.
 fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFindings<'_, '_>) {
     let subtasks = &page.spec.subtasks;
     let is_source = |subtask: &SubtaskId| subtasks[subtask.index()].inputs.is_empty();
-    // A subtask whose input nobody writes is no source; that fault is told by its topic.
+    // Judged by stated inputs, since a topic without a writer leaves no edge.
     let sources = graph.sources.iter().copied().filter(is_source);
     let sources = labels(page, &sources.collect::<Vec<_>>());
     // An empty DAG has a fault of its own.
@@ -123,10 +121,9 @@ fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFindin
     }
 }
 
-/// A topic without reader is a fault, but at an accepted sink it is only a
-/// value that nobody uses. Where one sink is wanted and a subtask without
-/// outputs is there to be it, other ends of the graph are no sinks but
-/// writers of unread topics, most likely of misspelt ones.
+/// Checks the sinks. A topic without a reader is a fault, but at an accepted sink only a value
+/// nobody uses. If the policy wants one sink and a subtask without outputs fits, then other ends of
+/// the graph are not sinks but writers of unread topics, most likely misspelt.
 #[inline(never)]
 fn check_sinks(
     graph: &Graph,
@@ -139,7 +136,7 @@ fn check_sinks(
     for &(writer, _) in unread {
         writes_unread[writer] = true;
     }
-    // An end that writes what nobody reads is perhaps no sink, but misspelt.
+    // An end writing an unread topic is perhaps no sink, but a misspelt topic.
     let silent = ends.iter().filter(|end| !writes_unread[end.index()]);
     let silent: Vec<SubtaskId> = silent.copied().collect();
     let wants_one = policy.sinks == CountLimit::One;
@@ -155,7 +152,7 @@ fn check_sinks(
         page.fault(|dag| DagFault::SeveralSinks { dag, sinks });
     }
 
-    // The only end may write something that nobody reads; it is still the sink.
+    // The only end may write a value nobody reads; it is still the sink.
     let accepted = !wants_one || (silent.is_empty() && ends.len() == 1);
     for &(writer, topic) in unread {
         let is_end = ends.binary_search(&SubtaskId(to_u32(writer))).is_ok();
@@ -178,7 +175,7 @@ fn check_sinks(
     }
 }
 
-/// Of subtasks only sinks have deadlines of their own.
+/// Checks that only sinks have deadlines of their own.
 fn check_deadlines(graph: &Graph, page: &mut DagFindings<'_, '_>) {
     let stated = &page.spec.subtasks;
     for subtask in graph.subtasks() {
@@ -201,15 +198,15 @@ fn labels(page: &DagFindings<'_, '_>, subtasks: &[SubtaskId]) -> Vec<SubtaskLabe
     labels.collect()
 }
 
-/// How many edges all searches of one graph may visit.
+/// The maximum number of edges visited by all searches in one graph.
 const BUDGET: usize = 4_000_000;
 
 /// In no knot, or not found yet.
 const NONE: u32 = u32::MAX;
 
-/// Returns one cycle for each knot, each from its smallest subtask on.
+/// Returns one cycle for each knot, starting from its smallest subtask.
 fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
-    // A cycle lies within one strongly connected part, so each is searched by itself.
+    // A cycle lies within one strongly connected part, so each part is searched by itself.
     let knots = knots(graph);
     let mut knot_of = vec![NONE; graph.len()];
     for (number, knot) in knots.iter().enumerate() {
@@ -231,7 +228,7 @@ fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
         .collect()
 }
 
-/// Returns the knots, and within each the subtasks, ascending.
+/// Returns the knots, each with its subtasks in ascending order.
 #[inline(never)]
 fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
     let (mut is_seen, mut ended) = (vec![false; graph.len()], Vec::new());
@@ -240,7 +237,7 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
     }
     is_seen.fill(false);
     let mut knots: Vec<Vec<SubtaskId>> = Vec::new();
-    // From what ended last no edge leads backwards out of its own part.
+    // Backwards from the subtask that ended last, no edge leads out of its own part.
     for root in ended.into_iter().rev() {
         let mut knot = Vec::new();
         walk(&graph.predecessors, root, &mut is_seen, &mut knot);
@@ -249,7 +246,7 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
             knots.push(sorted(&knot));
         }
     }
-    // They have no member in common, so the first ones tell them apart.
+    // Knots have no member in common, so their first members tell them apart.
     let order = sorted_by_key(knots.len(), |knot| knots[knot].first().copied());
     order
         .iter()
@@ -257,7 +254,7 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
         .collect()
 }
 
-/// Adds all that `root` leads to and that was not seen, each after what it leads to itself. The
+/// Adds all unseen subtasks reachable from `root`, each after the subtasks reachable from it. The
 /// path is a list instead of a recursion: a graph may be 100,000 subtasks deep.
 fn walk(edges: &AdjacencyList, root: SubtaskId, is_seen: &mut [bool], ended: &mut Vec<SubtaskId>) {
     let mut enter = |subtask: SubtaskId| !core::mem::replace(&mut is_seen[subtask.index()], true);
@@ -279,7 +276,7 @@ struct CycleSearch<'a> {
     knot_of: &'a [u32],
     /// The root of the last search that found a subtask.
     found_by: Vec<u32>,
-    /// From where it was found.
+    /// The predecessor through which the search found the subtask.
     found_from: Vec<SubtaskId>,
     queue: VecDeque<(SubtaskId, usize)>,
     budget: usize,
@@ -290,18 +287,18 @@ impl CycleSearch<'_> {
         let mut best: Option<Vec<SubtaskId>> = None;
         for &root in knot {
             let below = best.as_ref().map_or(usize::MAX, Vec::len);
-            // Two is the length of the shortest cycle there can be.
+            // Two is the length of the shortest possible cycle.
             if below == 2 || (self.budget == 0 && best.is_some()) {
                 break;
             }
-            // Only a shorter one is looked for, which cuts the search off early.
+            // Only a shorter cycle is wanted, so the search ends early.
             if let Some(cycle) = self.shortest_through(root, below) {
                 best = Some(cycle);
             }
         }
         let mut cycle = best?;
         let smallest = (0..cycle.len()).min_by_key(|&position| cycle[position])?;
-        // So that the same cycle is told the same way, wherever the search began.
+        // The same cycle is reported the same way, wherever the search began.
         cycle.rotate_left(smallest);
         Some(cycle)
     }
@@ -312,13 +309,13 @@ impl CycleSearch<'_> {
         self.queue.push_back((root, 1));
         self.found_by[root.index()] = root.0;
         while let Some((subtask, hops)) = self.queue.pop_front() {
-            // Breadth first: from here on all ways are as long.
+            // Breadth first: from here on, all paths are at least as long.
             if hops >= below {
                 return None;
             }
             for &successor in self.graph.successors.neighbours(subtask) {
-                // A large graph gets a cycle that may not be the shortest, rather than no answer
-                // in time.
+                // A large graph gets a cycle that may not be the shortest, rather than no answer in
+                // time.
                 self.budget = self.budget.saturating_sub(1);
                 if successor == root {
                     return Some(self.way_back(subtask, root));

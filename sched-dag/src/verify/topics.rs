@@ -1,35 +1,33 @@
-//! From topics to precedence edges.
+//! Turns topics into precedence edges.
 //!
-//! A topic is a named, typed bundle of edges from its writer to its readers
-//! inside one DAG. This module finds all ends of each topic, checks that they
-//! fit, and returns the edges that they make. It goes on after a fault, with
-//! the edges that the author most likely meant, so that the checks of the
-//! graph's shape do not report consequences of a fault that is known.
+//! A topic is a named, typed bundle of edges from its writer to its readers inside one DAG. This
+//! module finds all ends of each topic, checks that the ends fit, and returns the resulting edges.
+//! After a fault, the module goes on with the edges the author most likely meant. So the checks of
+//! the graph's shape do not report consequences of a known fault.
 //!
-//! A reader of a topic's *latest value* waits for nothing: it may belong to any DAG and makes no
-//! edge. For the topic it is one reader more: the topic is not unread, the types must agree, and
-//! a message that can only be moved can have no other reader.
+//! A reader of a topic's *latest value* waits for nothing. The reader may belong to any DAG and
+//! adds no edge, but counts as a reader of the topic: the topic is not unread, the types must
+//! agree, and a message that can only be moved can have no other reader.
 //!
-//! # States that subtasks of one DAG share: their checks, and their precedence
+//! # States shared by subtasks of one DAG: checks and precedence
 //!
-//! Words: a subtask that *updates* a state may change it, one that *reads* it may
-//! not. Two uses *conflict* unless both read. Conflicting uses must not overlap,
-//! and which one is first must not depend on execution times.
+//! Words: a subtask that *updates* a state may change it; a subtask that *reads* a state may not.
+//! Two uses *conflict* unless both read. Conflicting uses must not overlap, and their order must
+//! not depend on execution times.
 //!
 //! # The order of a state's users
 //!
-//! Within a job the users take turns in the order in which one core would run the
-//! DAG as stated, if it always took the ready subtask that was registered first.
-//! So a path decides, and where there is none, the order of registration. For
-//! each pair of neighbours that conflict an edge is added; readers between two
-//! updates stay parallel. All edges follow one order that all paths follow, so
-//! they close no cycle.
+//! Within a job, the users take turns as if one core ran the DAG as stated and always took the
+//! ready subtask registered first. So a path between two users decides their order; without a path,
+//! the order of registration decides. For each pair of conflicting neighbours an edge is added;
+//! readers between two updates stay parallel. All edges follow one order consistent with all paths,
+//! so the edges close no cycle.
 //!
-//! Jobs take turns as well: the commit allows one in flight. Job k + 1 finds the
-//! states as job k left them.
+//! Jobs take turns as well: the commit allows one job in flight. Job k + 1 finds the states as job
+//! k left them.
 //!
-//! The analysis sees nothing but a DAG with some more edges. There is no lock, so
-//! nothing is ever blocked by a state and no priority is inverted.
+//! The analysis sees nothing but a DAG with some more edges. There is no lock, so no subtask is
+//! ever blocked by a state and no priority is inverted.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -46,16 +44,16 @@ use crate::order::{sort_by_key, sorted_by_key};
 use crate::spec::{DagSpec, LatestSpec, StateSpec, TopicPort};
 use crate::task_set::StatePrecedence;
 
-/// The graph that the topics of one DAG make.
+/// The graph made by the topics of a DAG.
 #[derive(Clone, Default)]
 pub(super) struct TopicGraph<'a> {
-    /// Edges `(predecessor, successor)`, perhaps repeated, never to oneself.
+    /// Edges `(predecessor, successor)`, perhaps repeated, never from a subtask to itself.
     pub(super) edges: Vec<(u32, u32)>,
-    /// Topics that are written and not read, with their writer.
+    /// Topics written but not read, each with its writer.
     pub(super) unread: Vec<(usize, &'a str)>,
 }
 
-/// One end of a topic.
+/// An end of a topic.
 #[derive(Clone, Copy)]
 struct TopicEnd<'a> {
     /// The topic's number.
@@ -66,7 +64,7 @@ struct TopicEnd<'a> {
     port: &'a TopicPort,
 }
 
-/// The ends of one topic in one DAG, at most one of each kind a subtask.
+/// The ends of a topic in a DAG, at most one writer and one reader entry for each subtask.
 #[derive(Default)]
 struct TopicEnds<'a> {
     writers: Vec<TopicEnd<'a>>,
@@ -82,8 +80,8 @@ impl<'a> TopicEnds<'a> {
                 TopicSide::Output => &mut self.writers,
                 TopicSide::Input => &mut self.readers,
             };
-            // A topic that stands twice at a subtask is a fault of its own, and one end for the
-            // other checks.
+            // A topic stated twice at a subtask is a fault of its own, and one end for the other
+            // checks.
             if side.last().is_none_or(|last| last.subtask != end.subtask) {
                 side.push(*end);
             }
@@ -91,20 +89,19 @@ impl<'a> TopicEnds<'a> {
     }
 }
 
-/// Checks all topics and their latest values and returns what they say, one entry a DAG.
+/// Checks all topics and their latest values, and returns the resulting graphs, DAG by DAG.
 pub(super) fn check<'a>(
     options: &CommitOptions,
     findings: &mut VerifyFindings<'a>,
 ) -> Vec<TopicGraph<'a>> {
     let mut topologies = vec![TopicGraph::default(); findings.specs.len()];
-    // Filled anew for each topic, so that many topics do not mean as many
-    // allocations.
+    // Refilled for each topic, so that many topics do not mean as many allocations.
     let mut sides = TopicEnds::default();
     for ends in ends_by_topic(findings.specs).chunk_by(|one, other| one.topic == other.topic) {
         let first = ends[0];
         let of_dags = || ends.chunk_by(|one, other| one.dag == other.dag);
         let is_shared = ends.iter().any(|end| end.dag != first.dag);
-        // Told once, at the first DAG, with all that name it.
+        // Reported once, at the first DAG, with all DAGs naming the topic.
         if is_shared {
             let dags = of_dags().map(|ends| findings.label(ends[0].dag)).collect();
             let topic = first.port.topic.clone();
@@ -123,7 +120,7 @@ pub(super) fn check<'a>(
         let page = &mut findings.findings_of(dag);
         for latest in &page.spec.latest {
             let unread = &mut topology.unread;
-            // Those who sample it read it.
+            // A sampled topic is read, so it is no longer unread.
             unread.retain(|&(_, topic)| topic != latest.port.topic);
             check_latest(latest, page);
         }
@@ -131,7 +128,7 @@ pub(super) fn check<'a>(
     topologies
 }
 
-/// Returns all ends, those of a topic next to each other and in the order of DAGs and subtasks.
+/// Returns all ends, grouped by topic, and within a topic in the order of DAGs and subtasks.
 #[inline(never)]
 fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> Vec<TopicEnd<'a>> {
     let subtasks = specs.iter().flat_map(|spec| &spec.subtasks);
@@ -154,12 +151,12 @@ fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> Vec<TopicEnd<'a>> {
             }
         }
     }
-    // Stable: within a topic the order stays that of DAGs and subtasks.
+    // Stable: within a topic, the order remains by DAG and subtask.
     let order = sorted_by_key(ends.len(), |end| ends[end].topic);
     order.into_iter().map(|end| ends[end]).collect()
 }
 
-/// Checks the ends that one topic has in one DAG.
+/// Checks the ends of a topic in a DAG.
 #[inline(never)]
 fn check_topic<'a>(
     options: &CommitOptions,
@@ -182,7 +179,7 @@ fn check_topic<'a>(
         });
     }
     match (writers.first(), readers.first()) {
-        // Perhaps a sink that writes for nobody; the shape tells.
+        // Perhaps a sink writing for nobody; the check of the graph's shape decides.
         (Some(writer), None) if !is_shared => topology.unread.push((writer.subtask, &port.topic)),
         (None, Some(_)) if !is_shared => {
             for reader in readers {
@@ -211,8 +208,8 @@ fn check_topic<'a>(
     }
 }
 
-/// Reports a topic that stands twice among the inputs, or among the outputs,
-/// of a subtask: in `ends` such ends are neighbours.
+/// Reports a topic stated twice among the inputs, or twice among the outputs, of a subtask. Such
+/// ends are neighbours in `ends`.
 fn report_duplicates(ends: &[TopicEnd<'_>], page: &mut DagFindings<'_, '_>) {
     let kind = |end: &TopicEnd<'_>| (end.subtask, end.direction);
     for same in ends.chunk_by(|one, other| kind(one) == kind(other)) {
@@ -228,15 +225,15 @@ fn report_duplicates(ends: &[TopicEnd<'_>], page: &mut DagFindings<'_, '_>) {
     }
 }
 
-/// Compares every reader with the first writer, and every further writer with
-/// the first reader: linear, and no wrong end stays unnamed.
+/// Compares every reader with the first writer, and every further writer with the first reader:
+/// linear, and every wrong end is named.
 fn report_mismatches(
     writers: &[TopicEnd<'_>],
     readers: &[TopicEnd<'_>],
     page: &mut DagFindings<'_, '_>,
 ) {
     let spec = page.spec;
-    // Against the first end only: of n ends that differ n - 1 are told, not n times n.
+    // Against the first end only: n differing ends give n - 1 faults, not n times n.
     let with_first_writer = readers.iter().map(|reader| (&writers[0], reader));
     let with_first_reader = writers.iter().skip(1).map(|writer| (writer, &readers[0]));
     for (writer, reader) in with_first_writer.chain(with_first_reader) {
@@ -261,8 +258,8 @@ fn add_edges(
     page: &mut DagFindings<'_, '_>,
 ) {
     for (position, writer) in writers.iter().enumerate() {
-        // Under one writer a topic the further ones are a fault already: one
-        // edge each keeps them connected without a product of two counts.
+        // If the policy allows a single writer, further writers are a fault already. One edge for
+        // each keeps them connected without a product of two counts.
         let all = position == 0 || options.construction.writers != CountLimit::One;
         for reader in if all { readers } else { &readers[..1] } {
             if writer.subtask == reader.subtask {
@@ -308,7 +305,7 @@ fn check_latest(latest: &LatestSpec, page: &mut DagFindings<'_, '_>) {
         return;
     }
     let inputs = subtasks.flat_map(|subtask| subtask.inputs.iter().filter(is_here));
-    // Whoever samples reads, too, and a value that is moved has one reader.
+    // A sampler is a reader, too, and a moved value can have only one reader.
     let readers = inputs.count() + latest.samplers;
     if readers > 1 && !written.can_fan_out {
         page.fault(|dag| DagFault::LatestOfMoved {
@@ -365,9 +362,9 @@ fn check_users(stated: &StateSpec, page: &mut DagFindings<'_, '_>) {
             });
         }
     }
-    // After the repeated ones are told.
+    // Only now, since repeated users had to be reported first.
     users.dedup();
-    // Without a stated number the commit takes 1.
+    // Without a stated number, the commit takes 1.
     if let Some(in_flight @ 2..) = spec.in_flight
         && stated.is_shared()
     {
@@ -380,7 +377,7 @@ fn check_users(stated: &StateSpec, page: &mut DagFindings<'_, '_>) {
     }
 }
 
-/// Returns the precedence that shared states add to a graph without cycle.
+/// Returns the precedences that shared states add to an acyclic graph.
 #[inline(never)]
 pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence> {
     let mut precedences = Vec::new();
@@ -391,8 +388,7 @@ pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence>
     for state in spec.states.iter().filter(|state| state.is_shared()) {
         let place_of = |user: usize| place.get(state.users[user].subtask).copied();
         let users = sorted_by_key(state.users.len(), place_of);
-        // In the order in which a topological walk meets them, so that no edge that is added
-        // closes a cycle.
+        // Users are in topological order, so no added edge closes a cycle.
         let users: Vec<_> = users.iter().map(|&user| state.users[user]).collect();
         let mut add = |earlier: usize, later: usize| {
             precedences.push(StatePrecedence {
@@ -410,7 +406,7 @@ pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence>
                 }
                 readers.push(user.subtask);
             } else {
-                // Through the readers it also follows the update before them.
+                // Through the readers, the update also follows the previous update.
                 let before = if readers.is_empty() {
                     updater.as_slice()
                 } else {
@@ -427,8 +423,8 @@ pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence>
     precedences
 }
 
-/// Returns each subtask's place in the order in which one core runs the DAG if it
-/// always takes the first registered of the ready ones.
+/// Returns each subtask's place in the order of a single core that always runs the first registered
+/// ready subtask.
 fn places(graph: &Graph) -> Vec<usize> {
     let mut missing = graph.predecessor_counts();
     let mut ready: BinaryHeap<Reverse<SubtaskId>> =

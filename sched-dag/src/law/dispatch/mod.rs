@@ -1,4 +1,5 @@
-//! R5, and T1 to T4, for a journal: the changes that its events are. Each cluster is judged for itself.
+//! Judges R5, and T1 to T4, in a journal: turns its events into changes of the dispatch, cluster by
+//! cluster.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
@@ -14,7 +15,7 @@ use crate::policies::SchedulerOptions;
 use crate::policy::OnFault;
 use crate::task_set::{Dag, TaskSet};
 
-/// The findings about R5 in a journal.
+/// The findings about R5 and T1 to T4 in a journal.
 #[derive(Clone, Debug, Default)]
 pub struct DispatchReport {
     /// Every breach.
@@ -23,12 +24,11 @@ pub struct DispatchReport {
     pub waits: WaitCounts,
 }
 
-/// Holds a journal against R5: no instance is owed a core for longer than the terms
-/// tolerate.
+/// Checks a journal against R5: no instance is owed a core for longer than tolerated.
 ///
-/// The events are in their order; one whose time is before that of an earlier one
-/// counts as of that. If the oldest ones are lost, a core takes part from its first known
-/// event on. An ended DAG's waiting instances are owed nothing.
+/// The events must be in their order; an event with an earlier time than its predecessor counts at
+/// the predecessor's time. If the oldest events are lost, a core takes part from its first known
+/// event on. Waiting instances of an ended DAG are owed nothing.
 #[must_use]
 pub fn judge_dispatch(
     task_set: &TaskSet,
@@ -68,7 +68,7 @@ pub fn judge_dispatch(
     all
 }
 
-/// Judges the events of one cluster's DAGs, in a journal that begins and ends then.
+/// Judges the events of one cluster's DAGs, in a journal from `first_ns` to `end_ns`.
 fn of_cluster(
     model: &DispatchModel<'_>,
     terms: JudgeOptions,
@@ -82,7 +82,7 @@ fn of_cluster(
         false => before(cores, events.clone()),
     };
     let mut sweep = DispatchSweep::new(model, terms, first_ns, waits);
-    // A core that no event has named yet may have run anything, so nothing is held against it.
+    // A core not yet named by an event may have run anything, so nothing is held against it.
     sweep.known_cores = known;
     for (instance, stage) in before {
         sweep.enter(instance, stage);
@@ -93,7 +93,7 @@ fn of_cluster(
             sweep.known_cores.insert(event.core);
         }
         violations.extend(sweep.take_entry(&event));
-        // An instance's end is the DAG's too, unless the DAG survives faults.
+        // The end of an instance also ends its DAG, unless the DAG survives faults.
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
         if event.what == EventKind::DagEnded || event.what == EventKind::Ended && ends_its_dag {
             sweep.end_dag(event.dag);
@@ -110,7 +110,7 @@ fn of_cluster(
     violations.extend(wrong_cores(model, events));
 }
 
-/// Returns the breaches that [`judge_dispatch`] finds.
+/// Returns the breaches found by [`judge_dispatch`].
 #[must_use]
 pub fn dispatch_violations(
     task_set: &TaskSet,
@@ -121,8 +121,8 @@ pub fn dispatch_violations(
     judge_dispatch(task_set, options, terms, events).violations
 }
 
-/// Returns the state that must have been before the first event: which cores were busy,
-/// or idle with something else's end to come, and what each instance was.
+/// Returns the state before the first event: the cores busy then (or idle, if their first event
+/// ends an instance elsewhere), and the state of each instance.
 fn before(
     cores: Range<u32>,
     events: impl Iterator<Item = Event>,
@@ -144,8 +144,8 @@ fn before(
     (busy.collect(), first_of_instance)
 }
 
-/// Returns the instances on a core that is not theirs, by cluster, table or affinity, or that lost a
-/// core that they keep.
+/// Returns breaches by instances on a core forbidden by cluster, table or affinity, and by
+/// instances that lost a core they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let mut suspended = BTreeSet::new();
     let found = events.filter_map(|event| {
@@ -171,7 +171,8 @@ fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -
                 suspended.insert(instance);
                 false
             }
-            // After a wait it is resumed, too, on any core: that it has given up itself (W5).
+            // An instance also resumes after a wait, on any core, since the wait gave up its core
+            // (W5).
             EventKind::Resume => {
                 let dag = model.task_set.dag(instance.dag);
                 dag.subtask(instance.subtask).waits().is_empty() || suspended.remove(&instance)

@@ -1,9 +1,9 @@
 //! The jobs of one DAG that are due and not released, as runs of consecutive numbers.
 //!
-//! Under overload any number of jobs waits, and the same is known of most of them: that they were
-//! queued, have missed their deadlines, or were skipped. So jobs with consecutive numbers of which
-//! the same has happened are one *run*, with the moments of the job that joined it last. There are
-//! about as many runs as kinds of events, however many jobs wait.
+//! Under overload any number of jobs waits, and most of them share the same known events: queued,
+//! missed, or skipped. So jobs with consecutive numbers and the same events form one *run*, with
+//! the moments of the job that joined the run last. The number of runs stays near the number of
+//! kinds of events, however many jobs wait.
 
 use alloc::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ pub(super) struct Backlog(BTreeMap<u64, WaitingRun>);
 
 #[derive(Clone, Copy)]
 struct WaitingRun {
-    /// The number behind its last one.
+    /// The number after the run's last job.
     end: u64,
     queued: Option<StepTime>,
     skipped: Option<StepTime>,
@@ -31,7 +31,7 @@ impl WaitingRun {
 }
 
 impl Backlog {
-    /// Returns the run of a job, with its first number.
+    /// Returns the run of a job, and its first number.
     fn find(&self, job: u64) -> Option<(u64, WaitingRun)> {
         let (&first, &run) = self.0.range(..=job).next_back()?;
         (job < run.end).then_some((first, run))
@@ -41,7 +41,7 @@ impl Backlog {
         self.find(job).is_some()
     }
 
-    /// Takes a job out.
+    /// Takes a job out, and splits its run if needed.
     pub(super) fn take(&mut self, job: u64) -> Option<JobState> {
         let (first, run) = self.find(job)?;
         self.0.remove(&first);
@@ -59,7 +59,7 @@ impl Backlog {
         })
     }
 
-    /// Puts a job in, which is not there.
+    /// Adds a new job, and joins runs with the same events.
     pub(super) fn put(&mut self, job: u64, state: &JobState) {
         let (mut first, mut run) = (
             job,
@@ -87,7 +87,7 @@ impl Backlog {
         self.0.insert(first, run);
     }
 
-    /// Forgets skipped jobs before one that is complete, from the first one on.
+    /// Forgets skipped jobs before a complete job, starting with the first run.
     pub(super) fn forget_before(&mut self, job: u64) {
         while let Some(entry) = self.0.first_entry()
             && *entry.key() < job

@@ -1,37 +1,37 @@
 //! Rules R1 and R4: when a job is released, and when it is complete.
 //!
-//! R1: a job is released, queued or skipped at or after its nominal release, and not
-//! both released and skipped; sporadic ones are due at least T apart, and never before
-//! O. No more jobs are in flight than may be. Where times are exact, a release is carried
-//! out at the nominal instant or, if it was queued, when an older job ends.
+//! R1: a job is released, queued or skipped at or after its nominal release, and is not both
+//! released and skipped. Sporadic jobs are due at least the minimum inter-arrival time T apart, and
+//! never before the offset O. The number of jobs in flight never exceeds its maximum. Where times
+//! are exact, a release is carried out at its nominal instant or, after queueing, when an older job
+//! ends.
 //!
-//! R4: a job is complete with the last of its instances, which must all be over, in the
-//! scheduler's step that the last one brings about, within the tolerance. So is one that
-//! was aborted, or cut short by its DAG's end. Whether it is late is the affair of
-//! `deadlines`.
+//! R4: a job is complete with the last of its instances: all instances must be over, and the
+//! completion belongs to the scheduler step in which the last instance ends, within the tolerance.
+//! The same is true for a job aborted, or cut short by the end of its DAG. The next section says
+//! whether a job is late.
 //!
 //! # R4: when a job is late
 //!
-//! A job has missed a deadline if and only if a sink finishes later than its own. A core
-//! may finish in time while another one is just noticing the miss: that is a breach only
-//! if more than the tolerance lies between. Where times are exact, a miss is noticed at
-//! once: of several sinks, when the first deadline has passed that one of them does not
-//! meet.
+//! A job has missed a deadline if and only if a sink finishes later than the sink's own deadline. A
+//! core may finish in time while another core is just noticing the miss: this is a breach only
+//! beyond the tolerance. Where times are exact, a miss is noticed at once: with several sinks,
+//! right after the first deadline not met by its sink.
 //!
-//! Of a job that was aborted, or cut short by its DAG's end, it is not judged.
+//! Lateness is not judged for a job aborted, or cut short by the end of its DAG.
 //!
 //! # R2 and R3: what an instance waits for, and what makes it ready
 //!
-//! The *conditions* of an instance are the finish of each predecessor in its job, the end
-//! of its subtask's instance in the precursor and, for a source, its job's release.
+//! The *conditions* of an instance are the finish of each predecessor in its job, the end of the
+//! same subtask's instance in the precursor and, for a source, the release of its job.
 //!
-//! R2: it is neither ready nor started before all of them. As each instance waits for the
-//! one before it, no two of one subtask overlap.
+//! R2: an instance is neither ready nor started before all its conditions hold. As each instance
+//! waits for the same subtask's previous instance, no two instances of one subtask overlap.
 //!
-//! R3: it becomes ready in the scheduler's step that one of its conditions brings about.
-//! With R2 that is the last one, so all that waits for a finish and for nothing else is
-//! released in one step. Which of two is the last is left open, for two cores may finish
-//! and then take the scheduler's lock in the other order. And it does become ready, within
+//! R3: an instance becomes ready in the scheduler step that fulfils one of its conditions. With R2
+//! this is the last condition, so all instances waiting for nothing but one finish are released in
+//! one step. The rule leaves open which of two finishes is the last, for two cores may finish and
+//! then take the scheduler's lock in the other order. And the instance does become ready, within
 //! the tolerance.
 
 use alloc::vec::Vec;
@@ -43,21 +43,21 @@ use crate::law::sweep::DispatchState;
 use crate::law::{Violation, latest};
 use crate::policy::OverrunPolicy;
 
-/// The state of a job as the events so far tell it.
+/// The state of a job after the events so far.
 #[derive(Default)]
 pub(super) struct JobState {
-    /// The nominal release; `None` for a sporadic job until it is released.
+    /// The nominal release; `None` for a sporadic job before its release.
     pub(super) release_ns: Option<u64>,
-    /// Whether its release may be among the events that are lost.
+    /// Whether the release may be among the lost events.
     pub(super) is_partial: bool,
     pub(super) released: Option<StepTime>,
     pub(super) queued: Option<StepTime>,
     pub(super) skipped: Option<StepTime>,
-    /// When it was aborted, or a fault has cut it.
+    /// When the job was aborted, or cut by a fault.
     pub(super) cut: Option<StepTime>,
     pub(super) missed: Option<StepTime>,
     pub(super) completed: Option<StepTime>,
-    /// By subtask, as far as there is one.
+    /// By subtask, up to the last subtask with an event.
     pub(super) lives: Vec<Option<InstanceLife>>,
 }
 
@@ -70,12 +70,12 @@ impl JobState {
         }
     }
 
-    /// Returns the life of an instance, as far as it is known.
+    /// Returns the life of an instance, as far as known.
     pub(super) fn life(&self, subtask: SubtaskId) -> Option<&InstanceLife> {
         self.lives.get(subtask.index())?.as_ref()
     }
 
-    /// Returns the life of an instance, which begins at a stage if none is known.
+    /// Returns the life of an instance; an unknown life begins at the given stage.
     pub(super) fn life_from(
         &mut self,
         subtask: SubtaskId,
@@ -87,7 +87,7 @@ impl JobState {
         self.lives[subtask.index()].get_or_insert_with(|| InstanceLife::new(first))
     }
 
-    /// Takes note of an event; that it happens twice is a breach.
+    /// Records an event, and returns the breach if the same event has happened before.
     fn note(&mut self, event: &Event, moment: StepTime) -> Option<Violation> {
         let place = match event.what {
             EventKind::Released => &mut self.released,
@@ -98,7 +98,7 @@ impl JobState {
             _ => &mut self.completed,
         };
         let earlier = place.replace(moment)?;
-        // The first one counts for what follows: the second is the breach.
+        // The first event counts for later judgements: the second event is the breach.
         *place = Some(earlier);
         let (event, before, before_ns) = (*event, event.what, earlier.time_ns);
         Some(match before {
@@ -119,12 +119,12 @@ impl JobState {
 }
 
 impl DagReplay {
-    /// Forgets the jobs before a complete one that are over.
+    /// Forgets the jobs before a complete job, as long as they are over themselves.
     fn forget_before(&mut self, job: u64) {
         while let Some(first) = self.jobs.first_entry()
             && *first.key() < job
-            // Only from the front: a job in the middle may still be asked for by the next job's
-            // instances.
+            // Only from the front: the instances of the next job may still ask for a job in the
+            // middle.
             && first.get().completed.is_some()
         {
             self.forgotten = first.key() + 1;
@@ -135,7 +135,7 @@ impl DagReplay {
 }
 
 impl JournalReplay<'_> {
-    /// Takes what happens to a job that is due.
+    /// Judges the release, queueing or skipping of a job.
     pub(super) fn release(&mut self, event: &Event) {
         let event = *event;
         let Event { dag, job, .. } = event;
@@ -154,7 +154,7 @@ impl JournalReplay<'_> {
         {
             let before_ns = known.released.map_or(0, |released| released.time_ns);
             let before = EventKind::Released;
-            // Twice, or queued or skipped after all.
+            // Released twice, or queued or skipped after the release.
             found[0] = Some(Violation::ReleasedAgain {
                 event,
                 before,
@@ -163,7 +163,7 @@ impl JournalReplay<'_> {
             self.found.extend(found.into_iter().flatten());
             return;
         }
-        // A job is first due, and in flight only from its release on.
+        // A job is first due, and in flight only after its release.
         let mut waiting = of_dag.waiting.take(job).unwrap_or_default();
         found[0] = waiting.note(&event, moment);
         if is_released && let Some(skipped) = waiting.skipped {
@@ -189,7 +189,7 @@ impl JournalReplay<'_> {
         }
     }
 
-    /// The first thing that is wrong with a release but that it is early.
+    /// Returns the first breach by a release, other than an early release.
     fn released_at_wrong_time(
         &self,
         event: &Event,
@@ -200,7 +200,7 @@ impl JournalReplay<'_> {
         let Event { dag, job, .. } = event;
         let model = self.task_set.dag(dag);
         let of_dag = &self.dags[dag.index()];
-        // The order of the checks decides which breach is told: one release, one breach.
+        // The order of the checks decides which breach is reported: one release, one breach.
         if let Some((later, _)) = of_dag.latest.filter(|latest| latest.0 > job) {
             return Some(Violation::OutOfOrder { event, later });
         }
@@ -216,7 +216,7 @@ impl JournalReplay<'_> {
             return self.terms.is_whole.then_some(Violation::NotDue { event });
         };
         if model.is_sporadic() {
-            // From nominal release to nominal release, however late each was made.
+            // Between nominal releases, however late each was carried out.
             let before_ns = of_dag.latest.and_then(|(_, release_ns)| release_ns);
             let earliest_ns = before_ns.map_or(model.offset_ns(), |before_ns| {
                 before_ns.saturating_add(model.period_ns())
@@ -243,22 +243,24 @@ impl JournalReplay<'_> {
         })
     }
 
-    /// From now on the job is in flight.
+    /// Puts a released job in flight.
     fn open_job(&mut self, event: &Event, release_ns: Option<u64>, mut begun: JobState) {
         let Event { dag, job, .. } = *event;
         let moment = self.moment(event);
-        // Only what is skipped at its deadline misses it at that instant (rule 4).
+        // Only a job skipped at its deadline misses at that very instant (rule 4 of `overrun`).
+        // This job was released after all, so its miss came too early.
         let early = self.dag(dag).given_up.take_if(|missed| missed.job == job);
         if let (Some(event), Some(deadline_ns)) = (early, self.deadline_ns(dag, job)) {
             self.found
                 .push(Violation::MissedEarly { event, deadline_ns });
         }
-        // Judged when it was written; by now only the latest one of its run is known.
+        // Judged when it was written; by now the backlog knows only the latest miss of the job's
+        // run.
         if let (Some(missed), Some(deadline_ns)) = (&mut begun.missed, self.deadline_ns(dag, job)) {
             missed.time_ns = deadline_ns + 1;
         }
         let of_dag = self.dag(dag);
-        // Something of a partial one may have happened, such as its deadline's passing.
+        // Events of a partial job may have come before, such as a miss of its deadline.
         if let Some(partial) = of_dag.jobs.remove(&job) {
             begun.missed = begun.missed.or(partial.missed);
             begun.lives = partial.lives;
@@ -270,7 +272,7 @@ impl JournalReplay<'_> {
         of_dag.latest = of_dag.latest.max(Some((job, release_ns)));
     }
 
-    /// Takes what happens to a job later.
+    /// Judges a job's miss, abort or completion.
     pub(super) fn job(&mut self, event: &Event) {
         let Event { dag, job, .. } = *event;
         let moment = self.moment(event);
@@ -295,8 +297,7 @@ impl JournalReplay<'_> {
             self.found.push(again);
             return;
         }
-        // A deadline is judged when all is known: at the completion, or by a miss that comes after
-        // it.
+        // A deadline is judged when all is known: at the completion, or by a miss coming after it.
         let is_judged = event.what != EventKind::Aborted && known.completed.is_some();
         let was_counted = known.released.is_some();
         if event.what == EventKind::Completed {
@@ -317,7 +318,7 @@ impl JournalReplay<'_> {
         }
     }
 
-    /// Returns the first deadline of a job of a periodic DAG.
+    /// Returns the first deadline of a job of a periodic DAG, in nanoseconds.
     fn deadline_ns(&self, dag: DagId, job: u64) -> Option<u64> {
         let model = self.task_set.dag(dag);
         let of_sinks = model.sinks().iter();
@@ -326,7 +327,7 @@ impl JournalReplay<'_> {
         (first_ns.min().filter(|_| is_on_grid)).map(|ns| model.grid_ns(job).saturating_add(ns))
     }
 
-    /// R4 for a job that has missed its deadline before it was released.
+    /// R4 for a job that missed its deadline before its release.
     fn missed_while_waiting(&mut self, event: &Event) -> Option<Violation> {
         let event = *event;
         let deadline_ns = self.deadline_ns(event.dag, event.job)?;
@@ -346,7 +347,7 @@ impl JournalReplay<'_> {
         crate::ids::to_u32(self.task_set.dag(dag).subtasks().len())
     }
 
-    /// R4: complete with the last instance, in its step.
+    /// R4: a job is complete with its last instance, in the same step.
     fn completed_at_wrong_time(&self, event: &Event, completed: StepTime) -> Option<Violation> {
         let event = *event;
         let Event { dag, job, .. } = event;
@@ -360,15 +361,15 @@ impl JournalReplay<'_> {
             let life = known.life(subtask);
             match life.and_then(InstanceLife::over) {
                 Some(over) if over.time_ns <= completed.time_ns => {
-                    // The latest end is what the completion has to follow.
+                    // The completion has to follow the latest end.
                     if over.time_ns >= last_ns {
                         (last, last_ns) = (over, over.time_ns);
                     }
                     has_cause |= is_same_step(over);
                 }
-                // Of an ended DAG, an instance may be taken away for good.
+                // In an ended DAG, an instance may be taken away for good.
                 _ if of_dag.is_ended => return None,
-                // All its events may be among those that are lost.
+                // All events of the instance may be lost.
                 None if known.is_partial && life.is_none() => return None,
                 late => {
                     let awaited = Instance { dag, job, subtask };
@@ -395,7 +396,7 @@ impl JournalReplay<'_> {
         })
     }
 
-    /// R4 at the end, for a job that is not complete.
+    /// R4 at the end of the journal, for an incomplete job.
     pub(super) fn never_completed(&self, dag: DagId, job: u64) -> Option<Violation> {
         let of_dag = &self.dags[dag.index()];
         let known = of_dag.jobs.get(&job)?;
@@ -407,13 +408,14 @@ impl JournalReplay<'_> {
             Some(life.over()?.time_ns)
         };
         let end_ns = self.end_ns;
-        // All instances are over, and the completion is missing, if the latest was long enough ago.
+        // All instances are over, and the completion is missing, if the latest end was long enough
+        // ago.
         let over_ns = latest((0..self.subtasks(dag)).map(over_ns))
             .filter(|over_ns| !self.is_tolerable(*over_ns, end_ns));
         let unfinished = Violation::Unfinished { dag, job, end_ns };
         match over_ns {
             Some(over_ns) => Some(Violation::NeverCompleted { dag, job, over_ns }),
-            // A trace that was cut off may end in the middle of a job.
+            // A trace cut off early may end in the middle of a job.
             None => self.terms.is_complete.then_some(unfinished),
         }
     }
@@ -432,7 +434,7 @@ impl SinkDeadline {
 }
 
 impl JournalReplay<'_> {
-    /// Returns the deadlines of a job's sinks; `None` if its release is not known.
+    /// Returns the deadlines of a job's sinks, or `None` if the job's release is not known.
     fn dues(&self, dag: DagId, known: &JobState) -> Option<Vec<SinkDeadline>> {
         let release_ns = known.release_ns?;
         let model = self.task_set.dag(dag);
@@ -445,7 +447,7 @@ impl JournalReplay<'_> {
         Some(model.sinks().iter().map(due).collect())
     }
 
-    /// R4 for the deadlines of a job, as far as it has come.
+    /// R4 for the deadlines of a job, judged by the events so far.
     fn missed_wrongly(&self, dag: DagId, job: u64) -> Option<Violation> {
         let of_dag = &self.dags[dag.index()];
         let known = of_dag.jobs.get(&job)?;
@@ -457,7 +459,8 @@ impl JournalReplay<'_> {
             let late = late.max_by_key(|due| due.finish_ns)?;
             let finish_ns = late.finish_ns?;
             let may_be_lost = self.may_be_lost(&dues);
-            // A job that is cut before its deadline counts as that, and never as a miss (rule 4).
+            // A job cut before its deadline counts as cut, and never as a miss (rule 4 of
+            // `overrun`).
             let is_cut = known.cut.is_some() || of_dag.is_ended;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
@@ -466,7 +469,7 @@ impl JournalReplay<'_> {
                 deadline_ns: late.deadline_ns,
             });
         };
-        // Which of several sinks is meant is not known if a finish may be lost.
+        // If a finish may be lost, the missing one of several sinks is not known.
         if known.is_partial && dues.len() > 1 {
             return None;
         }
@@ -478,8 +481,8 @@ impl JournalReplay<'_> {
             job,
             subtask: None,
         };
-        // A sink that met its deadline may be meant, too: its core may have finished while another
-        // one was noticing the miss.
+        // Sinks that met their deadlines are candidates, too: the core may have finished while
+        // another core was noticing the miss.
         let may_be_meant = |due: &&SinkDeadline| {
             let finish_ns = due.finish_ns.filter(|_| due.is_met());
             finish_ns.is_none_or(|finish_ns| self.is_tolerable(finish_ns, missed.time_ns))
@@ -491,7 +494,7 @@ impl JournalReplay<'_> {
             .min();
         let earliest_ns = dues.iter().map(|due| due.deadline_ns).min()?;
         let deadline_ns = meant_ns.unwrap_or(earliest_ns);
-        // One that is given up at its deadline misses it at that instant (rule 4).
+        // A job given up at its deadline misses at that very instant (rule 4 of `overrun`).
         let is_given_up = known.cut.is_some_and(|cut| cut.time_ns == missed.time_ns);
         if missed.time_ns + u64::from(is_given_up) <= deadline_ns {
             return Some(Violation::MissedEarly { event, deadline_ns });
@@ -504,19 +507,19 @@ impl JournalReplay<'_> {
                 deadline_ns: last.deadline_ns,
             });
         }
-        // The first instant after the deadline notices it.
+        // The first instant after the deadline notices the miss.
         let is_late = self.is_exact() && missed.time_ns > deadline_ns + 1;
         is_late.then_some(Violation::MissedLate { event, deadline_ns })
     }
 
-    /// Reports whether what followed from one of the deadlines may be among the events
-    /// that are lost: the job's miss, or an abort before.
+    /// Reports whether events following one of the deadlines may be lost: the job's miss, or an
+    /// earlier abort.
     fn may_be_lost(&self, dues: &[SinkDeadline]) -> bool {
         let earliest_ns = dues.iter().map(|due| due.deadline_ns).min();
         !self.terms.is_whole && earliest_ns < self.first_ns
     }
 
-    /// R4 at the end, for the deadlines of a job that is not complete.
+    /// R4 at the end of the journal, for the deadlines of an incomplete job.
     pub(super) fn never_missed(&self, dag: DagId, job: u64) -> Option<Violation> {
         let of_dag = &self.dags[dag.index()];
         let known = of_dag.jobs.get(&job)?;
@@ -543,23 +546,23 @@ impl JournalReplay<'_> {
 
 /// A condition of an instance.
 struct InstanceCondition {
-    /// The instance that must be over; `None`: the release.
+    /// The instance that must be over, or `None` for the release.
     awaited: Option<Instance>,
-    /// When it held; `None`: it is not known to have held.
+    /// When the condition was met, or `None` if not known.
     held: Option<StepTime>,
-    /// Whether it may have held without leaving an event.
+    /// Whether the condition may have been met without leaving an event.
     may_be_lost: bool,
 }
 
 impl JournalReplay<'_> {
-    /// Judges that an instance becomes ready, or starts without having been.
+    /// Judges the readiness of an instance, or its start without a readiness.
     pub(super) fn join(&mut self, event: &Event, instance: Instance, moment: StepTime) {
         let too_early = self.before_release(event, instance);
         self.found.extend(too_early);
         let too_early = self.before_join(event, instance);
         let is_early = too_early.is_some();
         self.found.extend(too_early);
-        // One breach is told once: what follows from a wrong readiness is no news.
+        // One breach is reported once: consequences of a wrong readiness are no news.
         if is_early || event.what != EventKind::Ready {
             return;
         }
@@ -603,7 +606,7 @@ impl JournalReplay<'_> {
                 may_be_lost: life.is_none() && is_partial,
             }
         });
-        // Not job - 1: a skipped job has no instances, so the order is that of released ones.
+        // Not job - 1: a skipped job has no instances, so only released jobs count.
         let precursor = of_dag.jobs.range(..job).next_back();
         let of_precursor = precursor.map(|(&job, known)| {
             let life = known.life(subtask);
@@ -621,10 +624,10 @@ impl JournalReplay<'_> {
         of_predecessors.chain(of_precursor).chain(of_release)
     }
 
-    /// Returns the condition that held last, if all are known to have held.
+    /// Returns the condition met last, if all are met.
     fn last_condition(&self, instance: Instance) -> Option<InstanceCondition> {
         let mut last: Option<InstanceCondition> = None;
-        // At one time a finish comes after the release: it is what the latency is measured from.
+        // At equal times a finish comes after the release: the latency is measured from the finish.
         let rank = |condition: &InstanceCondition| {
             let time_ns = condition.held.map(|held| held.time_ns);
             (time_ns, condition.awaited.is_some())
@@ -641,7 +644,7 @@ impl JournalReplay<'_> {
         last
     }
 
-    /// R1 for an instance.
+    /// R1 for an instance: it neither becomes ready nor starts before its job's release.
     fn before_release(&self, event: &Event, instance: Instance) -> Option<Violation> {
         let event = *event;
         let job = self.dags[instance.dag.index()].jobs.get(&instance.job)?;
@@ -653,7 +656,7 @@ impl JournalReplay<'_> {
         is_early.then_some(Violation::BeforeReleased { event, released_ns })
     }
 
-    /// R2: the first condition that did not hold.
+    /// R2: returns the first unmet condition as a breach.
     fn before_join(&self, event: &Event, instance: Instance) -> Option<Violation> {
         let mut early = self.conditions(instance).filter_map(|condition| {
             let awaited = condition.awaited?;
@@ -671,7 +674,7 @@ impl JournalReplay<'_> {
         early.next()
     }
 
-    /// R3 at the end: all conditions hold, and nothing happens.
+    /// R3 at the end of the journal: all conditions are met, and nothing happens.
     pub(super) fn never_ready(&self, instance: Instance) -> Option<Violation> {
         let of_dag = &self.dags[instance.dag.index()];
         let job = of_dag.jobs.get(&instance.job)?;
@@ -681,7 +684,8 @@ impl JournalReplay<'_> {
         }
         let held = self.last_condition(instance)?.held?;
         let is_tolerable = self.is_tolerable(held.time_ns, self.end_ns);
-        // Of a run in which every job has ended nothing is still to come, however short ago it was.
+        // After a run in which every job has ended, nothing is still to come, however recent the
+        // last condition.
         (!is_tolerable || self.terms.is_complete).then_some(Violation::NeverReady {
             instance,
             since_ns: held.time_ns,

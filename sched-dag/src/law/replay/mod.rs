@@ -1,31 +1,32 @@
-//! Replaying a journal: R1 to R4, one life of each instance, one instance on each core.
+//! Replays a journal: R1 to R4, one life of each instance, one instance on each core.
 //!
-//! The events are taken in their order, in which each comes after all that it follows
-//! from, and held against what is known by then: so what is not there yet has not
-//! happened, whatever its time says. Jobs are forgotten once they are complete and
-//! nothing waits for them any more, and of those that are due and wait only runs are kept
-//! ([`backlog`]), so the memory that it takes is that of the jobs in flight.
+//! The replay takes the events in their order, where each event comes after all its causes, and
+//! compares each event with the state known so far. An event not yet seen has not happened,
+//! whatever time it carries. Complete jobs are forgotten once nothing waits for them any more, and
+//! jobs that are due and waiting are kept as runs ([`backlog`]). So the replay needs memory for the
+//! jobs in flight only.
 //!
-//! Words. A *step* of the scheduler is known by the core that made it and by that core's
-//! last machine event before it: between two machine events of a core, a completion's
-//! step cannot begin. A *moment* is when and in which step something happened. A job's
-//! *precursor* is the job of the same DAG that was released before it.
+//! Words. A *step* of the scheduler is identified by its core and by the core's last machine event
+//! before the step. (A completion's step begins with a machine event, never between two of them.) A
+//! *moment* is the time and the step of an event. A job's *precursor* is the job of the same DAG
+//! released before it.
 //!
-//! If the oldest events are lost, a job is *partial* if its release may be among them:
-//! of what is not there of it, nothing can be concluded. All other jobs are judged as in
+//! If the oldest events are lost, a job is *partial* if its release may be among the lost events:
+//! nothing can be concluded from a missing event of a partial job. All other jobs are judged as in
 //! a whole journal.
 //!
 //! # One life of each instance, and one instance on each core
 //!
-//! *One life*: an instance becomes ready once, starts once and only when ready, is
-//! suspended only where it runs, resumed only when suspended, and finishes once, where it
-//! runs. That also says that it is on one core at a time. It is cancelled only if its job
-//! was cut, and each of this is no earlier than what comes before it.
+//! *One life*: an instance becomes ready once, starts once and only when ready, is suspended only
+//! on the core where it runs, resumed only when suspended, and finishes once, on the core where it
+//! runs. So an instance is on one core at a time. An instance is cancelled only if its job was cut.
+//! The time of each event is no earlier than the time of the event before.
 //!
-//! *One core*: what is left over from one instance is a core's *occupant*: it must be
-//! gone before the next one starts or is resumed.
+//! *One core*: an instance on a core is the core's *occupant*. The occupant must be gone before the
+//! next instance starts or is resumed there.
 //!
-//! If its job is partial, an instance's first event tells what it must have been before.
+//! The first known event of an instance of a partial job tells the instance's state before the
+//! event.
 
 mod backlog;
 mod jobs;
@@ -43,21 +44,19 @@ use crate::task_set::TaskSet;
 use backlog::Backlog;
 use jobs::JobState;
 
-/// The findings about R1 to R4, lives of DAGs and cores in a journal.
+/// The findings about R1 to R4, waits, lives of instances, and cores in a journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReplayVerdict {
-    /// Every breach, in the order in which they were found.
+    /// Every breach, in the order of discovery.
     pub violations: Vec<Violation>,
-    /// The longest time from a finish that an instance waited for last to its
-    /// readiness.
+    /// The longest time from the finish an instance waited for last to the instance's readiness.
     pub finish_to_ready_max_ns: u64,
 }
 
-/// Holds a journal against the rules R1 to R4, and each instance and each core against
-/// what no machine may do.
+/// Checks a journal against the rules R1 to R4, and each instance and each core against the limits
+/// of any machine.
 ///
-/// Which instance should have run is judged by
-/// [`dispatch_violations`](super::dispatch_violations).
+/// [`dispatch_violations`](super::dispatch_violations) judges which instance should have run.
 #[must_use]
 pub fn judge(
     task_set: &TaskSet,
@@ -88,7 +87,7 @@ pub fn judge(
     }
 }
 
-/// Returns the breaches that [`judge`] finds.
+/// Returns the breaches found by [`judge`].
 #[must_use]
 pub fn violations(
     task_set: &TaskSet,
@@ -103,7 +102,7 @@ struct JournalReplay<'a> {
     terms: JudgeOptions,
     dags: Vec<DagReplay>,
     cores: Vec<CoreReplay>,
-    /// The time at which the first event was written.
+    /// When the first event was written.
     first_ns: Option<u64>,
     /// The latest time so far.
     end_ns: u64,
@@ -113,38 +112,39 @@ struct JournalReplay<'a> {
 
 #[derive(Default)]
 struct DagReplay {
-    /// The jobs that are released, or partial, and not forgotten.
+    /// The jobs that are released or partial, and not forgotten.
     jobs: BTreeMap<u64, JobState>,
     /// The jobs that are due and not released.
     waiting: Backlog,
-    /// The latest waiting job that missed its deadline at that instant, and is to be skipped.
+    /// The miss of the latest waiting job that missed at the very instant of its deadline. The job
+    /// must be skipped.
     given_up: Option<Event>,
-    /// How many jobs were released and are not complete.
+    /// The number of released jobs not yet complete.
     in_flight: u32,
-    /// All jobs before this one are forgotten or not complete.
+    /// All jobs before this number are forgotten or not complete.
     forgotten: u64,
-    /// The sporadic job that is being released, and when it was due.
+    /// The sporadic job being released, and when it was due.
     due: Option<(u64, u64)>,
-    /// The job that was released last, and its nominal release.
+    /// The latest released job, and its nominal release.
     latest: Option<(u64, Option<u64>)>,
-    /// When a job was complete last.
+    /// When the latest completion of a job happened.
     completed_ns: Option<u64>,
     is_ended: bool,
-    /// Whether it is paused or closed, and so releases nothing.
+    /// Whether the DAG is paused or closed, and so releases nothing.
     is_off: bool,
-    /// The jobs of the faults after which it went on.
+    /// The jobs with faults that the DAG has survived.
     faults: Vec<u64>,
 }
 
 #[derive(Clone, Default)]
 struct CoreReplay {
-    /// Counts its machine events.
+    /// Counts the core's machine events.
     step: u64,
-    /// The instance that it runs.
+    /// The instance running on the core.
     occupant: Option<Instance>,
 }
 
-/// When and in which step of the scheduler something happened.
+/// The time and the scheduler step of an event.
 #[derive(Clone, Copy)]
 struct StepTime {
     time_ns: u64,
@@ -160,7 +160,7 @@ impl StepTime {
 
 impl JournalReplay<'_> {
     fn judge_event(&mut self, event: &Event) {
-        // The time of these may be before that of events that are lost.
+        // A finish or a due release may carry an earlier time than lost events.
         if !matches!(event.what, EventKind::Finish | EventKind::Due) {
             self.first_ns.get_or_insert(event.time_ns);
         }
@@ -197,18 +197,18 @@ impl JournalReplay<'_> {
         }
     }
 
-    /// Reports whether something may last so long.
+    /// Reports whether the tolerance allows this delay.
     const fn is_tolerable(&self, from_ns: u64, to_ns: u64) -> bool {
         to_ns <= from_ns.saturating_add(self.terms.tolerance_ns)
     }
 
-    /// Reports whether the times are those at which the model lets things happen.
+    /// Reports whether times must be exactly those of the model.
     const fn is_exact(&self) -> bool {
         self.terms.tolerance_ns == 0
     }
 
-    /// Finds the job of an event; takes it for a partial one if it may be. That it can
-    /// be neither is a breach.
+    /// Finds the job of an event. Treats an unknown job as partial if its first events may be lost;
+    /// otherwise records a breach. Returns whether the event can be judged.
     fn find_job(&mut self, event: &Event) -> bool {
         let Event { dag, job, .. } = *event;
         let model = self.task_set.dag(dag);
@@ -221,7 +221,7 @@ impl JournalReplay<'_> {
         }
         let is_over = job < of_dag.forgotten;
         let is_partial = may_be_lost && !is_over && !of_dag.waiting.contains(job);
-        // In both cases nothing is concluded from what is not there of it.
+        // In both cases, nothing is concluded from missing events of the job.
         of_dag.jobs.insert(job, JobState::partial(release_ns));
         if !is_partial {
             let event = *event;
@@ -249,17 +249,17 @@ impl JournalReplay<'_> {
     }
 }
 
-/// The state of an instance as the events so far tell it.
+/// The state of an instance after the events so far.
 #[derive(Default)]
 struct InstanceLife {
     stage: DispatchState,
-    /// Its latest event, and when that was.
+    /// The latest event, and its time.
     last: Option<(EventKind, u64)>,
     ready: Option<StepTime>,
     finish: Option<StepTime>,
-    /// When it was cancelled, or ended by a fault.
+    /// When the instance was cancelled, or ended by a fault.
     dropped: Option<StepTime>,
-    /// How many waits it has begun, and when the latest one.
+    /// The number of waits begun, and when the latest wait began.
     waits: (usize, u64),
 }
 
@@ -271,7 +271,7 @@ impl InstanceLife {
         }
     }
 
-    /// Takes note of a wait, or of the finish, and says what is wrong with the waits: W1 and W2.
+    /// Records a wait or the finish, and returns the breach of W1 or W2, if any.
     fn wait(&mut self, event: &Event, stated: &[Wait], terms: JudgeOptions) -> Option<Violation> {
         let (event, (waits, since_ns)) = (*event, self.waits);
         let other = Violation::OtherWaits {
@@ -305,10 +305,11 @@ impl InstanceLife {
         self.finish.or(self.dropped)
     }
 
-    /// Takes note of an event, whether it is allowed or not, and says what is wrong.
+    /// Records an event, whether allowed or not, and returns the breach, if any.
     fn note(&mut self, event: &Event, moment: StepTime) -> Option<Violation> {
         let (stage, last) = (self.stage, self.last);
-        // Also after a breach: else one slip would make each later event a breach of its own.
+        // Also after a breach: otherwise one slip would turn each later event into a breach of its
+        // own.
         self.stage = stage_after(event);
         self.last = Some((event.what, event.time_ns));
         let place = match event.what {
@@ -341,7 +342,7 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
         | (DispatchState::Ready, EventKind::Start | EventKind::Cancelled)
         | (DispatchState::Suspended, EventKind::Resume)
         | (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled)
-        // Whichever core finds the fault, or ends the DAG, ends the instance.
+        // Any core may find the fault or end the DAG, and so end the instance.
         | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
         (
             DispatchState::Running(core),
@@ -376,7 +377,7 @@ pub(super) const fn stage_before(event: &Event) -> DispatchState {
 }
 
 impl JournalReplay<'_> {
-    /// Takes what happens to an instance.
+    /// Judges an event of an instance.
     fn instance(&mut self, event: &Event) {
         let Some(instance) = event.instance() else {
             return;
@@ -416,7 +417,7 @@ impl JournalReplay<'_> {
         if event.what == EventKind::Cancelled && is_uncut {
             self.found.push(Violation::CancelledUncut { event });
         }
-        // A start is judged like a readiness where that did not come before.
+        // A start without an earlier readiness is judged like a readiness.
         let is_first =
             event.what == EventKind::Start && ready_ns.is_none_or(|ns| event.time_ns < ns);
         if event.what == EventKind::Ready || is_first {
@@ -424,7 +425,7 @@ impl JournalReplay<'_> {
         }
     }
 
-    /// D1: a fault after which a DAG went on, although it should have ended.
+    /// D1: returns the breach if a DAG went on after a fault that should have ended it.
     fn beyond_limit(&mut self, event: Event) -> Option<Violation> {
         let OnFault::DropJob(limit) = self.task_set.dag(event.dag).on_fault() else {
             return Some(Violation::FaultBeyondLimit { event });
@@ -441,7 +442,7 @@ impl JournalReplay<'_> {
 
     fn occupy(&mut self, event: &Event, instance: Instance) {
         if event.what == EventKind::Ended {
-            // Another core may have ended it.
+            // A fault may be found on any core, so the instance's own core must be looked for.
             for core in &mut self.cores {
                 core.occupant = core.occupant.filter(|occupant| *occupant != instance);
             }
@@ -450,8 +451,7 @@ impl JournalReplay<'_> {
             return;
         }
         let core = self.core(event.core);
-        // What the scheduler writes from here on, up to the core's next machine event, is of one
-        // step.
+        // All scheduler events from here to the core's next machine event belong to one step.
         core.step += 1;
         let event = *event;
         match event.what {
