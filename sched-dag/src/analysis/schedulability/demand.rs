@@ -1,24 +1,25 @@
-//! Processor demand on one core under EDF: each subtask is finished by its deadline, or no more is
-//! known.
+//! Processor demand on one core under EDF: proves that each subtask finishes by its deadline, or
+//! nothing.
 //!
-//! S. K. Baruah, L. E. Rosier, R. R. Howell, Real-Time Systems 2, 1990; L. George,
-//! N. Rivierre, M. Spuri, INRIA RR-2966, 1996, where work keeps its core. Say a subtask is not
-//! finished at its deadline, and let `t` be the time from the last instant before it at which no
-//! work due by then was pending. In between only such work executes that was released since, and
-//! one subtask that was not to be preempted, is due later, and so has a relative deadline above
+//! S. K. Baruah, L. E. Rosier, R. R. Howell, Real-Time Systems 2, 1990; L. George, N. Rivierre,
+//! M. Spuri, INRIA RR-2966, 1996, for work that keeps its core. Say a subtask is not finished at
+//! its deadline, and let `t` be the time to the deadline from the last earlier instant without
+//! pending work due by the deadline. In between, the core executes only such work, released since,
+//! and at most one non-preemptible subtask that is due later and so has a relative deadline above
 //! `t`. So `t < demand(t) + blocking(t)`, where `demand(t)` sums `(t - D) / T + 1` times the WCET
-//! (floor) over all subtasks with their own `D`. If that is false for all `t` up to the longest
-//! stretch in which the core is busy, every deadline is met. Of these `t` it looks at those that
-//! can be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last one down.
+//! (floor) over all subtasks with their own `D`. If this is false for all `t` up to the longest
+//! busy stretch of the core, every deadline is met. The test checks only those `t` where the
+//! condition may be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last
+//! down.
 //!
-//! The time for which long steps keep the core and a device's interrupts keep the core (bursts, in
-//! `workload`) is added: in the stretch, and in each `t`, as they fall into it.
+//! The time taken from the core by long steps and by a device's interrupts (bursts, in `workload`)
+//! is added: in the stretch, and in each `t`, as much as falls into it.
 //!
-//! The proof is about all DAGs together. Under EDF each of them may delay every other, so what
-//! enters one enters all.
+//! The proof is about all DAGs together. Under EDF each DAG may delay every other, so a feature of
+//! one DAG concerns all.
 //!
-//! Assumes: releases at least `T` apart; WCETs above 0. The order of equal deadlines is fixed.
-//! A subtask that is never preempted counts as if others preempted it, too.
+//! Assumes: releases at least `T` apart; WCETs above 0. The order of equal deadlines is fixed. A
+//! subtask that is never preempted counts as if others preempted it, too.
 
 use alloc::vec::Vec;
 
@@ -28,7 +29,7 @@ use crate::analysis::features::covers;
 use crate::analysis::witness_text::WitnessText;
 use crate::analysis::{DagBound, SchedulabilityTest};
 
-/// The most evaluations of sums, for all DAGs.
+/// The maximum number of evaluations of sums, for all DAGs.
 const STEP_LIMIT: u64 = 4096;
 
 pub(super) const TEST: BoundTest = BoundTest {
@@ -80,18 +81,18 @@ fn certificate(case: &AnalysisInput<'_>, bounds: &[Option<DagBound>], text: &mut
     }
 }
 
-/// The part of each job of a DAG that is due at the same time, under EDF.
+/// The part of a DAG's jobs with the same deadline, under EDF.
 struct DueDemand {
     deadline_ns: u64,
     period_ns: u64,
     volume_ns: u64,
-    /// The largest WCET of those that keep the core, or 0.
+    /// The largest WCET of a subtask in this part that keeps the core, or 0.
     keeps_ns: u64,
 }
 
-/// Looks for a time in which more is due than the core can execute. If there is none, returns the
-/// longest stretch in which it is busy, and the times that show it; `None` also if that takes too
-/// many steps.
+/// Looks for a time with more demand than the core can execute. If there is none, returns the
+/// longest busy stretch, and the times checked as evidence. Returns `None` also if the search takes
+/// too many steps.
 fn demand(case: &AnalysisInput<'_>) -> Option<(u128, Vec<u128>)> {
     let all: Vec<DueDemand> = (0..case.tasks.len()).flat_map(|dag| dues(case, dag)).collect();
     let (all, bursts) = (&all, &case.set.bursts);
@@ -120,7 +121,7 @@ fn demand(case: &AnalysisInput<'_>) -> Option<(u128, Vec<u128>)> {
             after => busy = after,
         }
     }
-    // The last time before another at which something is due.
+    // The last time before another at which work is due.
     let last_before = |time: u128| {
         let last = all.iter().filter_map(|due| {
             let (deadline, period) = (u128::from(due.deadline_ns), u128::from(due.period_ns));
@@ -142,13 +143,13 @@ fn demand(case: &AnalysisInput<'_>) -> Option<(u128, Vec<u128>)> {
         if demand.saturating_add(blocking(time)) > time {
             return None;
         }
-        // From there on no more is due or lost, and no more may block.
+        // From there on no more work is due or lost, and no more may block.
         next = last_before(time.min(demand + most));
     }
     Some((busy, times))
 }
 
-/// Returns the demands of a DAG, by deadlines.
+/// Returns the demands of a DAG, one for each deadline.
 fn dues(case: &AnalysisInput<'_>, dag: usize) -> Vec<DueDemand> {
     let (task, subtasks) = (case.tasks[dag], case.dag(dag).subtasks());
     let mut dues: Vec<DueDemand> = Vec::new();

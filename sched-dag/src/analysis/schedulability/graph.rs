@@ -1,9 +1,9 @@
 //! Response times by a certificate: a closed list of the states of a schedule-abstraction graph.
 //!
-//! [`abstraction`](crate::analysis::abstraction) has graph, check and what both assume;
-//! [`certificate`](crate::analysis::certificate) the text, and how DAGs become a graph. The proof is of
-//! all DAGs together: one that is not covered, or not analysed, leaves all without these bounds, and
-//! the graph isolates none from a fault or an overrun of another.
+//! [`abstraction`](crate::analysis::abstraction) has graph, check and their common assumptions;
+//! [`certificate`](crate::analysis::certificate) the text, and the way from DAGs to a graph. The
+//! proof is about all DAGs together: a DAG that is not covered, or not analysed, leaves all without
+//! these bounds, and the graph isolates no DAG from a fault or an overrun of another.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -33,7 +33,7 @@ pub(super) const TEST: BoundTest = BoundTest {
 
 pub(super) const WITNESS: BoundWitness = BoundWitness {
     certificate: |case, _, text| {
-        // No line but the first is of the hash, which the checker has no need of.
+        // The first line is the hash; the checker does not need it.
         if matches!(case.closed, Some(Ok(_))) {
             let states = case.certificate.unwrap_or_default().lines().skip(1);
             states.for_each(|state| text.line(format_args!("{state}")));
@@ -63,7 +63,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
                 found.offer(dag, latest(of_dag), SchedulabilityTest::Graph);
             }
         }
-        // More telling than that no other test has a bound.
+        // This reason tells more than the general one for a missing bound.
         Err(Some(reason)) => found.reasons.fill(Some(reason)),
         Err(None) => {}
     }
@@ -73,7 +73,8 @@ fn latest(of_dag: &[u64]) -> u64 {
     of_dag.iter().copied().max().unwrap_or(0)
 }
 
-/// Returns the bounds of sinks by DAG and subtask, or the reason for none, where there is a certificate.
+/// Returns the bounds of sinks by DAG and subtask, or the reason for having none despite a
+/// certificate.
 fn bounds<'c>(
     case: &'c AnalysisInput<'_>,
     asked: &[bool],

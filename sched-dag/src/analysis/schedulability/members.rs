@@ -1,11 +1,12 @@
-//! Response times of members: of DAGs in what tables leave of their cores.
+//! Response times of members: DAGs that run when tables leave their cores idle.
 //!
-//! A DAG without a table is a *member* of the group of its cores, with all that have the same ones,
-//! and executes while no entry of a core's table has begun ([`lent_cores`](crate::analysis::lent_cores),
-//! whose proofs these bounds rest on). Of a table these need no more than that it keeps its times.
+//! A DAG without a table is a *member* of the group of its cores, with all other DAGs on the same
+//! cores. It executes while no entry of a core's table has begun
+//! ([`lent_cores`](crate::analysis::lent_cores) has the proofs behind these bounds). The proofs
+//! need no more of a table than that it keeps its times.
 //!
-//! Assumes subtasks that can be preempted and do not wait; of the members of a group that are several:
-//! a static priority that outranks DAG by DAG. A bound is at most `T`, so jobs do not overlap.
+//! Assumes preemptible subtasks that do not wait, and, if a group has several members, static
+//! priorities that rank them DAG by DAG. A bound is at most `T`, so jobs do not overlap.
 
 use alloc::vec::Vec;
 
@@ -55,16 +56,16 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
         bounds[dag] = (terms.own).respond(&terms.cores, &terms.above(), &mut steps);
         match bounds[dag] {
             Some(bound_ns) => found.offer(dag, bound_ns, SchedulabilityTest::Member),
-            // Of one on cores without a table the next test says why.
+            // On cores without a table, the next test gives the reason.
             None => found.reasons[dag] = Some(NotProvenReason::NoBound),
         }
     }
 }
 
-/// The supply that a core's table leaves, or the reason for none.
+/// The supply left by a core's table, or the reason for none.
 type Supply = Result<CoreSupply, NotProvenReason>;
 
-/// Returns that by core, where members need it.
+/// Returns the supply of each core, as far as members need it.
 fn supplies(case: &AnalysisInput<'_>) -> Vec<Supply> {
     let mut supplies = alloc::vec![Ok(CoreSupply::FREE); case.settings.cores as usize];
     for table in &case.tables {
@@ -88,10 +89,10 @@ fn supply(
         let dag = failing.or(table.dags.first().copied());
         dag.map_or(*reason, |dag| NotProvenReason::DelayedBy { dag: case.id(dag) })
     })?;
-    // A length with slack says nothing of what is left of a family at an instant.
+    // A length with slack says nothing about the work left of a family at an instant.
     let times = table.times.as_ref().ok().filter(|times| times.is_exact);
     let times = times.ok_or(NotProvenReason::BesideTable)?;
-    // Long steps make all entries late alike.
+    // Long steps make all entries equally late.
     let latest_ns = |of: &[Vec<u64>]| of.iter().flatten().copied().max().unwrap_or(0);
     let late_ns = latest_ns(finishes_ns) - latest_ns(&times.latest_ns);
     let task = |id| {
@@ -110,7 +111,7 @@ struct MemberTerms<'a> {
 }
 
 impl<'a> MemberTerms<'a> {
-    /// Returns the terms of a member; an error says why there is no equation.
+    /// Returns the terms of a member; an error gives the reason for having no equation.
     fn of(
         case: &'a AnalysisInput<'_>,
         dag: usize,

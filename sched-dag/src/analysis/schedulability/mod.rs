@@ -1,10 +1,10 @@
-//! The tests of a commit: each is one file, which says what its proof covers, and a name in the
-//! table below.
+//! The schedulability tests of a commit. Each test is one file, stating the scope of its proof, and
+//! a name in the table below.
 //!
-//! They are asked in the order of the table, each of the DAGs that it covers (see
-//! [`features`](super::features)). Nobody but this module asks a test, neither for jobs nor for
-//! sinks nor for a witness, and what a test computes is private to its file: so there is no other
-//! way to its answer. Of several bounds the smallest counts.
+//! The tests run in the order of the table, each for the DAGs covered by its proof (see
+//! [`features`](super::features)). Only this module calls the tests, for jobs, for sinks and for
+//! witnesses, and a test's computations are private to its file: so there is no other way to its
+//! answer. Of several bounds the smallest counts.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,14 +14,14 @@ use super::features::Features;
 use super::witness_text::WitnessText;
 use super::{DagBound, NotProvenReason, SchedulabilityTest};
 
-/// The bounds of jobs by DAG, as far as they are known.
+/// The known bounds of jobs, by DAG.
 pub(super) type Responses<'a> = &'a [Option<u64>];
 
 /// A test of schedulability.
 struct BoundTest {
-    /// The names of its bounds, one for each form that it has; a test of sinks alone has none.
+    /// The names of its bounds, one for each form; a test for sinks alone has none.
     names: &'static [SchedulabilityTest],
-    /// The features that its proof covers.
+    /// The features covered by its proof.
     covers: Features,
     /// Bounds jobs.
     jobs: fn(&AnalysisInput<'_>, &mut JobBounds),
@@ -38,12 +38,12 @@ impl BoundTest {
         sinks: |_, _, _| (),
     };
 
-    /// Reports whether it covers all that enters a DAG.
+    /// Reports whether the test covers all features entering a DAG.
     fn is_for(&self, case: &AnalysisInput<'_>, dag: usize) -> bool {
         self.covers.cover(case.entering[dag])
     }
 
-    /// Notes of each DAG whether it covers it, and reports whether it does one.
+    /// Records for each DAG whether the test covers it, and reports whether any DAG is covered.
     fn ask(&self, case: &AnalysisInput<'_>, asked: &mut Vec<bool>) -> bool {
         asked.clear();
         asked.extend((0..case.members.len()).map(|dag| self.is_for(case, dag)));
@@ -51,13 +51,14 @@ impl BoundTest {
     }
 }
 
-/// The part of a test that writes its terms, apart: a program that writes no witness has none.
+/// The part of a test for writing its terms. It is separate, so a program that writes no witness
+/// need not contain it.
 struct BoundWitness {
-    /// Writes what is needed once before all bounds.
+    /// Writes the lines needed once before all bounds.
     certificate: fn(&AnalysisInput<'_>, &[Option<DagBound>], &mut WitnessText),
     /// Writes the terms of a DAG's bound.
     job: fn(&AnalysisInput<'_>, Responses<'_>, usize, u64, &mut WitnessText),
-    /// Writes the terms of a DAG's sinks whose bounds are below that of their job.
+    /// Writes the terms of a DAG's sinks with smaller bounds than their job.
     sinks: fn(&AnalysisInput<'_>, Responses<'_>, usize, u64, &mut WitnessText),
 }
 
@@ -81,25 +82,25 @@ macro_rules! tests {
     };
 }
 
-// Those on whose bounds others rest stand before these. A DAG with a bound has none by `multiple_paths`,
-// so none before that may be longer than its own, but by `windows`.
+// A test comes after the tests on whose bounds it rests. `multiple_paths` bounds only DAGs without
+// a bound, so no earlier test may give a longer bound than `multiple_paths`, except for `windows`.
 tests!(
     one_core windows priorities tables members widths sharp_clip multiple_paths demand graph sink_paths
 );
 
-/// The bounds of jobs, as far as tests have found them.
+/// The bounds of jobs found by the tests so far.
 pub(super) struct JobBounds {
     pub(super) bounds: Vec<Option<DagBound>>,
-    /// Why there is none.
+    /// Why a bound is missing.
     pub(super) reasons: Vec<Option<NotProvenReason>>,
-    /// The first DAG that has none for a reason of its own.
+    /// The first DAG that has no bound for a reason of its own.
     pub(super) first_failing: Option<usize>,
-    /// By DAG, whether the test in hand covers it.
+    /// By DAG, whether the current test covers it.
     asked: Vec<bool>,
 }
 
 impl JobBounds {
-    /// Takes a bound, if the test in hand covers the DAG and no bound as small is known.
+    /// Takes a bound if the current test covers the DAG and no bound as small is known.
     fn offer(&mut self, dag: usize, bound_ns: u64, test: SchedulabilityTest) {
         let is_less = self.bounds[dag].is_none_or(|known| bound_ns < known.bound_ns);
         if self.asked[dag] && is_less {
@@ -108,14 +109,14 @@ impl JobBounds {
     }
 }
 
-/// The bounds of sinks, by DAG and place among its sinks.
+/// The bounds of sinks, by DAG and the sink's position in the DAG.
 pub(super) struct SinkBounds {
     bounds_ns: Vec<Vec<Option<u64>>>,
     asked: Vec<bool>,
 }
 
 impl SinkBounds {
-    /// Takes bounds of the sinks of a DAG, if the test in hand covers it.
+    /// Takes bounds of a DAG's sinks if the current test covers the DAG.
     fn offer(&mut self, dag: usize, found_ns: impl Iterator<Item = Option<u64>>) {
         if self.asked[dag] {
             for (known, found) in self.bounds_ns[dag].iter_mut().zip(found_ns) {
@@ -159,8 +160,8 @@ pub(super) fn is_graph_asked(case: &AnalysisInput<'_>) -> bool {
     (0..case.members.len()).all(|dag| graph::TEST.is_for(case, dag))
 }
 
-/// Returns the bounds of each DAG of a case by each test, where the smallest ones of the others are
-/// known that tests before have found.
+/// Returns each DAG's bounds by each test. Each test knows the smallest bounds of the other DAGs
+/// found by earlier tests.
 pub(super) fn bound_by_each(case: &AnalysisInput<'_>) -> Vec<Vec<DagBound>> {
     let count = case.members.len();
     let (mut by_test, mut best) = (vec![Vec::new(); count], vec![None; count]);
@@ -186,7 +187,7 @@ pub(super) fn bound_by_each(case: &AnalysisInput<'_>) -> Vec<Vec<DagBound>> {
     by_test
 }
 
-/// Returns the bounds of the sinks of a case, by DAG and place among its sinks.
+/// Returns the bounds of the sinks of a case, by DAG and the sink's position in the DAG.
 pub(super) fn bound_sinks(
     case: &AnalysisInput<'_>,
     responses: Responses<'_>,
@@ -204,7 +205,7 @@ pub(super) fn bound_sinks(
     found.bounds_ns
 }
 
-/// Writes what is needed once before all bounds.
+/// Writes the lines needed once before all bounds.
 pub(super) fn write_certificates(
     case: &AnalysisInput<'_>,
     bounds: &[Option<DagBound>],
@@ -217,7 +218,7 @@ pub(super) fn write_certificates(
     }
 }
 
-/// Writes the terms of a DAG's bound, and of its sinks'.
+/// Writes the terms of a DAG's bound, and of its sinks' bounds.
 pub(super) fn write_terms(
     case: &AnalysisInput<'_>,
     responses: Responses<'_>,

@@ -1,40 +1,37 @@
 //! The multi-path bound: the equations of all DAGs of a case, solved together.
 //!
-//! The work that interferes with DAG `k` is decided for each pair of DAGs:
+//! The work interfering with DAG `k` is decided for each pair of DAGs:
 //!
-//! - *Static priorities.* DAG `i` may outrank `k` if its most urgent subtask
-//!   wins over `k`'s least urgent one (equal priorities: the DAG committed
-//!   first wins). Priorities may thus interleave: then two DAGs may outrank
-//!   each other and each counts in full for the other. That is safe: while a
-//!   subtask of `k` waits, whatever runs on the cores belongs to `k` or wins
-//!   over that subtask, so its DAG is among those counted.
-//! - *EDF.* Every DAG may outrank every other. Of two DAGs whose jobs do not overlap, only
-//!   jobs with a deadline no later are counted: a subtask that waits is due no later than
-//!   its job, so what wins over it is, too. Where sinks have deadlines of their own, a job
-//!   counts as soon as the first of its deadlines is no later.
-//! - *No preemption at all.* Lower-ranked subtasks block besides; those of
-//!   DAGs that count in full are counted already.
+//! - *Static priorities.* DAG `i` may outrank `k` if the most urgent subtask of `i` wins over the
+//!   least urgent subtask of `k` (with equal priorities, the DAG committed first wins). Priorities
+//!   may thus interleave: then two DAGs may outrank each other, and each counts in full for the
+//!   other. This is safe: while a subtask of `k` waits, any work on the cores belongs to `k` or
+//!   wins over the waiting subtask, so its DAG counts.
+//! - *EDF.* Every DAG may outrank every other. For two DAGs without overlapping jobs, only jobs
+//!   with a deadline no later are counted: a waiting subtask is due no later than its job, so work
+//!   that wins over the subtask is, too. Where sinks have deadlines of their own, a job counts as
+//!   soon as the first of its deadlines is no later.
+//! - *No preemption at all.* Lower-ranked subtasks block in addition, except for subtasks of DAGs
+//!   that already count in full.
 //! - *Any other order.* Every other DAG counts in full.
-//! - *Preemption for some subtasks and not for others.* A subtask preempted
-//!   again and again may find other non-preemptible ones each time, which the
-//!   blocking term does not cover. Then every other DAG counts in full, in
-//!   whatever order: true of any work-conserving scheduler.
+//! - *Preemption for some subtasks and not for others.* A subtask preempted again and again may
+//!   find other non-preemptible subtasks each time, not covered by the blocking term. Then every
+//!   other DAG counts in full, in whatever order, as is true of any work-conserving scheduler.
 //!
-//! If a younger job may win over an older one of the same DAG (unequal
-//! priorities inside, or no preemption), the equation counts younger jobs too.
-//! A response time beyond `in_flight` periods would meet the overrun policy;
-//! it does not count as proven.
+//! If a younger job may win over an older job of the same DAG (unequal priorities inside, or no
+//! preemption), the equation counts younger jobs, too. A response time beyond `in_flight` periods
+//! would meet the overrun policy, and so does not count as proven.
 //!
-//! Where subtasks *wait* (`waiting`), of a DAG or of one that may delay it, directly or through
-//! others, jobs must not overlap: a bound beyond the period does not count as proven, the DAG's
-//! own or that of another in its equation.
+//! Where subtasks *wait* (`waiting`), in a DAG or in another DAG that may delay it, directly or
+//! through others, jobs must not overlap: a bound beyond the period does not count as proven,
+//! neither the DAG's own nor the bound of another DAG in its equation.
 //!
-//! Where DAGs are confined to groups of cores (T4 of `table`), those of the group *count*: while a segment
-//! is eligible and does not execute, each of them executes another one of the group that wins or keeps
-//! its core. So such a DAG has the bounds of a machine of as many cores, on which those of its group
-//! that may outrank it count; where cores are kept all of them do. Under EDF no deadline limits what
-//! counts, and jobs must not overlap, as where subtasks wait. A group with a core that has a table is
-//! no matter of this test (`members`).
+//! Where DAGs are confined to groups of cores (T4 of `table`), DAGs of the same group *count*:
+//! while a segment is eligible and does not execute, each core of the group executes another
+//! segment of the group that wins or keeps its core. So such a DAG has the bounds of a machine with
+//! as many cores, where DAGs of the group count if they may outrank it; where cores are kept, all
+//! of them count. Under EDF no deadline limits the counted work, and jobs must not overlap, as
+//! where subtasks wait. A group containing a core with a table is left to another test (`members`).
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -78,7 +75,7 @@ pub(super) const WITNESS: BoundWitness = BoundWitness {
     ..BoundWitness::NONE
 };
 
-/// Bounds the DAGs that have no bound yet, with the bounds of the others.
+/// Bounds the DAGs without a bound so far, using the bounds of the others.
 fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let known = found.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let known: Vec<Option<u64>> = known.collect();
@@ -89,14 +86,14 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
         match solution.responses[dag] {
             Some(bound_ns) => found.offer(dag, bound_ns, form(case, dag, bound_ns)),
             None => {
-                // Numbers that overflow alone are no failure of an equation.
+                // If only numbers overflow, no equation has failed.
                 let limit = BoundFailure::Own(SolverFailure::Limit);
                 let failure = solution.failures[dag].unwrap_or(limit);
                 found.reasons[dag] = Some(reason(case, dag, failure, &solution.responses));
             }
         }
     }
-    // A bound by windows of segments may be longer than by the equations.
+    // A bound by windows of segments may be longer than the bound by the equations.
     let by_windows = |dag: usize| {
         let bound = found.bounds[dag].filter(|of| of.test == SchedulabilityTest::Windows);
         Some((dag, again(case, dag, &solution.responses, bound?.bound_ns)?))
@@ -109,8 +106,8 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     found.first_failing = first.filter(|&dag| is_asked(dag));
 }
 
-/// Returns the bound of one DAG by its equations, of at most so much and a period, where those of the
-/// others are known.
+/// Returns the bound of a DAG by its equations, up to `most_ns` and the period, given the bounds of
+/// the other DAGs.
 fn again(
     case: &AnalysisInput<'_>,
     dag: usize,
@@ -168,8 +165,7 @@ fn reason(
             }
         }
         BoundFailure::Own(SolverFailure::BeyondDeadline)
-            // A job may wait for room until its deadline has passed, however fast the others
-            // are.
+            // A job may wait for room until its deadline has passed, however fast the others are.
             if room < u128::from(task.relative_deadline_ns()) =>
         {
             NotProvenReason::InFlightTooFew { in_flight }
@@ -178,7 +174,7 @@ fn reason(
     }
 }
 
-/// Looks for a bound beyond the deadline that rests on bounds of others alone. One core has better
+/// Looks for a bound beyond the deadline based on bounds of other DAGs alone. One core has better
 /// bounds than the equations give.
 fn late(case: &AnalysisInput<'_>, dag: usize, responses: Responses<'_>) -> NotProvenReason {
     match again(case, dag, responses, u64::MAX).filter(|_| case.settings.cores > 1) {
@@ -187,7 +183,7 @@ fn late(case: &AnalysisInput<'_>, dag: usize, responses: Responses<'_>) -> NotPr
     }
 }
 
-/// Writes the first of the forms that prove a bound.
+/// Writes the first form that proves a bound.
 pub(super) fn write(
     case: &AnalysisInput<'_>,
     responses: Responses<'_>,
@@ -304,7 +300,7 @@ pub(super) struct OutrankingDag<'a> {
     workloads: &'a InterferingDag,
 }
 
-/// Names the DAGs that may outrank one, in the order of their workloads.
+/// Lists the DAGs that may outrank a DAG, in the order of their workloads.
 pub(super) fn listed<'a>(
     case: &AnalysisInput<'_>,
     dag: usize,

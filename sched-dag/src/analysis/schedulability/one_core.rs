@@ -1,35 +1,36 @@
 //! Response times on one core, under static priorities and under EDF.
 //!
-//! On one core the subtasks of a job start in an order that nothing else changes: of those that are
-//! ready by edges the most urgent one first. So a DAG is as several sequential tasks that are
-//! released together, one for each deadline among its sinks, and one alone under static
-//! priorities. `docs/bounds.md` has the proof; in short: let S be a subtask, all that is before the
-//! subtask in its job, and all of other jobs that goes before. Look at a longest stretch in which
-//! work of S is pending. Only S executes in the stretch, but for one subtask that keeps its core and
-//! started before. So a job that is released `a` after the stretch's begin completes the subtask
-//! within the least `X > 0` with
+//! On one core, the subtasks of a job start in an order that nothing else changes: among the
+//! subtasks ready by edges, the most urgent first. So a DAG behaves like several sequential tasks
+//! released together: one for each deadline among its sinks, or only one under static priorities.
+//! `docs/bounds.md` has the proof. In short: let S be a subtask, all work before the subtask in its
+//! job, and all work of other jobs that goes before. Look at a longest stretch in which work of S
+//! is pending. Only S executes in the stretch, except for one subtask that keeps its core and
+//! started before. So a job released `a` after the stretch's begin completes the subtask within the
+//! least `X > 0` with
 //!
 //! `X = blocking + own(a) + C + sum over S of min(ceil(max(0, X - first) / T), most) work`
 //!
-//! with own(a) the DAG's earlier work and C the job's up to the subtask, and `R = max over a of X - a`,
-//! where `a` is a multiple of the own period or, under EDF, an instant at which another job joins S. A
-//! subtask that keeps its core has to *start*: its equation is without its own WCET, and also counts
-//! work that is released at its start, if nothing blocks. A blocking subtask has started before the
-//! stretch, so it ends before its WCET has passed.
+//! with own(a) the DAG's earlier work, C the job's work up to the subtask, and `R = max over a of X
+//! - a`. Candidates for `a` are the multiples of the own period and, under EDF, the instants at
+//!   which another job joins S. A subtask that keeps its core only has to *start*: its equation
+//!   leaves out its own WCET, and also counts work released at its start, if nothing blocks. A
+//!   blocking subtask has started before the stretch, so it ends before its WCET has passed.
 //!
 //! M. Joseph, P. Pandya, The Computer Journal 29(5), 1986; J. P. Lehoczky, RTSS 1990; L. George,
 //! N. Rivierre, M. Spuri, INRIA RR-2966, 1996; R. Davis et al., Real-Time Systems 35, 2007;
 //! N. Guan, W. Yi, IEEE Trans. Industrial Informatics 10(2), 2014. Ties, DAGs, sinks and younger
 //! jobs were derived here.
 //!
-//! Where static priorities interleave, S is the DAG and all that may outrank the DAG, or outrank one
-//! of these, and so on; where priorities differ within the DAG, its younger jobs count, too. That is
-//! a bound, but none that some run attains. The time for which long steps and a device's interrupts
-//! keep the core in the stretch (bursts, in `workload`) is added; then all subtasks count as if they
-//! could be preempted.
+//! Where static priorities interleave, S is the DAG and all DAGs that may outrank it, directly or
+//! through others; where priorities differ within the DAG, its younger jobs count, too. Then the
+//! result is a bound, but no run need attain it. The time taken from the core in the stretch by
+//! long steps and by a device's interrupts (bursts, in `workload`) is added; then all subtasks
+//! count as if they could be preempted.
 //!
 //! Assumes: releases at least `T` apart; WCETs above 0; no job waits for room, so under EDF all
-//! DAGs must have their bounds. Beyond its limits the test has no bound, and the next one is asked.
+//! DAGs must have their bounds. Beyond its limits the test has no bound, and the next test is
+//! asked.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -62,10 +63,11 @@ pub(super) const WITNESS: BoundWitness = BoundWitness {
     ..BoundWitness::NONE
 };
 
-/// The most terms of sums under EDF, for the jobs of all DAGs and for the sinks of all.
+/// The maximum number of terms of sums under EDF, for the jobs of all DAGs and for the sinks of
+/// all.
 const TERM_LIMIT: u64 = 1 << 17;
 
-/// The most releases that are looked at for one bound: a witness has a line for each.
+/// The maximum number of releases considered for a bound: a witness has a line for each.
 const RELEASE_LIMIT: u32 = 4096;
 
 fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
@@ -135,28 +137,28 @@ fn write_sinks(
     }
 }
 
-/// The part of each job of a DAG that is due at the same time; under static priorities all of it.
+/// The part of a DAG's jobs with the same deadline; under static priorities the whole job.
 struct LevelDemand {
     dag: usize,
     due_ns: i128,
     work_ns: u64,
-    /// The largest WCET of those that keep the core, or 0.
+    /// The largest WCET of a subtask in this part that keeps the core, or 0.
     keeps_ns: u64,
 }
 
-/// A subtask whose response time is asked for.
+/// A subtask whose response time is wanted.
 #[derive(Clone, Copy)]
 struct TargetSubtask {
     dag: usize,
     subtask: usize,
     due_ns: i128,
-    /// The work of its job that is before it.
+    /// The work of its job that comes before the subtask.
     before_ns: u64,
     wcet_ns: u64,
     keeps_core: bool,
 }
 
-/// Work that is released within a stretch, at the same distances.
+/// Work released within a stretch, at equal distances.
 struct ReleasedWork {
     first_ns: u64,
     period_ns: u64,
@@ -164,15 +166,16 @@ struct ReleasedWork {
     work_ns: u64,
 }
 
-/// The WCET that keeps the core as a stretch begins, and the first release in it of a DAG that is late.
+/// The WCET that keeps the core as a stretch begins, and the first release in the stretch of a late
+/// DAG.
 type CoreBlocker = (u64, Option<(usize, u64)>);
 
 struct CoreDemand<'a> {
     case: &'a AnalysisInput<'a>,
     levels: Vec<LevelDemand>,
     by_deadline: bool,
-    /// By DAG, under static priorities, the least urgent rank that counts and whether the DAG is in
-    /// a band.
+    /// By DAG, under static priorities: the least urgent rank that counts, and whether the DAG is
+    /// in a band.
     least_counting: Vec<((u64, usize), bool)>,
 }
 
@@ -209,12 +212,12 @@ impl<'a> CoreDemand<'a> {
         self.case.tasks[dag].period_ns()
     }
 
-    /// Returns the least urgent rank of all that counts for a DAG under static priorities, and
-    /// whether it is in a band: nothing of these is less urgent than anything of it.
+    /// Returns the least urgent rank of all DAGs that count for a DAG under static priorities, and
+    /// whether the DAG is in a band: no counting work is less urgent than any work of the DAG.
     fn least_of(by_most: &[[(u64, usize); 2]], own: [(u64, usize); 2]) -> ((u64, usize), bool) {
         let mut least = own[1];
-        // A DAG that delays one of these delays the job, too; those after the first that delays none
-        // are less urgent still.
+        // A DAG that delays a counting DAG delays the job, too. The DAGs after the first that
+        // delays none are less urgent still.
         for &[most, lower] in by_most {
             if most >= least {
                 break;
@@ -224,7 +227,7 @@ impl<'a> CoreDemand<'a> {
         (least, own[0] == own[1] && least == own[1])
     }
 
-    /// Returns the steps of one sum: under EDF one for each term.
+    /// Returns the cost of a sum in steps: under EDF the number of its terms.
     fn step(&self) -> u64 {
         if self.by_deadline { self.levels.len() as u64 } else { 1 }
     }
@@ -238,14 +241,14 @@ impl<'a> CoreDemand<'a> {
         self.by_deadline || self.least_counting[dag].1
     }
 
-    /// Reports whether work of a DAG counts for another one, or for itself.
+    /// Reports whether work of a DAG counts for another DAG, or for itself.
     fn counts(&self, other: usize, dag: usize) -> bool {
         let most = || self.case.relation.ranks(other)[0];
         other == dag || self.by_deadline || most() < self.least_counting[dag].0
     }
 
-    /// Returns the subtasks of a DAG in the order in which each of its jobs starts them; in their
-    /// place the whole job, if the DAG is in no band.
+    /// Returns the subtasks of a DAG in the order in which each job starts them. Returns the whole
+    /// job as a single target if the DAG is in no band.
     fn start_order(&self, dag: usize) -> Vec<TargetSubtask> {
         let (task, subtasks) = (self.case.tasks[dag], self.case.dag(dag).subtasks());
         if !self.is_band(dag) {
@@ -287,7 +290,7 @@ impl<'a> CoreDemand<'a> {
         order
     }
 
-    /// Returns those of a DAG's subtasks whose responses are the longest: the last of each level.
+    /// Returns the subtasks of a DAG with the longest responses: the last of each level.
     fn last_of_levels(&self, dag: usize) -> Vec<TargetSubtask> {
         let order = self.start_order(dag);
         let is_last = |&place: &usize| {
@@ -297,7 +300,7 @@ impl<'a> CoreDemand<'a> {
         (0..order.len()).filter(is_last).map(|place| order[place]).collect()
     }
 
-    /// Returns the response time of a DAG's jobs if it is of use, found within so many steps.
+    /// Returns the response time of a DAG's jobs if within the limit and found within `steps`.
     fn response(&self, dag: usize, steps: &mut u64) -> Option<u64> {
         let (busy, limit_ns) = (self.busy(dag, steps)?, self.case.set.figures[dag].limit_ns());
         let (mut most, mut left) = (0, RELEASE_LIMIT);
@@ -307,7 +310,7 @@ impl<'a> CoreDemand<'a> {
         Some(most)
     }
 
-    /// Returns the response times of a DAG's sinks, as far as they are known, in their order.
+    /// Returns the response times of a DAG's sinks, as far as known, in their order.
     fn of_sinks(
         &self,
         dag: usize,
@@ -339,7 +342,7 @@ impl<'a> CoreDemand<'a> {
         bounds.collect()
     }
 
-    /// Returns the longest stretch in which the core executes a DAG and what counts for it.
+    /// Returns the longest stretch in which the core executes a DAG and all work counting for it.
     fn busy(&self, dag: usize, steps: &mut u64) -> Option<u64> {
         let all = (0..self.case.members.len()).filter(|&other| self.counts(other, dag));
         let figures = |dag: usize| {
@@ -364,14 +367,14 @@ impl<'a> CoreDemand<'a> {
         self.fixed_point([blocking_ns.max(1), u64::MAX], (blocking_ns, &released, false), steps)
     }
 
-    /// Returns the longest WCET of those that keep the core and do not count for a DAG.
+    /// Returns the longest WCET that keeps the core, among DAGs not counting for a DAG.
     fn blocked_below(&self, dag: usize) -> u64 {
         let below = self.levels.iter().filter(|level| !self.counts(level.dag, dag));
         below.map(|level| level.keeps_ns).max().unwrap_or(0)
     }
 
-    /// Returns the response time of a subtask, or `most` if that is more; `None` if the time is
-    /// beyond the limit, or not found within so many releases and steps.
+    /// Returns the response time of a subtask, or `most` if that is longer. Returns `None` if the
+    /// time exceeds the limit, or is not found within so many releases and steps.
     fn solve(
         &self,
         target: &TargetSubtask,
@@ -385,13 +388,14 @@ impl<'a> CoreDemand<'a> {
             *steps = steps.checked_sub(self.step())?;
             for blocker in self.blockers(target, after) {
                 let latest_ns = after.saturating_add(limit_ns);
-                // Under EDF most of them lengthen nothing, which one sum shows.
+                // Under EDF most blockers lengthen nothing; a single sum shows this.
                 let enough_ns = if self.by_deadline { after.saturating_add(most) } else { 0 };
                 let range_ns = [enough_ns, known_ns, latest_ns];
                 let of = (target, after, blocker);
                 let finish_ns = self.finish(of, range_ns, &mut released, steps)?;
                 most = most.max(finish_ns.saturating_sub(after));
-                // Of a later job all that counts is more, but for a blocking one under EDF.
+                // For a later job all counting work is more, except for a blocking subtask under
+                // EDF.
                 if !self.by_deadline {
                     known_ns = finish_ns - target.wcet_ns;
                 }
@@ -404,7 +408,7 @@ impl<'a> CoreDemand<'a> {
         Some(most)
     }
 
-    /// Writes the releases that are looked at, each with the finishes.
+    /// Writes the considered releases, each with the finishes.
     fn write_points(&self, target: &TargetSubtask, bound_ns: u64, busy: u64, text: &mut WitnessText) {
         if target.subtask != usize::MAX {
             text.line(format_args!("target {}", target.subtask));
@@ -423,8 +427,8 @@ impl<'a> CoreDemand<'a> {
         }
     }
 
-    /// Returns what may keep the core as a stretch begins, by how long after it the job is
-    /// released.
+    /// Returns the subtasks that may keep the core as a stretch begins, given the job's release
+    /// time `after` the begin.
     fn blockers(&self, target: &TargetSubtask, after: u64) -> impl Iterator<Item = CoreBlocker> {
         let first_ns = match self.by_deadline {
             true => 0,
@@ -448,7 +452,7 @@ impl<'a> CoreDemand<'a> {
         core::iter::once((first_ns, None)).chain(found)
     }
 
-    /// Returns the next instant at which more counts for a subtask.
+    /// Returns the next instant at which more work counts for a subtask.
     fn next_candidate(&self, target: &TargetSubtask, after: u64) -> u64 {
         let now = i128::from(after);
         let next = self.levels.iter().filter_map(|level| {
@@ -464,9 +468,9 @@ impl<'a> CoreDemand<'a> {
         next.min().and_then(|next| u64::try_from(next).ok()).unwrap_or(u64::MAX)
     }
 
-    /// Returns when a subtask is complete whose job is released so long after the stretch's begin,
-    /// or the first of three times if the subtask is complete by then. The others are known to be
-    /// before its start, and of no use after.
+    /// Returns when a subtask completes, if its job is released `after` the stretch's begin.
+    /// Returns `enough_ns` if the subtask completes by then. Its start is known to be no earlier
+    /// than `known_ns`, and a time after `latest_ns` is of no use.
     fn finish(
         &self,
         (target, after, (blocking_ns, late)): (&TargetSubtask, u64, CoreBlocker),
@@ -484,7 +488,7 @@ impl<'a> CoreDemand<'a> {
         let of = (base_ns, &released[..], is_closed);
         if let Some(end_ns) = enough_ns.checked_sub(rest_ns) {
             *steps = steps.checked_sub(self.step())?;
-            // If a sum is no more than its time, so is the least that equals it.
+            // If a sum is no more than its time, so is the least time that equals its sum.
             if self.sum(end_ns, of)? <= end_ns {
                 return Some(enough_ns);
             }
@@ -493,7 +497,8 @@ impl<'a> CoreDemand<'a> {
         self.fixed_point(range_ns, of, steps)?.checked_add(rest_ns)
     }
 
-    /// Adds what counts for a subtask, and returns the work of its DAG's earlier jobs in the stretch.
+    /// Adds the work that counts for a subtask, and returns the work of the own DAG's earlier jobs
+    /// in the stretch.
     fn released(
         &self,
         target: &TargetSubtask,
@@ -510,12 +515,13 @@ impl<'a> CoreDemand<'a> {
             let period = i128::from(period_ns);
             let sooner = target.due_ns - level.due_ns;
             let (first_ns, most) = if level.dag == target.dag {
-                // A job that is older by more than a period may have this due no later.
+                // For a job older by more than a period, this part may be due no later.
                 let apart = period.max(-sooner);
                 let count = (i128::from(after) - apart).div_euclid(period) + 1;
                 let count = u64::try_from(count).unwrap_or(0);
                 earlier_ns = earlier_ns.saturating_add(count.saturating_mul(work_ns));
-                // Younger jobs win by a sooner deadline, or by priorities that differ.
+                // Younger jobs win by a sooner deadline, or by priorities that differ within the
+                // DAG.
                 let most = (sooner - 1).div_euclid(period);
                 let most = if younger_may_win { i128::MAX } else { most };
                 (after.saturating_add(own_ns), most)
@@ -536,7 +542,7 @@ impl<'a> CoreDemand<'a> {
         earlier_ns
     }
 
-    /// Returns the least time of a range that equals its sum.
+    /// Returns the least time in a range that equals its sum.
     fn fixed_point(
         &self,
         [mut time_ns, latest_ns]: [u64; 2],
@@ -552,8 +558,7 @@ impl<'a> CoreDemand<'a> {
         }
     }
 
-    /// Returns a base and all work that is released before a time, or until the time if that is
-    /// closed.
+    /// Returns a base plus all work released before a time, or also at that time if `is_closed`.
     fn sum(
         &self,
         time_ns: u64,

@@ -1,4 +1,4 @@
-//! One DAG by its subtasks' priorities, where nothing can delay it and that is its shortest bound.
+//! Bounds a DAG by its subtasks' priorities if nothing delays the DAG and no bound is shorter.
 
 use super::{BoundTest, BoundWitness, JobBounds};
 use crate::analysis::case::AnalysisInput;
@@ -48,7 +48,7 @@ fn by_priorities(case: &AnalysisInput<'_>, dag: usize) -> Option<u64> {
     let others = multi_path::alone(task, &case.set.shapes[dag].left, cores, Rounding::Up)?;
     let limit = task.relative_deadline_ns().min(task.period_ns());
     let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
-    // Long steps and a device's interrupts are in no equation of this test, so they are added to it.
+    // No equation of this test counts long steps or a device's interrupts, so their time is added.
     let bound = bound.and_then(|bound_ns| case.set.bursts.after(bound_ns));
     bound.filter(|&bound_ns| bound_ns <= limit)
 }

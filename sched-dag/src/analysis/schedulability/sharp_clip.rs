@@ -1,23 +1,26 @@
 //! The second form of the multi-path bound, without its excess of 1.
 //!
-//! A job that is unfinished at `r` waits for some `X > x = r - length` with `g(X) >= 0`, where
+//! A job unfinished at `r` waits for some `X > x = r - length` with `g(X) >= 0`, where
 //!
 //! `g(X) = B_j + blocking + sum of f_i(X) - (m - j) X`,
 //!
-//! each `f_i` clipped to `X` in the window `r` (`multi_path`). The published form demands `g(x) <= 0`
-//! with `max(1, B_j)`, since `g` may be 0 from 0 to `X` where nothing but the `f_i` is in the sum. But
-//! `g` is concave and `g(0) = 0`, so `g` is below 0 on all of `(x, infinity)` exactly if
+//! each `f_i` clipped to `X` in the window `r` (`multi_path`). The published form demands
+//! `g(x) <= 0` with `max(1, B_j)`, since `g` may be 0 from 0 to `X` if the sum consists of the
+//! `f_i` alone. But `g` is concave and `g(0) = 0`, so `g` is below 0 on all of `(x, infinity)`
+//! exactly if
 //!
 //! `g(x) <= 0`, and to the right of `x` all `f_i` together grow by less than `m - j`.
 //!
-//! That is the bound, wherever the sum is of the `f_i` alone; elsewhere both forms are one. `X` may be any
-//! real number, and nothing is rounded, so runs may change at any fraction of a nanosecond. The forms
-//! of whole units that ask for `g(x + 1) < 0` instead are false then.
+//! This condition is the bound wherever the sum consists of the `f_i` alone; elsewhere both forms
+//! are the same. `X` may be any real number, and nothing is rounded, so runs may change at any
+//! fraction of a nanosecond. The forms for whole units that demand `g(x + 1) < 0` instead are then
+//! false.
 //!
-//! Trap: the slope is that of `f_i` in `X`, in a window that stays. In `r` the workloads grow by
-//! more, or by less where a [`WorkloadSegment`](super::super::workload::WorkloadSegment) ends.
+//! Trap: the slope is the slope of `f_i` in `X`, in a fixed window. In `r` the workloads grow by
+//! more, or by less at the end of a [`WorkloadSegment`](super::super::workload::WorkloadSegment).
 //!
-//! Assumes: as `multi_path`. What a platform costs is not covered: 1 ns is no matter there.
+//! Assumes: as `multi_path`. Costs of the platform are not covered: compared with them, 1 ns is no
+//! matter.
 
 use super::multiple_paths::write;
 use super::{BoundTest, BoundWitness, JobBounds};

@@ -1,21 +1,20 @@
 //! The equations of single sinks, where the bound of their job is known.
 //!
-//! The critical chain of a sink ends with the sink, so it is at most as long as the
-//! longest path to it, and its subtasks are the sink's ancestors. What delays it is what
-//! delays the job, but for two things:
+//! The critical chain of a sink ends with the sink. So the chain is at most as long as the longest
+//! path to the sink, and its subtasks are the sink's ancestors. The sink is delayed by the same
+//! work as the job, with two exceptions:
 //!
-//! - Of the job itself only subtasks count that may win over an ancestor. If all can be
-//!   preempted these are, under EDF, those that reach a sink whose deadline is no later
-//!   (all ancestors have deadlines no later than the sink's); in an order that is the same for
-//!   every job, those that are not less urgent than the least urgent ancestor. If not all can be
-//!   preempted, or in any other order, all count.
-//! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. What is
+//! - In the job itself, only subtasks that may win over an ancestor count. If all can be preempted
+//!   these are, under EDF, the subtasks that reach a sink whose deadline is no later (all ancestors
+//!   have deadlines no later than the sink's). In an order that is the same for every job, these
+//!   are the subtasks at least as urgent as the least urgent ancestor. If not all can be preempted,
+//!   or in any other order, all subtasks count.
+//! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. Work that is
 //!   due later and keeps its core may block.
 //!
-//! So the sink's bound is the solution of the job's equation with these figures (see
-//! `pipelined`). Older and younger jobs of the DAG count as there, with the job's bound,
-//! which holds for all of them. The sink finishes no later than its job: the smaller of
-//! both bounds is taken. Evidence: `accepted_sets_keep_their_bounds` observes sinks, too.
+//! So the sink's bound is the solution of the job's equation with these figures (see `pipelined`).
+//! Older and younger jobs of the DAG count as there, with the job's bound, valid for all of them.
+//! The sink finishes no later than its job, so the smaller of both bounds is taken.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -74,14 +73,14 @@ fn write(
     }
 }
 
-/// The path to a sink, and what of its own job may delay it.
+/// The path to a sink, and the work of its own job that may delay it.
 struct SinkPath {
     length_ns: u64,
     volume_ns: u64,
 }
 
-/// Returns the equation of each sink of a DAG and what may delay it, where the response times
-/// of jobs are known that it rests on.
+/// Returns the equation of each sink of a DAG and the work that may delay it, if the response times
+/// needed are known.
 fn equations<'a>(
     case: &'a AnalysisInput<'_>,
     dag: usize,
@@ -107,17 +106,17 @@ fn equations<'a>(
 
 fn reaches(case: &AnalysisInput<'_>, dag: usize) -> Vec<SinkPath> {
     let (task, model) = (case.tasks[dag], case.dag(dag));
-    // The smaller one wins.
+    // The smaller number wins.
     let numbers = case.settings.policy.numbers(model);
-    // The largest one among the ancestors.
+    // The largest number among the ancestors.
     let mut least_urgent = numbers.clone();
     for subtask in task.topological_order() {
         for next in task.successors(subtask) {
             least_urgent[next] = least_urgent[next].max(least_urgent[subtask]);
         }
     }
-    // By urgency, with the sums of WCETs: a look at all subtasks for each sink takes as long
-    // as the square of a large DAG's size.
+    // By urgency, with the sums of WCETs: a look at all subtasks for each sink would take time
+    // quadratic in the size of a DAG.
     let order = sorted_by_key(numbers.len(), |subtask| numbers[subtask]);
     let mut sums_ns = vec![0];
     for &subtask in &order {

@@ -1,16 +1,17 @@
 //! Response times of DAGs in tables, by the entries' times.
 //!
-//! In a table that is *right* ([`check_table`](crate::analysis::check_table)) no entry finishes later
-//! than its time, whatever other DAGs do and whatever the policy is: a bound is the latest finish
-//! after a release. The proof is in `docs/bounds.md`, "Tables".
+//! In a table that is *right* ([`check_table`](crate::analysis::check_table)), no entry finishes
+//! later than its time, whatever other DAGs do and whatever the policy is. So a bound is the latest
+//! finish after a release. The proof is in `docs/bounds.md`, "Tables".
 //!
 //! A table of one DAG begins a lap with each job. Where no entry belongs to another lap's job, the
-//! DAG may be sporadic. Then long steps and a device's interrupts (bursts, in `workload`) are covered,
-//! too, as long as the job ends by its deadline and the next release: each entry is late by so much.
-//! In a table of several DAGs lateness would be handed on from lap to lap, so these have no bound then.
+//! DAG may be sporadic. Then long steps and a device's interrupts (bursts, in `workload`) are
+//! covered, too, as long as the job ends by its deadline and the next release: each entry is late
+//! by the same time. In a table of several DAGs lateness would be handed on from lap to lap, so the
+//! DAGs have no bound then.
 //!
-//! Assumes subtasks that do not wait, and members on the table's cores that can be preempted. As many
-//! jobs may be in flight as the bounds take.
+//! Assumes subtasks that do not wait, and preemptible members on the table's cores. As many jobs
+//! may be in flight as the bounds need.
 
 use alloc::vec::Vec;
 
@@ -97,18 +98,18 @@ fn latest(finishes_ns: &[u64]) -> (u64, SubtaskId) {
     latest.unwrap_or((0, SubtaskId(0)))
 }
 
-/// By DAG and subtask of a table, how long after its release a subtask finishes at most; or why
-/// nothing holds of the table, and the DAG that is to blame, if not all are.
+/// The latest finish of each subtask of a table after its release, by DAG and subtask. The error
+/// gives the reason why the table has no bounds, and the DAG to blame, unless all are.
 pub(super) type TableFinishes = Result<Vec<Vec<u64>>, (Option<usize>, NotProvenReason)>;
 
-/// Returns these finishes.
+/// Computes the finishes of a table.
 pub(super) fn finishes_ns(case: &AnalysisInput<'_>, table: &CaseTable<'_>) -> TableFinishes {
     let times = table.times.as_ref().map_err(|reason| (None, *reason))?;
     let mut finishes_ns = times.latest_ns.clone();
     let overheads = &case.settings.overheads;
     let has_bursts = overheads.ready_ns > 0 || overheads.device_ns > 0;
     if let [dag] = table.dags[..] {
-        // A lap at each release: what is late is late within its job only.
+        // With a lap at each release, lateness stays within its job.
         let mut entries = table.table.lists.iter().flat_map(|list| &list.entries);
         let is_strict = has_bursts || case.dag(dag).is_sporadic();
         if let Some(of) = entries.find(|entry| is_strict && entry.job != 0) {
@@ -131,7 +132,7 @@ pub(super) fn finishes_ns(case: &AnalysisInput<'_>, table: &CaseTable<'_>) -> Ta
     for (&dag, finishes_ns) in table.dags.iter().zip(&finishes_ns) {
         let in_flight = case.dag(dag).in_flight();
         let room = u128::from(in_flight) * u128::from(case.tasks[dag].period_ns());
-        // One that finds no room is released late, and makes all others late.
+        // A job that finds no room is released late, and makes all others late.
         if room < u128::from(latest(finishes_ns).0) {
             return Err((Some(dag), NotProvenReason::InFlightTooFew { in_flight }));
         }

@@ -1,15 +1,15 @@
-//! Widths that fit: nothing waits for a core where there are as many as can be needed at once.
+//! Widths that fit: nothing waits for a core if there are as many cores as can be needed at once.
 //!
-//! A DAG is as wide as its largest set of subtasks without precedences among them, so no more
-//! instances of one job are ready or running at any instant. Let the widths of a DAG and of all
-//! that may delay it be no more than the cores, and no job last beyond the next release. Then an
-//! instance that becomes ready has a core at once, so a response time is the longest path with its
-//! waits; that of a sink is the longest path to it. Where subtasks keep their cores every other DAG
-//! may delay.
+//! The width of a DAG is the size of its largest set of subtasks without precedences among them, so
+//! no more instances of one job are ready or running at any instant. Let the widths of a DAG and of
+//! all DAGs that may delay it add up to no more than the cores, and let no job last beyond the next
+//! release. Then an instance has a core as soon as it becomes ready. So a job's response time is
+//! the longest path with its waits, and a sink's is the longest path to the sink. Where subtasks
+//! keep their cores, every other DAG may delay.
 //!
-//! That bounds rest on bounds is no circle: look at the first job to exceed its own (`set`). A
-//! platform's costs are not covered: while a step hands an instance to a core, others wait for the
-//! step, so an instance does not have its core at once.
+//! Bounds rest on bounds here, but not in a circle: look at the first job to exceed its own
+//! (`set`). A platform's costs are not covered: while a step hands an instance to a core, others
+//! wait for the step, so an instance does not have its core at once.
 //!
 //! Assumes: no core idles while a subtask is ready. Any order.
 
@@ -21,7 +21,7 @@ use crate::analysis::case::AnalysisInput;
 use crate::analysis::features::covers;
 use crate::analysis::witness_text::WitnessText;
 
-/// The most rounds in which DAGs are found that do not fit.
+/// The maximum number of rounds to find DAGs that do not fit.
 const ROUNDS: u32 = 4;
 
 pub(super) const TEST: BoundTest = BoundTest {
@@ -84,7 +84,7 @@ fn of_sinks(case: &AnalysisInput<'_>, dag: usize) -> Vec<Option<u64>> {
     bounds.collect()
 }
 
-/// Returns by DAG the response time of its jobs, where widths fit.
+/// Returns the response time of each DAG's jobs, where widths fit.
 fn fitting(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
     let all = 0..case.members.len();
     let alone = all.clone().map(|dag| {
@@ -93,7 +93,7 @@ fn fitting(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
         let bound = case.set.bursts.after(case.tasks[dag].span_ns());
         bound.filter(|&bound_ns| bound_ns <= limit_ns && TEST.is_for(case, dag))
     });
-    // From all that may have such a bound down to those that rest on none that has not.
+    // Starts from all DAGs that may have such a bound, and drops DAGs resting on a DAG without.
     let mut bounds: Vec<Option<u64>> = alone.collect();
     for _ in 0..ROUNDS {
         let fits = |dag: usize| bounds[dag].filter(|_| has_room(case, dag, &bounds));
@@ -106,12 +106,12 @@ fn fitting(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
     alloc::vec![None; bounds.len()]
 }
 
-/// Reports whether there are as many cores as a DAG and all that may delay it can use at once.
+/// Reports whether there are as many cores as a DAG and all DAGs that may delay it can use at once.
 fn has_room(case: &AnalysisInput<'_>, dag: usize, bounds: &[Option<u64>]) -> bool {
     let cores = u64::from(case.set.cores);
     let width = |dag: usize| case.set.shapes[dag].parallelism;
     if case.is_alone(dag) {
-        // A width of all cores may be any that is larger.
+        // The computed width is capped at the number of cores, so the true width may be larger.
         return width(dag) < cores;
     }
     let mut delaying =

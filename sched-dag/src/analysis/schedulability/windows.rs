@@ -1,29 +1,34 @@
-//! Subtasks that wait, on one core under static priorities: a job in windows of segments.
+//! Waiting subtasks on one core under static priorities: splits a job into windows of segments.
 //!
-//! A *window* is the time from the instant at which a segment becomes eligible to the end of that
-//! segment or of a later one. Say the subtasks of a job are all on one path: then its segments
-//! follow one another, with a wait or nothing in between, and windows of consecutive segments, with
-//! the waits between them, make up the response. `docs/bounds.md` has the proof; in short: go back
-//! from the window's begin to the last instant at which no DAG above *without waits* is pending.
-//! From there on the core executes those, which are released from there on, DAGs above with waits
-//! (`workload`), the segments of the window, and a segment of a DAG below that keeps the core and
-//! started before, or while the window waits; or the window waits. So the time is at most the least
+//! A *window* is the time from the instant when a segment becomes eligible to the end of the same
+//! or a later segment. Say all subtasks of a job are on one path: then its segments follow one
+//! another, with or without a wait in between, and windows of consecutive segments, with the waits
+//! between them, make up the response. `docs/bounds.md` has the proof. In short: go back from the
+//! window's begin to the last instant at which no DAG above *without waits* is pending. From there
+//! on, either the window waits, or the core executes one of the following:
+//!
+//! - DAGs above without waits, released from there on;
+//! - DAGs above with waits (`workload`);
+//! - the segments of the window;
+//! - a segment of a DAG below that keeps the core, started before or while the window waits.
+//!
+//! So the time is at most the least
 //!
 //! `x = segments + waits + blocking + sum of ceil(x / T) volume + sum of W(x)`
 //!
-//! Where the last segment keeps its core its *start* is looked for, and its WCET is added. The
-//! blocking is that of a DAG below; or a segment of the own DAG has kept more urgent work waiting,
-//! but that has ended by the window's begin and is taken off again. Of all groupings into windows
-//! the best counts. A job of any other graph is one window, with the waits of a path.
+//! If the last segment keeps its core, the equation bounds its *start*, and its WCET is added. The
+//! blocking is by a DAG below; or a segment of the own DAG has kept more urgent work waiting, but
+//! has ended by the window's begin and is subtracted again. The best of all groupings into windows
+//! counts. A job with any other graph is one window, with the waits of a path.
 //!
 //! DAGs above without waits thus need no jitter, unlike in `multiple_paths`, where they count as
-//! work that is carried in. A bound there may still be less, if a long segment of the own DAG keeps
-//! the core, or many waits meet short DAGs below, and then counts.
+//! carried-in work. The bound by `multiple_paths` may still be smaller, if a long segment of the
+//! own DAG keeps the core, or many waits meet short DAGs below, and then counts.
 //!
-//! Assumes: each other DAG is wholly above or wholly below; `R <= T` where subtasks wait, of the
-//! DAG and of those above; no job of those above waits for room, so each has a bound. No locks: a
-//! wait for a lock is charged to the first segment, and may be in any. Long steps and a device's
-//! interrupts are added to each window, and then nothing gains by keeping its core.
+//! Assumes: each other DAG is wholly above or wholly below; `R <= T` for the DAG and for DAGs
+//! above, where subtasks wait; no job of a DAG above waits for room, so each has a bound. No locks:
+//! the wait for a lock is charged to the first segment, but may happen in any. Long steps and a
+//! device's interrupts are added to each window, and then no segment gains by keeping its core.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -37,7 +42,8 @@ use crate::analysis::workload::InterferingWorkload;
 
 pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::Windows],
-    // All count as interleaved where some subtasks keep their cores; `of` looks at the priorities.
+    // All DAGs count as interleaved if only some subtasks keep their cores; `of` looks at the
+    // priorities.
     covers: covers!(
         RANKED ONE_CORE PREEMPTION ALL_KEEP SOME_KEEP INTERLEAVED WAITS LATE_DEADLINES FEW_IN_FLIGHT
         OVERHEADS BURSTS DEVICE SPORADIC
@@ -51,7 +57,7 @@ pub(super) const WITNESS: BoundWitness = BoundWitness {
     ..BoundWitness::NONE
 };
 
-/// How often the equations of a DAG are evaluated at most.
+/// The maximum number of evaluations of a DAG's equations.
 const STEP_LIMIT: u64 = 1 << 14;
 
 fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
@@ -83,14 +89,14 @@ fn write(
     });
 }
 
-/// Consecutive segments: how many, or 0 for the whole job, and when they end if a DAG below has
-/// kept the core, and if the own one has.
+/// Consecutive segments: their number, or 0 for the whole job, and their end if a DAG below has
+/// kept the core, and if the own DAG has.
 type SegmentGroup = (usize, [u64; 2]);
 
-/// A bound, and the windows that make it up.
+/// A bound, with the windows adding up to the bound.
 type GroupedBound = (u64, Vec<SegmentGroup>);
 
-/// Returns the least bound that is found of a DAG, where the responses of those above are known.
+/// Returns the least bound found for a DAG, given the responses of the DAGs above.
 fn best(case: &AnalysisInput<'_>, dag: usize, responses: Responses<'_>) -> Option<GroupedBound> {
     let (windows, mut steps) = (JobWindows::of(case, dag, responses)?, STEP_LIMIT);
     let whole = windows.whole(&mut steps);
@@ -107,15 +113,16 @@ struct JobWindows<'a> {
     dag: usize,
     /// The volumes and periods of the DAGs above without waits.
     released: Vec<[u64; 2]>,
-    /// The workloads of those with waits.
+    /// The workloads of the DAGs above with waits.
     waiting: Vec<InterferingWorkload>,
-    /// The longest segment that keeps the core, of DAGs below and of its own.
+    /// The longest segment that keeps the core, of DAGs below and of the own DAG.
     kept_ns: [u64; 2],
     limit_ns: u64,
 }
 
 impl<'a> JobWindows<'a> {
-    /// Describes those of a DAG, if each other one is above or below, and those above have bounds.
+    /// Describes the windows of a DAG, if each other DAG is above or below, and all DAGs above have
+    /// bounds.
     fn of(case: &'a AnalysisInput<'a>, dag: usize, responses: Responses<'_>) -> Option<Self> {
         let limit_ns = case.set.figures[dag].limit_ns();
         let mut windows = Self {
@@ -134,7 +141,7 @@ impl<'a> JobWindows<'a> {
                 let kept_ns = &mut windows.kept_ns[usize::from(other == dag)];
                 *kept_ns = longest_kept(case, other).max(*kept_ns);
             } else if ranks[1] > most {
-                // It is neither above nor below.
+                // The DAG is neither wholly above nor wholly below.
                 return None;
             } else if task.has_waits() {
                 let bound_ns = responses[other].filter(|&bound_ns| bound_ns <= period_ns)?;
@@ -158,7 +165,7 @@ impl<'a> JobWindows<'a> {
         let stops: Vec<u128> = stops.collect();
         let path = task.longest_complete_path(&stops).into_iter();
         let longest = path.map(|subtask| stops[subtask]).sum();
-        // The job ends with the last segment of a subtask that precedes none.
+        // The job ends with the last segment of a subtask without successors.
         let last = task.topological_order();
         let last = last.filter(|&subtask| task.successors(subtask).next().is_none());
         let last = last.map(|subtask| self.segments(subtask).map_or(0, |of| of[of.len() - 1][2]));
@@ -166,8 +173,8 @@ impl<'a> JobWindows<'a> {
         self.window([task.volume_ns().into(), longest], last_ns, steps)
     }
 
-    /// Returns a subtask's segments, if they are known: the limit of the wait before, or 0, the
-    /// WCET with its charge, and for how much of that the core is kept.
+    /// Returns a subtask's segments, if known: the limit of the wait before (or 0), the WCET with
+    /// its charge, and the part of this WCET keeping the core.
     fn segments(&self, subtask: usize) -> Option<Vec<[u64; 3]>> {
         let (case, settings) = (self.case, self.case.settings);
         let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption)?;
@@ -182,14 +189,14 @@ impl<'a> JobWindows<'a> {
         Some(rows.collect())
     }
 
-    /// Returns the time for a wait, and for a segment of a DAG below that starts in it.
+    /// Returns the time for a wait, and for a segment of a DAG below starting in the wait.
     fn stop(&self, limit_ns: u64) -> u128 {
         // Nothing starts in a wait of no time.
         let kept_ns = self.kept_ns[0] * u64::from(limit_ns > 0);
         u128::from(limit_ns) + u128::from(kept_ns)
     }
 
-    /// Returns the segments of a DAG whose subtasks are all on one path, if they are known.
+    /// Returns the segments of a DAG with all subtasks on one path, if known.
     fn chain(&self) -> Option<Vec<[u64; 3]>> {
         let task = self.case.tasks[self.dag];
         let is_path = task.most_subtasks_on_a_path() == task.subtask_count() as u64;
@@ -198,9 +205,9 @@ impl<'a> JobWindows<'a> {
         Some(segments?.concat())
     }
 
-    /// Returns the best of the groupings of a chain that are looked at.
+    /// Returns the best grouping of a chain's segments into windows, within the remaining steps.
     fn grouped(&self, chain: &[[u64; 3]], steps: &mut u64) -> Option<GroupedBound> {
-        // The best of the first 0, 1, .. segments.
+        // The best grouping of the first 0, 1, .. segments.
         let mut best = vec![Some((0, Vec::new()))];
         for (last, &[.., last_ns]) in chain.iter().enumerate() {
             let (mut least, mut work, mut stops): (Option<GroupedBound>, u128, u128) = (None, 0, 0);
@@ -208,7 +215,7 @@ impl<'a> JobWindows<'a> {
                 let [wait_ns, wcet_ns, _] = chain[first];
                 work += u128::from(wcet_ns);
                 let window = self.window([work, stops], last_ns, steps);
-                // No grouping of a long chain is known to its end, so the commit does not look on.
+                // The steps do not suffice for any grouping of the whole chain, so the search ends.
                 if *steps == 0 {
                     return None;
                 }
@@ -227,13 +234,13 @@ impl<'a> JobWindows<'a> {
         best.pop()?.filter(|_| !chain.is_empty())
     }
 
-    /// Returns how long a window lasts that ends so.
+    /// Returns the length of a window with the given ends.
     fn length(&self, [below_ns, own_ns]: [u64; 2]) -> u64 {
         below_ns.max(own_ns - self.kept_ns[1])
     }
 
-    /// Returns when a window ends of so much work and stops, whose last segment keeps the core for
-    /// so long, if a DAG below has kept the core, and if its own DAG has.
+    /// Returns two ends of a window with given work and stops, and with a last segment that keeps
+    /// the core for `last_ns`: if a DAG below has kept the core, and if the own DAG has.
     fn window(
         &self,
         [work, stops]: [u128; 2],
@@ -243,7 +250,7 @@ impl<'a> JobWindows<'a> {
         let mut ends = [0; 2];
         for (end_ns, kept_ns) in ends.iter_mut().zip(self.kept_ns) {
             let base = work - u128::from(last_ns) + stops + u128::from(kept_ns);
-            // What is released as the last segment starts goes first; but something that blocks has
+            // Work released as the last segment starts goes first; but a blocking segment has
             // started before, so less than its WCET is left of it.
             let is_blocked = kept_ns > 0 || (stops > 0 && self.kept_ns[0] > 0);
             let start_ns = self.fixed_point(base, last_ns > 0 && !is_blocked, steps)?;
@@ -252,8 +259,8 @@ impl<'a> JobWindows<'a> {
         Some(ends)
     }
 
-    /// Returns the least time that is a base and all that goes first, until then or, if that is
-    /// closed, with what comes at that time.
+    /// Returns the least time equal to a base plus all more urgent work released before that time,
+    /// or at that time, too, if `is_closed`.
     fn fixed_point(&self, base: u128, is_closed: bool, steps: &mut u64) -> Option<u64> {
         let (mut time, mut sum) = (u128::MAX, base);
         let latest = u128::from(self.limit_ns) + u128::from(self.kept_ns[1]);
