@@ -391,8 +391,7 @@ impl<'m> DispatchSweep<'m> {
     fn add_owed(&self, group: &[u32], claims: &BTreeMap<CoreId, Key>, owed: &mut Vec<(Key, bool)>) {
         let is_of_it = |key: &Key| self.model.place(key.1) == Place::Group(group);
         let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
-        // An instance that keeps its core has it whatever waits, so the others share the remaining
-        // cores.
+        // An instance that keeps its core has it whatever waits; the others share the rest.
         let taken = self.count(group, claims.keys().chain(kept.map(|(_, core)| core)));
         let free = self.count(group, self.known_cores.iter());
         let movable = self.running.keys().filter(|key| is_of_it(key));

@@ -100,7 +100,7 @@ worded! {
         /// R1: where times are exact, a queued release was carried out before any job had ended.
         StillQueued { event: Event } = "still_queued", (Release, By(event)),
             " although it waits, and no job has ended";
-        /// R1: a job was released, queued or skipped once more, or after an event excluding this.
+        /// R1: a job was released, queued or skipped once more, or after an event ruling this out.
         ReleasedAgain { event: Event, before: EventKind, before_ns: u64 } =
             "released_again", (Release, By(event)),
             " although it was {before} at {before_ns} ns";

@@ -84,7 +84,7 @@ fn of_sinks(case: &AnalysisInput<'_>, dag: usize) -> Vec<Option<u64>> {
     bounds.collect()
 }
 
-/// Returns the response time of each DAG's jobs, where widths fit.
+/// Returns each DAG's response time, where widths fit.
 fn fitting(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
     let all = 0..case.members.len();
     let alone = all.clone().map(|dag| {

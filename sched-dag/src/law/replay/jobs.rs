@@ -123,8 +123,7 @@ impl DagReplay {
     fn forget_before(&mut self, job: u64) {
         while let Some(first) = self.jobs.first_entry()
             && *first.key() < job
-            // Only from the front: the instances of the next job may still ask for a job in the
-            // middle.
+            // Only from the front: the next job's instances may still ask for one in the middle.
             && first.get().completed.is_some()
         {
             self.forgotten = first.key() + 1;
@@ -254,8 +253,7 @@ impl JournalReplay<'_> {
             self.found
                 .push(Violation::MissedEarly { event, deadline_ns });
         }
-        // Judged when it was written; by now the backlog knows only the latest miss of the job's
-        // run.
+        // Judged when it was written; by now only the latest miss of its run is known.
         if let (Some(missed), Some(deadline_ns)) = (&mut begun.missed, self.deadline_ns(dag, job)) {
             missed.time_ns = deadline_ns + 1;
         }
@@ -408,8 +406,7 @@ impl JournalReplay<'_> {
             Some(life.over()?.time_ns)
         };
         let end_ns = self.end_ns;
-        // All instances are over, and the completion is missing, if the latest end was long enough
-        // ago.
+        // All instances are over, and the completion is overdue, if the latest end was long ago.
         let over_ns = latest((0..self.subtasks(dag)).map(over_ns))
             .filter(|over_ns| !self.is_tolerable(*over_ns, end_ns));
         let unfinished = Violation::Unfinished { dag, job, end_ns };
@@ -459,8 +456,7 @@ impl JournalReplay<'_> {
             let late = late.max_by_key(|due| due.finish_ns)?;
             let finish_ns = late.finish_ns?;
             let may_be_lost = self.may_be_lost(&dues);
-            // A job cut before its deadline counts as cut, and never as a miss (rule 4 of
-            // `overrun`).
+            // A job cut before its deadline never counts as a miss (rule 4 of `overrun`).
             let is_cut = known.cut.is_some() || of_dag.is_ended;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
@@ -469,7 +465,7 @@ impl JournalReplay<'_> {
                 deadline_ns: late.deadline_ns,
             });
         };
-        // If a finish may be lost, the missing one of several sinks is not known.
+        // If a finish may be lost, nobody knows which of several sinks missed.
         if known.is_partial && dues.len() > 1 {
             return None;
         }

@@ -308,8 +308,7 @@ impl InstanceLife {
     /// Records an event, whether allowed or not, and returns the breach, if any.
     fn note(&mut self, event: &Event, moment: StepTime) -> Option<Violation> {
         let (stage, last) = (self.stage, self.last);
-        // Also after a breach: otherwise one slip would turn each later event into a breach of its
-        // own.
+        // Also after a breach: otherwise one slip would make every later event a breach.
         self.stage = stage_after(event);
         self.last = Some((event.what, event.time_ns));
         let place = match event.what {
