@@ -1,19 +1,17 @@
 //! Function-as-Subtask: DAG tasks written as plain functions.
 //!
-//! The API of the paper "Function-as-Subtask API Replacing Publish/Subscribe
-//! for OS-Native DAG Scheduling". An app states *functions* and the *topics*
-//! between them; it has no way to publish in mid-function, to match messages,
-//! or to wake anybody. So an app is a set of DAG tasks in the sense of
-//! real-time theory, and the scheduler may take it for one.
+//! The API of the paper "Function-as-Subtask API Replacing Publish/Subscribe for OS-Native DAG
+//! Scheduling". An app registers *functions* and names the *topics* between them. A function cannot
+//! publish before returning, match messages, or wake anybody. An app is therefore a set of DAG
+//! tasks in the sense of real-time theory, and the scheduler may treat the app as such a set.
 //!
 //! # Words
 //!
-//! A *DAG* (or task) is released periodically; each release is a *job*, counted
-//! from 0. A *subtask* is a function in the DAG: its argument tuple is what it
-//! reads, its result tuple what it writes, one *topic* for each element. One
-//! execution of a subtask, for one job, is an *instance*. A *source* reads
-//! nothing and is started by the release, a *sink* writes nothing. `docs/glossary.md` has
-//! the words that are our own.
+//! A *DAG* (or task) is released periodically; each release is a *job*, counted from 0. A *subtask*
+//! is a function in the DAG: the function reads its argument tuple and writes its result tuple, one
+//! *topic* for each element. One execution of a subtask, for one job, is an *instance*. A *source*
+//! has no inputs and starts at the release; a *sink* has no outputs. `docs/glossary.md` lists the
+//! project's own words.
 //!
 //! # A first DAG
 //!
@@ -62,50 +60,51 @@
 //!
 //! # Where things are
 //!
-//! The root has what every app needs, and the paper's names. The values that subtasks share beyond
-//! their edges are in [`shared`], a commit's answers in [`commit`], what functions say in
-//! [`log`](mod@log); a machine below offers itself by [`platform`], and records and replays by
-//! [`edge`].
+//! The crate root has the paper's names and everything every app needs. Values shared beyond the
+//! edges are in [`shared`], a commit's answers in [`commit`], the messages of functions in
+//! [`log`](mod@log). A machine installs itself through [`platform`], and records and replays
+//! through [`edge`].
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - A function runs when all values of its job have arrived, and gets exactly
-//!   those: every value carries its job's number and is found by it.
-//! - Nothing a function returns is seen before it has returned, and then all of
-//!   it at once. Sending never waits.
-//! - What functions share otherwise is stated and typed: a [`State`](shared::State) within a DAG,
-//!   a [`Latest`](shared::Latest) value between DAGs, a [`Signal`](shared::Signal) that releases
-//!   one. The commit turns it into precedence, bounded staleness, or a minimum distance of
-//!   releases.
-//! - What a function may change of the run is stated, too: which DAGs are paused
-//!   ([`Switch`](shared::Switch)), and when it ends ([`Shutdown`](shared::Shutdown)).
-//! - What comes from outside and goes there while DAGs run passes a [`Wire`](shared::Wire), or is
-//!   a [`Parameter`](shared::Parameter).
-//! - A function may be async, and wait in its midst: as often as is stated, each time until a limit
-//!   at the latest, for a time, a [`Device`](shared::Device) or a [`Wire`](shared::Wire). Meanwhile it has no core.
-//! - After the commit the crate allocates nothing and takes no lock. Edges do no
-//!   locked read-modify-write; states and latest values do one or two a use. (What
-//!   functions and their messages' `clone` do is theirs.)
-//! - [`finish_create_dags`] reports everything that is wrong at once. Where
-//!   WCETs are given, it also says by when each DAG's jobs are complete, or that
-//!   it cannot prove it ([`Commit::answers`](commit::Commit::answers)).
+//! - A function runs after all values of its job have arrived, and gets exactly the values of that
+//!   job. Every value carries its job's number, and the reader finds the value by that number.
+//! - A function's results become visible after the function has returned, all at once. Sending
+//!   never waits.
+//! - Functions share other data only by declared and typed objects: a [`State`](shared::State)
+//!   within a DAG, a [`Latest`](shared::Latest) value between DAGs, a [`Signal`](shared::Signal)
+//!   for releasing a DAG. The commit turns them into precedence, bounded staleness, or a minimum
+//!   distance of releases.
+//! - A function declares every influence on the run, too: pausing DAGs ([`Switch`](shared::Switch))
+//!   and ending the run ([`Shutdown`](shared::Shutdown)).
+//! - While DAGs run, data enters and leaves only through a [`Wire`](shared::Wire) or a
+//!   [`Parameter`](shared::Parameter).
+//! - A function may be async and wait before returning. The subtask declares the number of waits,
+//!   and a time limit for each. The function can wait for a time, a [`Device`](shared::Device) or a
+//!   [`Wire`](shared::Wire), and has no core meanwhile.
+//! - After the commit the crate allocates nothing and takes no lock. Edges do no locked
+//!   read-modify-write; states and latest values do one or two per use. (Functions and the `clone`
+//!   of their messages may still allocate or lock.)
+//! - [`finish_create_dags`] reports all faults at once. Given WCETs, the commit also bounds each
+//!   DAG's response time, or reports the lack of a proof
+//!   ([`Commit::answers`](commit::Commit::answers)).
 //!
-//! # What is not
+//! # Limits
 //!
-//! - What functions share behind the scheduler's back (a mutex, a static) is
-//!   not in the model; time waited there is execution time.
+//! - The model does not cover data shared behind the scheduler's back (a mutex, a static); time
+//!   waited there is execution time.
 //! - A function that never returns holds its core forever.
 //!
-//! # How it is built
+//! # How the crate is built
 //!
-//! Top to bottom: [`Dag`] takes registrations; the commit verifies them with `sched-dag` and makes
-//! of each function a [`SubtaskCode`](platform::SubtaskCode), one future that is polled once for
-//! each instance, or, of a function that waits, one for each instance, polled once a turn; the [`Platform`](platform::Platform) gets the [`Plan`](platform::Plan) and runs
-//! bodies when its scheduler says so. Values travel in rings that have a slot for each job that may
-//! be in flight. The crate names no kernel and needs only `alloc`; its `unsafe` is in
-//! `run/cell`.
+//! Top to bottom: [`Dag`] takes registrations. The commit verifies them with `sched-dag` and turns
+//! each function into a [`SubtaskCode`](platform::SubtaskCode): one future, polled once per
+//! instance; or, for a function with waits, one future per instance, polled once per turn. The
+//! [`Platform`](platform::Platform) gets the [`Plan`](platform::Plan) and runs bodies on request of
+//! its scheduler. Values travel in rings with a slot for each job that may be in flight. The crate
+//! names no kernel and needs only `alloc`; its `unsafe` is in `run/cell`.
 //!
-//! `docs/paper.md` relates the paper's figures 3 and 4 to this code.
+//! `docs/paper.md` relates the paper's figures 3 and 4 to the code.
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
@@ -117,23 +116,23 @@ pub mod edge;
 pub mod platform;
 mod run;
 pub mod shared {
-    //! Values and events beyond the edges of a DAG, each stated by the subtasks that use it.
+    //! Values and events beyond the edges of a DAG, declared by every subtask with access to them.
     //!
     //! | shared | between | made by |
     //! |---|---|---|
     //! | [`State`] | subtasks of a DAG, from job to job | [`Dag::state`](crate::Dag::state) |
     //! | [`Latest`] value | DAGs | [`Dag::latest`](crate::Dag::latest) |
-    //! | [`Signal`] | a subtask or a driver, and the DAG that it releases | [`Dag::sporadic`](crate::Dag::sporadic) |
+    //! | [`Signal`] | a raiser, and the released DAG | [`Dag::sporadic`](crate::Dag::sporadic) |
     //! | [`Wire`] | DAGs and the outside: bytes in packets | [`Wire::new`] |
-    //! | [`Device`] | a subtask that asks and waits, and what answers | [`create_device`] |
-    //! | [`Lock`]ed data | what else shares no edge | [`Lock::new`] |
+    //! | [`Device`] | an asking subtask, and a driver | [`create_device`] |
+    //! | [`Lock`]ed data | subtasks without a common edge | [`Lock::new`] |
     //! | [`Parameter`] | DAGs and people who tune them | [`Parameter::new`] |
     //! | [`WallClock`] | DAGs and the world's time | [`WallClock::new`] |
-    //! | [`Switch`] | a DAG and those that pause and resume it | [`Dag::switching`](crate::Dag::switching) |
-    //! | [`Modes`] | groups of DAGs, of which one runs | [`Modes::new`] |
+    //! | [`Switch`] | a DAG, and subtasks pausing it | [`Dag::switching`](crate::Dag::switching) |
+    //! | [`Modes`] | groups of DAGs, with one group running at a time | [`Modes::new`] |
     //! | [`Shutdown`] | all: when the run ends | [`shutting_down`] |
     //!
-    //! A subtask that uses one is registered by [`Dag::using`](crate::Dag::using).
+    //! [`Dag::using`](crate::Dag::using) registers a subtask with access to such an object.
 
     pub use crate::api::device::{
         Asker, Device, DeviceDriver, DeviceUse, PendingAnswer, Ticket, create_device,

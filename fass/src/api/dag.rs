@@ -1,13 +1,11 @@
 //! Building a DAG: the registering half of the paper's API.
 //!
-//! A [`Dag`] is a handle of a DAG under construction. Registering a subtask
-//! takes a function, the names of the topics it reads and writes, and its
-//! attributes; nothing else can be said about a subtask, and nothing runs.
-//! Faults are not reported here but at the commit, all at once
-//! ([`finish_create_dags`](crate::finish_create_dags)). After the commit the
-//! handle is spent.
+//! A [`Dag`] is a handle of a DAG under construction. Registering a subtask takes a function, the
+//! names of the input and output topics, and attributes. A subtask has no other properties, and
+//! registration runs nothing. Registration does not report faults either: the commit reports all of
+//! them at once ([`finish_create_dags`](crate::finish_create_dags)). The commit uses up the handle.
 //!
-//! Construction happens on one thread; a `Dag` cannot leave it.
+//! Construction happens on one thread; a `Dag` cannot leave the thread.
 
 use alloc::rc::Rc;
 use core::cell::{RefCell, RefMut};
@@ -51,9 +49,8 @@ pub fn create_dag() -> Dag {
 ///
 /// # Panics
 ///
-/// Every method panics, at its caller's line, if the DAG has been committed:
-/// the graph that was verified is the graph that runs, and an addition that
-/// would silently not run is a mistake in the program.
+/// Every method panics, at its caller's line, after the DAG's commit. The verified graph is the
+/// graph that runs, and a later addition, silently ignored, would be a mistake in the program.
 #[derive(Clone)]
 pub struct Dag {
     pub(crate) draft: Rc<RefCell<DagDraft>>,
@@ -67,37 +64,35 @@ impl Dag {
         self
     }
 
-    /// Sets the time of the first release after the start of scheduling;
-    /// without it, 0.
+    /// Sets the time from the start of scheduling to the first release; by default 0.
     #[track_caller]
     pub fn offset(&self, offset: Duration) -> &Self {
         self.open().set_offset(offset);
         self
     }
 
-    /// Sets the most jobs that may be in flight at once, at least 1.
+    /// Sets the greatest number of jobs in flight at once, at least 1.
     ///
-    /// It is also the number of slots of every edge. Without it the commit
-    /// takes enough for the relative deadline.
+    /// The number is also the number of slots of every edge. By default the commit chooses enough
+    /// for the relative deadline.
     #[track_caller]
     pub fn in_flight(&self, jobs: u32) -> &Self {
         self.open().spec.in_flight = Some(jobs);
         self
     }
 
-    /// Sets what happens at a release that finds the most jobs in flight;
-    /// without it the release queues.
+    /// Sets the reaction to a release while the greatest number of jobs is in flight; by default
+    /// the release queues.
     #[track_caller]
     pub fn overrun(&self, policy: OverrunPolicy) -> &Self {
         self.open().spec.overrun = policy;
         self
     }
 
-    /// Puts the DAG into a cluster, on whose cores alone it runs; they are counted from 0.
-    /// Where the machine's cores are divided, each DAG is to be in one.
+    /// Puts the DAG into a cluster, counted from 0: the DAG runs only on the cores of that cluster.
+    /// Where the machine's cores are divided, each DAG has to be in a cluster.
     ///
-    /// Latest values and signals, which a DAG shares with others, may cross
-    /// clusters.
+    /// Latest values and signals, shared between DAGs, may cross clusters.
     ///
     /// ```
     /// use core::time::Duration;
@@ -120,12 +115,12 @@ impl Dag {
         self
     }
 
-    /// Lets only these cores of its cluster, counted from 0, execute the DAG; in any order, and none
-    /// means all.
+    /// Restricts the DAG to the given cores of its cluster, counted from 0, in any order. An empty
+    /// list means all cores.
     ///
-    /// DAGs of a cluster have the same affinity, or no core in common; anything else is a fault at
-    /// commit, and so is a core that there is not. Cores that DAGs with an affinity leave idle execute
-    /// no others.
+    /// Any two DAGs of a cluster have the same affinity or no core in common; otherwise the commit
+    /// reports a fault, as for a core that does not exist. Cores left idle by DAGs with an affinity
+    /// execute no other DAGs.
     ///
     /// ```
     /// use core::time::Duration;
@@ -148,20 +143,20 @@ impl Dag {
         self
     }
 
-    /// Sets the number of jobs to release, after which the DAG is finished;
-    /// without it the DAG runs without end.
+    /// Sets the number of jobs to release; afterwards the DAG is finished. By default the DAG runs
+    /// without end.
     #[track_caller]
     pub fn jobs(&self, jobs: u64) -> &Self {
         self.open().spec.jobs = Some(jobs);
         self
     }
 
-    /// Demands a proof: the commit is refused unless a test bounds the response
-    /// time of this DAG by its relative deadline.
+    /// Demands a proof: the commit fails unless a test bounds the response time of this DAG by its
+    /// relative deadline.
     ///
-    /// That needs the WCETs of all its subtasks, and of all DAGs that may delay
-    /// it. Other DAGs of the commit need no proof of their own. Without the
-    /// demand the commit only answers; see [`Commit::answers`](crate::commit::Commit::answers).
+    /// A proof needs the WCETs of all subtasks of the DAG, and of all DAGs that may delay the DAG.
+    /// Other DAGs of the commit need no proof of their own. Without the demand the commit only
+    /// reports the answer; see [`Commit::answers`](crate::commit::Commit::answers).
     ///
     /// ```
     /// use core::time::Duration;
@@ -185,8 +180,8 @@ impl Dag {
         self
     }
 
-    /// Registers the source: a function without arguments that every release
-    /// starts, at multiples of `period` after the offset.
+    /// Registers the source: a function without arguments, started by every release, at multiples
+    /// of `period` after the offset.
     ///
     /// `output_topics` names one topic for each element of `Ret`.
     ///
@@ -224,11 +219,11 @@ impl Dag {
         self.open().set_period(period, subtask);
     }
 
-    /// Registers a subtask between the source and the sink: a function from a
-    /// tuple of inputs to a tuple of outputs.
+    /// Registers a subtask between the source and the sink: a function from a tuple of inputs to a
+    /// tuple of outputs.
     ///
-    /// `input_topics` names one topic for each element of `Args`,
-    /// `output_topics` one for each element of `Ret`.
+    /// `input_topics` names one topic for each element of `Args`, `output_topics` one for each
+    /// element of `Ret`.
     ///
     /// ```
     /// use fass::{SubtaskAttributes, create_dag};
@@ -241,8 +236,7 @@ impl Dag {
     /// );
     /// ```
     ///
-    /// A function that takes its inputs as separate arguments is refused by the
-    /// compiler:
+    /// The compiler refuses a function taking its inputs as separate arguments:
     ///
     /// ```compile_fail,E0593
     /// # use fass::{SubtaskAttributes, create_dag};
@@ -271,12 +265,12 @@ impl Dag {
             .register(attributes);
     }
 
-    /// Registers a sink: a function that returns nothing and shall have finished by
-    /// `relative_deadline` after the release. The job is complete with its last sink.
+    /// Registers a sink: a function without results, to be finished by `relative_deadline` after
+    /// the release. The job is complete with its last sink.
     ///
-    /// `input_topics` names one topic for each element of `Args`. If a DAG has several
-    /// sinks ([`finish_create_dags_with`](crate::commit::finish_create_dags_with)), each has its
-    /// own deadline.
+    /// `input_topics` names one topic for each element of `Args`. In a DAG with several sinks
+    /// ([`finish_create_dags_with`](crate::commit::finish_create_dags_with)), each sink has its own
+    /// deadline.
     ///
     /// ```
     /// use core::time::Duration;
@@ -306,17 +300,17 @@ impl Dag {
             .register(attributes);
     }
 
-    /// Sets the time between two releases, where no source states it: of untyped subtasks, or of a
-    /// [`source`](Self::source).
+    /// Sets the time between two releases. Needed where no source states a period: for a DAG of
+    /// untyped subtasks, or with a [`source`](Self::source).
     #[track_caller]
     pub fn period(&self, period: Duration) -> &Self {
         self.open().replace_period(period);
         self
     }
 
-    /// Sets the time after its release by which a job shall be complete, for a
-    /// DAG of untyped subtasks. It is the deadline of each sink that states none. (A
-    /// typed sink states its own, which may be shorter.)
+    /// Sets the time from a release to the deadline of the job, for a DAG of untyped subtasks. The
+    /// deadline holds for each sink without its own. (A typed sink states its own deadline,
+    /// possibly shorter.)
     #[track_caller]
     pub fn relative_deadline(&self, relative_deadline: Duration) -> &Self {
         self.open().set_dag_deadline(relative_deadline);
@@ -338,7 +332,7 @@ impl Dag {
 
 shown_as!(Dag, |of| of.draft.borrow().spec.name);
 
-/// After the commit a handle names its DAG, wherever one is asked for.
+/// Identifies a committed DAG by its handle, in every call with a DAG as an argument.
 ///
 /// ```
 /// use core::time::Duration;

@@ -1,33 +1,34 @@
-//! Devices: what takes its time to answer a subtask, and may be late, or never come to an end.
+//! Devices: peers answering the questions of a subtask, possibly late or never.
 //!
-//! A device has two ends. One subtask *asks*: it is async, sends a question and waits for the
-//! answer, or until the limit of that wait. The other end is the *driver's*: it takes the question
-//! and answers it, from a DAG of its own, a thread of Linux, a test. So all that a device can do to a
-//! DAG is to end a wait before its limit.
+//! A device has two ends. One subtask *asks*: the subtask is async, sends a question and waits for
+//! the answer, or until the limit of that wait. The other end belongs to the *driver*: a DAG of its
+//! own, a thread of Linux, or a test takes the question and answers. So the only influence of a
+//! device on a DAG is to end a wait before its limit.
 //!
-//! A driver that is a DAG is released by the questions themselves ([`Device::served_by`]): its time,
-//! too, is a part of the wait, and its faults are its own.
+//! If the driver is a DAG, the questions themselves release the driver's jobs
+//! ([`Device::served_by`]). The driver's time is then a part of the wait, and its faults stay in
+//! its own DAG.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - A question is there for the driver when the wait for its answer has begun, not before (R3).
-//! - An answer ends the wait that it is for, once. Another one, or one for a wait that has ended, or
-//!   whose job is gone, is given back.
-//! - Neither end waits for the other, or takes a lock; and nothing is allocated.
+//! - The driver sees a question only after the wait for the answer has begun (R3).
+//! - An answer ends exactly the wait for which it was given, once. The driver gets back a second
+//!   answer, an answer to a wait already over, or an answer to a job already gone.
+//! - Neither end waits for the other or takes a lock; and nothing is allocated.
 //!
 //! # How the two ends meet
 //!
-//! Each question has a number, from 1 on, that no other one has of any device: so a ticket is of no
-//! use to another device's driver. The word `posted` is that of the question that waits for its
-//! answer; whoever exchanges it for 0 has decided: the driver, who then has answered, or the asking
-//! end, which has given up, or whose instance is cancelled. The driver does not decide behind the
-//! wait's last instant, when the asking end may not have had a core yet. There are two places for
-//! questions, as the driver may be just taking one out that has been given up; the asking end writes
-//! the next one to the other. The place of the answer is the driver's until it has answered, and then
-//! the asking end's.
+//! Each question has a number, counted from 1, unique over all devices: so a ticket is of no use to
+//! another device's driver. The word `posted` holds the number of the question waiting for its
+//! answer. Either end decides the question by exchanging the number for 0: the driver by answering,
+//! the asking end by giving up, or when its instance is cancelled. After the wait's last instant
+//! the driver does not decide any more, even if the asking end has had no core yet. There are two
+//! places for questions: while the driver is taking a question just given up, the asking end writes
+//! the next question to the other place. The place of the answer belongs to the driver until the
+//! driver has answered, and then to the asking end.
 //!
-//! A [wire](super::wire_waits) is a device, too: its driver says that an answer is there, and the
-//! asking end takes it from the wire. It may be there before it is asked for.
+//! A [wire](super::wire_waits) is a device, too: its driver reports an answer, and the asking end
+//! takes the answer from the wire. The answer may be there before the question.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -58,7 +59,7 @@ use crate::run::line::ChannelState;
 use crate::run::turn::{TurnState, WaitEnd, WaitFault};
 use crate::run::waiting::{WaitStep, nanoseconds};
 
-/// Makes a device of that name: the end of the subtask that asks it, and the driver's.
+/// Makes a device with the given name: the end for the asking subtask, and the end for the driver.
 ///
 /// See [`Device`].
 #[must_use]
@@ -91,12 +92,12 @@ where
     (Device(cell), driver)
 }
 
-/// A device, as the subtask has it that asks. Made by [`create_device`].
+/// The asking subtask's end of a device. Made by [`create_device`].
 ///
 /// # Examples
 ///
-/// A camera's DAG that asks an accelerator for what is in a frame, and goes on without if it is
-/// late:
+/// A camera's DAG asks an accelerator for the objects in a frame, and goes on without an answer if
+/// the accelerator is late:
 ///
 /// ```
 /// use core::time::Duration;
@@ -142,12 +143,12 @@ pub struct Device<Q, A>(Arc<DeviceCell<Q, A>>);
 #[derive(Debug)]
 pub struct DeviceUse<Q, A>(Device<Q, A>);
 
-/// The handle by which an async function asks a device.
+/// The handle of an async function for asking a device.
 ///
 /// See [`Device`].
 pub struct Asker<Q, A>(Arc<DeviceCell<Q, A>>);
 
-/// A question on its way to its answer. Made by [`Asker::ask`].
+/// A question waiting for its answer, as a future. Made by [`Asker::ask`].
 ///
 /// See [`Device`].
 #[must_use = "the question is sent when this is awaited"]
@@ -155,24 +156,24 @@ pub struct PendingAnswer<'a, Q, A> {
     cell: &'a DeviceCell<Q, A>,
     question: Option<Q>,
     wait: WaitStep,
-    /// Its number, 0 before it has one.
+    /// The question's number, 0 before the question has one.
     number: u64,
-    /// The answer of the recorded run, if this is a replay.
+    /// The answer of the recorded run, in a replay.
     recorded: Option<A>,
 }
 
 /// The driver's end of a device. Made by [`create_device`].
 ///
-/// There is one, so of what drives a device one acts at a time.
+/// There is only one, so a device has a single driver at any time.
 ///
 /// See [`Ticket`].
 pub struct DeviceDriver<Q, A> {
     cell: Arc<DeviceCell<Q, A>>,
-    /// The question that was taken last.
+    /// The number of the question taken last.
     taken: u64,
 }
 
-/// The question that an answer is for.
+/// The identity of a question, needed for answering the question.
 ///
 /// ```
 /// use core::time::Duration;
@@ -203,73 +204,76 @@ pub struct DeviceDriver<Q, A> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ticket {
     number: u64,
-    /// The plan.
+    /// The number of the plan.
     plan: u64,
     wait: WaitId,
 }
 
 impl Ticket {
-    /// Returns the job that asks.
+    /// Returns the job of the asking instance.
     pub const fn job(&self) -> u64 {
         self.wait.instance.job
     }
 }
 
-/// A question, with its number and the wait for its answer: of which job, and which one there.
+/// A question, with its number and the wait for its answer: the job, and the wait's number within
+/// the job.
 struct Question<Q> {
     number: u64,
     wait: (u64, u32),
     question: Q,
 }
 
-/// The place of the answers of a device whose driver has none of its own.
+/// The place of the answers, for a device whose driver keeps none of its own.
 pub(super) trait AnswerSource<A>: Send + Sync {
-    /// Reports whether there is one.
+    /// Reports whether there is an answer.
     fn is_there(&self) -> bool;
 
-    /// Takes it.
+    /// Takes the answer.
     fn take(&self) -> Option<A>;
 }
 
-/// The cell that both ends of a device share.
+/// The cell shared by both ends of a device.
 struct DeviceCell<Q, A> {
     name: String,
-    /// The subtask that asks.
+    /// The asking subtask.
     asking: SetOnce<(Arc<RequestTarget>, SubtaskId)>,
-    /// The turns of that subtask, by their address.
+    /// The turns of the asking subtask, identified by their address.
     turn: AtomicUsize,
-    /// The DAG that a question releases.
+    /// The DAG released by a question.
     server: SetOnce<Arc<RequestTarget>>,
-    /// The word that a question changes, where a driver's thread sleeps on it.
+    /// A word changed by each question, for a driver's thread to sleep on.
     bell: SetOnce<Arc<AtomicU32>>,
     questions: [SharedCell<Option<Question<Q>>>; 2],
     /// The answer, with the number of its question.
     answer: SharedCell<Option<(u64, A)>>,
-    /// Where the answers are, if not there.
+    /// The source of the answers, if they are not in `answer`.
     source: SetOnce<Box<dyn AnswerSource<A>>>,
-    /// How the answers are recorded, if they are.
+    /// The recorder of the answers, if they are recorded.
     answers: SetOnce<Box<dyn AnyAnswers<A>>>,
-    /// When the latest question was posted, and how long the answer took, if it is recorded.
+    /// The time at which the latest question was posted, and the time until its answer, if
+    /// recorded.
     posted_ns: AtomicU64,
     took_ns: AtomicU64,
-    /// The last instant at which it may be answered.
+    /// The last instant at which the question may be answered.
     last_ns: AtomicU64,
-    /// The question to be posted at the end of the turn, or 0.
+    /// The number of the question to be posted at the end of the turn, or 0.
     staged: AtomicU64,
-    /// The question that was posted last, or 0.
+    /// The number of the question posted last, or 0.
     latest: AtomicU64,
-    /// The question that waits for its answer, or 0.
+    /// The number of the question waiting for its answer, or 0.
     posted: AtomicU64,
 }
 
-/// How many questions have a number, of all devices.
+/// The count of question numbers given so far, over all devices.
 static QUESTIONS: AtomicU64 = AtomicU64::new(0);
 
 impl<Q, A> DeviceCell<Q, A> {
-    /// Writes a question down, which is not to be seen yet, and returns its number.
+    /// Writes a question to a free place without showing it to the driver yet, and returns its
+    /// number.
     fn stage(&self, wait: (u64, u32), question: Q) -> u64 {
         let number = QUESTIONS.fetch_add(1, Ordering::Relaxed) + 1;
-        // The driver is at one of them at most.
+        // The driver holds at most one of the two places.
         let place = self.questions.iter().find_map(SharedCell::change);
         let mut place = place.expect("the driver's end is used by one thread at a time");
         let question = Question {
@@ -278,14 +282,15 @@ impl<Q, A> DeviceCell<Q, A> {
             question,
         };
         let older = place.replace(question);
-        // What is dropped is the app's, and may panic: not in the place.
+        // The older question belongs to the app, and dropping it may panic: so not inside the
+        // place.
         drop(place);
         drop(older);
         self.staged.store(number, Ordering::Relaxed);
         number
     }
 
-    /// Takes the answer to a question, which has come.
+    /// Takes the answer to an answered question.
     fn take_answer(&self, number: u64) -> A {
         let answer = match self.source.get() {
             Some(source) => source.take(),
@@ -306,7 +311,8 @@ impl<Q, A> DeviceCell<Q, A> {
         }
     }
 
-    /// Panics where this is no turn of the subtask that asks: its question would wait in another's.
+    /// Panics outside a turn of the asking subtask: the question would wait in another subtask's
+    /// wait.
     fn check_turn(&self, context: &Context<'_>) {
         let turn = turn_of(context.waker()).map_or(0, TurnState::address);
         if turn != self.turn.load(Ordering::Relaxed) {
@@ -314,20 +320,21 @@ impl<Q, A> DeviceCell<Q, A> {
         }
     }
 
-    /// Decides on a question that waits for its answer, and reports whether it did.
+    /// Decides a question waiting for its answer, and reports whether this call decided the
+    /// question.
     fn decide(&self, number: u64) -> bool {
         let posted = &self.posted;
-        // Acquire: if the driver has, the answer is in its place.
+        // Acquire: if the driver has decided, the answer is in its place.
         let decided = posted.compare_exchange(number, 0, Ordering::AcqRel, Ordering::Acquire);
         decided.is_ok()
     }
 }
 
-/// Posts the question that an instance has staged, once its turn has ended in the wait for the
-/// answer.
+/// Posts the question staged by an instance, after the instance's turn has ended in the wait for
+/// the answer.
 struct QuestionPost<Q, A> {
     cell: Arc<DeviceCell<Q, A>>,
-    /// Whether a thread sleeps that is to be woken for it.
+    /// Whether a sleeping thread has to be woken for the question.
     rings: bool,
     is_muted: bool,
 }
@@ -361,7 +368,8 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
             self.rings = true;
         }
         cell.source.get().is_some_and(|source| {
-            // With the driver's: an answer that comes now is seen here, or the question there.
+            // Pairs with the driver's fence: either this side sees an answer coming now, or the
+            // driver sees the question.
             fence(Ordering::SeqCst);
             source.is_there() && cell.decide(number)
         })
@@ -382,18 +390,19 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
 }
 
 impl<Q, A> Device<Q, A> {
-    /// Returns the use of the subtask that asks it, of which there is one.
+    /// Returns the use for the asking subtask. A device has one such subtask.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn asking(&self) -> DeviceUse<Q, A> {
         DeviceUse(Self(Arc::clone(&self.0)))
     }
 
-    /// Has each question raise a signal, in the step in which the wait for the answer begins: the
-    /// sporadic DAG that it releases has the driver. It answers at once, or starts what answers
-    /// later. Reports whether it is the first signal of the device, which alone counts.
+    /// Lets each question raise `signal`, which releases the driver's sporadic DAG. The signal is
+    /// raised in the step in which the wait for the answer begins. The driver's function answers at
+    /// once, or starts work leading to an answer later. Returns `true` if `signal` is the device's
+    /// first signal; later signals have no effect.
     ///
-    /// To be called before the commit, which must have the signal's DAG, too; after it no signal
-    /// counts.
+    /// Call the method before the commit; a later call has no effect. The commit must have the
+    /// signal's DAG, too.
     ///
     /// ```
     /// use core::time::Duration;
@@ -424,7 +433,7 @@ impl<Q, A> Device<Q, A> {
     /// assert!(report.dag("asks").jobs().all(|job| job.response_time_ns() == Some(1_000_000)));
     /// ```
     pub fn served_by(&self, signal: &Signal) -> bool {
-        // Behind the commit nobody checks whether the signal is one of the plan's.
+        // After the commit nobody checks any more whether the signal's DAG belongs to the plan.
         let asking = self.0.asking.get();
         let is_committed = asking.is_some_and(|(dag, _)| dag.get().is_some());
         !is_committed && self.0.server.set(Arc::clone(&signal.target))
@@ -432,13 +441,13 @@ impl<Q, A> Device<Q, A> {
 }
 
 impl<Q, A: Recordable + Send + Sync + 'static> Device<Q, A> {
-    /// Records the answers, where the platform records: each with how long it took, when the
-    /// instance that got it is complete. A replay takes them, in place of asking: its waits are as
-    /// long as they were.
+    /// Records the answers, where the platform records. Each answer is recorded with the time it
+    /// took, after the instance that got the answer is complete. A replay takes the recorded
+    /// answers instead of asking: its waits are as long as in the recorded run.
     ///
-    /// They are recorded if topics of the DAG are ([`Dag::record`]), too; if one of a source is, the
-    /// answers have to be. Those of a job that take more than 4 KiB together are lost. To be called
-    /// before the commit.
+    /// Answers are recorded only in a DAG with recorded topics ([`Dag::record`]). If a topic of a
+    /// source is recorded, recording the answers is mandatory. Answers of a job with more than 4
+    /// KiB together are lost. Call the method before the commit.
     ///
     /// ```
     /// use core::time::Duration;
@@ -482,7 +491,7 @@ impl<Q, A: Recordable + Send + Sync + 'static> Device<Q, A> {
     /// ```
     pub fn record(&self) -> &Self {
         let answers = RecordedAnswers::new(&EDGE);
-        // Once is enough.
+        // A second call changes nothing.
         let _ = self.0.answers.set(Box::new(answers));
         self
     }
@@ -519,7 +528,7 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
         let cell = self.0.0;
         let mut draft = dag.draft.borrow_mut();
         let id = SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX));
-        // A fault of the commit, as all are, and not a panic where the subtask is registered.
+        // Like all faults a fault of the commit, and not a panic where the subtask is registered.
         if !cell.asking.set((Arc::clone(&draft.target), id)) {
             let name = cell.name.clone();
             draft.add(PartKind::SecondAsker, move |of: &CheckedDag<'_>| {
@@ -552,16 +561,17 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
 impl<Q, A> Asker<Q, A> {
     /// Sends a question, and waits for the answer, or until the limit of the wait.
     ///
-    /// The question goes out when the wait begins. An answer at the very instant of the limit counts.
+    /// The question goes out when the wait begins. An answer at the very instant of the limit still
+    /// counts.
     ///
     /// # Panics
     ///
-    /// When polled, with a [`WaitFault`], if the wait is not as stated.
+    /// When polled, with a [`WaitFault`], if the wait differs from the subtask's declared waits.
     pub fn ask(&self, question: Q) -> PendingAnswer<'_, Q, A> {
         self.ask_if(Some(question))
     }
 
-    /// Panics where this is no turn of the subtask that asks.
+    /// Panics outside a turn of the asking subtask.
     pub(super) async fn check_turn(&self) {
         core::future::poll_fn(|context| {
             self.0.check_turn(context);
@@ -570,7 +580,7 @@ impl<Q, A> Asker<Q, A> {
         .await;
     }
 
-    /// Asks, or waits until the limit for nothing.
+    /// Sends the question, or, given none, waits until the limit in vain.
     pub(super) fn ask_if(&self, question: Option<Q>) -> PendingAnswer<'_, Q, A> {
         PendingAnswer {
             cell: &self.0,
@@ -599,7 +609,7 @@ impl<Q, A> PendingAnswer<'_, Q, A> {
     }
 }
 
-/// Nothing in it is pinned.
+/// No part of the future is pinned.
 impl<Q, A> Unpin for PendingAnswer<'_, Q, A> {}
 
 impl<Q, A> Future for PendingAnswer<'_, Q, A> {
@@ -609,7 +619,7 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
         let this = self.get_mut();
         this.cell.check_turn(context);
         let answers = this.cell.answers.get();
-        // No question leaves in a replay: what it may set off happened in the recorded run.
+        // In a replay no question leaves: its effects happened in the recorded run.
         if let Some(answers) = answers.filter(|answers| answers.replays()) {
             return this.replay(&**answers, context);
         }
@@ -617,19 +627,20 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
         let Some(wait) = this.wait.id() else {
             return Poll::Pending;
         };
-        // Staged only: it goes out at the end of this turn, when nothing of it can fail any more.
+        // Only staged: the question goes out at the end of the turn, when the turn cannot fail any
+        // more.
         if let Some(question) = this.question.take() {
             this.number = this.cell.stage(wait, question);
         }
         polled.map(|has_timed_out| {
             let cell = this.cell;
-            // At the limit, too, an answer may be there: since the wait began, or since the driver gave
-            // it while the scheduler ended the wait. A replay may post no question.
+            // At the limit, too, an answer may be there: given before the wait began, or while the
+            // scheduler was ending the wait. A replay may post no question.
             let was_answered =
                 || cell.latest.load(Ordering::Relaxed) == this.number && !cell.decide(this.number);
             let is_there = this.number > 0 && (!has_timed_out || was_answered());
             let answer = is_there.then(|| cell.take_answer(this.number));
-            // That there was none in time is an answer, too, without which a replay would differ.
+            // A missing answer is recorded, too; otherwise a replay would differ.
             if let Some(answers) = answers.filter(|answers| answers.is_open()) {
                 answers.keep(wait, cell.took_ns.load(Ordering::Relaxed), answer.as_ref());
             }
@@ -639,13 +650,14 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
 }
 
 impl<Q, A> PendingAnswer<'_, Q, A> {
-    /// Waits as long as it took in the recorded run, for the answer that there was.
+    /// Waits for the recorded answer, as long as the wait took in the recorded run.
     fn replay(
         &mut self,
         answers: &dyn AnyAnswers<A>,
         context: &Context<'_>,
     ) -> Poll<Result<A, TimedOut>> {
-        // It is looked up before the wait begins, whose end depends on it.
+        // The lookup comes before the wait begins, since the wait's end depends on the recorded
+        // time.
         let next = self.wait.next_id(context);
         if let Some((took_ns, Some(answer))) = next.and_then(|wait| answers.recorded(wait)) {
             self.recorded = Some(answer);
@@ -656,10 +668,11 @@ impl<Q, A> PendingAnswer<'_, Q, A> {
     }
 }
 
-/// From now on no answer is taken.
+/// A dropped future takes no answer any more.
 impl<Q, A> Drop for PendingAnswer<'_, Q, A> {
     fn drop(&mut self) {
         if self.number > 0 {
+            // A question still staged would go out for a wait already over.
             let staged = &self.cell.staged;
             if staged.load(Ordering::Relaxed) == self.number {
                 staged.store(0, Ordering::Relaxed);
@@ -670,7 +683,7 @@ impl<Q, A> Drop for PendingAnswer<'_, Q, A> {
 }
 
 impl<Q, A> DeviceDriver<Q, A> {
-    /// Takes the question that waits for its answer, if there is one that was not taken before.
+    /// Takes the question waiting for its answer, unless there is none or it was taken before.
     ///
     /// See [`Ticket`].
     pub fn question(&mut self) -> Option<(Ticket, Q)> {
@@ -679,7 +692,7 @@ impl<Q, A> DeviceDriver<Q, A> {
             return None;
         }
         let is_it = |question: &mut Question<Q>| question.number == number;
-        // The other place is of a question that is staged, or was given up.
+        // The other place has a question that is staged, or was given up.
         let mut places = self.cell.questions.iter();
         let found = places.find_map(|place| place.change()?.take_if(is_it))?;
         self.taken = number;
@@ -697,39 +710,43 @@ impl<Q, A> DeviceDriver<Q, A> {
         Some((ticket, found.question))
     }
 
-    /// Gives the answer to a question, which ends the wait for it.
+    /// Answers a question, and so ends the wait for the answer.
     ///
     /// See [`Ticket`].
     ///
     /// # Errors
     ///
-    /// The answer is given back if the question has one, or nobody waits for it any more.
+    /// Returns the answer if the question already has an answer, or if no instance waits for an
+    /// answer any more.
     pub fn answer(&mut self, ticket: Ticket, answer: A) -> Result<(), A> {
         let (cell, number) = (&self.cell, ticket.number);
-        // Until then the place is the asking end's, which may not have taken its answer yet.
+        // Until this question is posted the answer's place belongs to the asking end, whose older
+        // answer may still be there.
         if cell.posted.load(Ordering::Acquire) != number {
             return Err(answer);
         }
         let Some(mut place) = cell.answer.change() else {
             return Err(answer);
         };
+        // As for a question: dropping the older answer may panic, so not inside the place.
         let older = place.replace((number, answer));
         drop(place);
         drop(older);
         if self.end_wait(ticket) {
             return Ok(());
         }
-        // It comes too late, or has been given up just now; nobody else writes to the place.
+        // The answer is too late, or the question was given up just now; nobody else writes to the
+        // place.
         let mut place = self.cell.answer.change();
         let taken = place.as_mut().and_then(|place| place.take());
         taken.map_or(Ok(()), |(_, taken)| Err(taken))
     }
 
-    /// Ends the wait for an answer, which is there. Reports whether somebody waits for it.
+    /// Ends the wait for an answer already in its place. Reports whether an instance was waiting.
     fn end_wait(&self, ticket: Ticket) -> bool {
         let (cell, platform) = (&self.cell, platform::expect_installed());
         let now_ns = platform.now_ns();
-        // The asking end may get to know only later that its wait has ended: it has no core yet.
+        // The asking end has no core yet, and may learn only later that its wait has ended.
         if now_ns > cell.last_ns.load(Ordering::Relaxed) {
             return false;
         }
@@ -739,29 +756,31 @@ impl<Q, A> DeviceDriver<Q, A> {
             cell.took_ns.store(took_ns, Ordering::Relaxed);
         }
         let decided = cell.decide(ticket.number);
-        // Once for each question: whoever decides it first tells the scheduler, or nobody does.
+        // Only the end deciding the question tells the scheduler, so the scheduler is told at most
+        // once.
         if decided {
             platform.answer(ticket.plan, ticket.wait);
         }
         decided
     }
 
-    /// Has the asking end take its answers from there.
+    /// Makes the asking end take its answers from `source`.
     pub(super) fn answer_from(&self, source: impl AnswerSource<A> + 'static) {
         self.cell.source.set(Box::new(source));
     }
 
-    /// Ends the wait for an answer, if there is one, that is where the asking end takes it.
+    /// Ends a wait for an answer, if there is one, after the answer has come to its source.
     pub(super) fn tell(&mut self) {
-        // With that of the post: a question that comes now is seen here, or the answer there.
+        // Pairs with the fence at posting: either this side sees a question coming now, or the
+        // asking end sees the answer.
         fence(Ordering::SeqCst);
         if let Some((ticket, _)) = self.question() {
             self.end_wait(ticket);
         }
     }
 
-    /// Returns a word that changes when there is a question, for a platform that has threads: one
-    /// may sleep on it.
+    /// Returns a word that changes with every question. On a platform with threads, a driver's
+    /// thread may sleep on the word.
     ///
     /// ```
     /// let (_sonar, driver) = fass::shared::create_device::<(), u32>("sonar");
@@ -774,7 +793,7 @@ impl<Q, A> DeviceDriver<Q, A> {
         bell.get().cloned().unwrap_or_default()
     }
 
-    /// Reports whether there is still something that may ask.
+    /// Reports whether the device can still be asked.
     ///
     /// ```
     /// let (sonar, driver) = fass::shared::create_device::<(), u32>("sonar");
@@ -783,6 +802,7 @@ impl<Q, A> DeviceDriver<Q, A> {
     /// assert!(!driver.is_used());
     /// ```
     pub fn is_used(&self) -> bool {
+        // One of the handles is the driver's own.
         Arc::strong_count(&self.cell) > 1
     }
 }

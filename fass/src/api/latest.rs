@@ -1,28 +1,28 @@
-//! Latest values: what passes between DAGs of different rates.
+//! Latest values: data between DAGs of different rates.
 //!
-//! DAGs have no edges between them, since their jobs do not correspond. A subtask
-//! can *sample* a topic of any DAG instead: it gets, at its start, the latest value
-//! whose instance is complete, and waits for nothing. In ROS 2 terms: the timer
-//! callback that looks at what subscriptions have left in member variables.
+//! DAGs have no edges between them, since their jobs do not correspond. Instead, a subtask can
+//! *sample* a topic of any DAG: at its start the subtask gets the latest value whose instance is
+//! complete, and waits for nothing. In ROS 2 terms: a timer callback looking at member variables
+//! filled by subscriptions.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - *Wait-free, both ways.* A sampling subtask never waits for the writer, nor the
-//!   writer for it, whatever cores they run on and whichever is preempted. Nothing is
-//!   allocated after the commit (a message's `clone` is its own affair).
-//! - *Completion boundary.* A value shows when its writer's instance is complete, not
-//!   before, and then whole.
-//! - *Never backwards.* One subtask's samples are of ever later jobs, or the same
-//!   again. During an instance its sample does not change.
-//! - *Visible staleness.* A [`Sample`] says of which job it is and when that was
-//!   complete. How old it can be follows from the writer's bound
+//! - *Wait-free, both ways.* A sampling subtask never waits for the writer, nor the writer for the
+//!   sampling subtask, whatever cores they run on and whichever is preempted. Nothing is allocated
+//!   after the commit (apart from the message's own `clone`).
+//! - *Completion boundary.* A value becomes visible when its writer's instance is complete, not
+//!   before, and then as a whole.
+//! - *Never backwards.* Successive samples of one subtask come from ever later jobs, or from the
+//!   same job again. During an instance its sample does not change.
+//! - *Visible staleness.* A [`Sample`] contains the writer's job and the time of that job's
+//!   completion. The greatest age of a value follows from the writer's bound
 //!   ([`Commit::staleness`](crate::commit::Commit::staleness)).
 //!
-//! # What is not
+//! # Limits
 //!
-//! - Two samples of one function may be of different times, and two subtasks that
-//!   sample the same topic in one job may get different values. Sample once and send
-//!   the value along an edge to have one for all.
+//! - Two samples of one function may be of different times, and two subtasks sampling the same
+//!   topic in one job may get different values. To have the same value for all, sample once and
+//!   send the value along an edge.
 //! - Values may be sampled several times, or never.
 
 use alloc::boxed::Box;
@@ -79,15 +79,14 @@ pub struct Latest<T> {
     pub(crate) shared: Rc<SharedLatest<T>>,
 }
 
-/// The use of a [`Latest`]: the function gets an `Option<Sample<T>>`. Made by
-/// [`Latest::sample`].
+/// The use of a [`Latest`]: the function gets an `Option<Sample<T>>`. Made by [`Latest::sample`].
 ///
 /// See [`Latest`].
 #[derive(Debug)]
 pub struct LatestUse<T>(Latest<T>);
 
-/// A value as a subtask finds it at its start: that of the latest complete instance
-/// of its writer. `None` in its place: none has been complete yet.
+/// The value found by a sampling subtask at its start, from the writer's latest complete instance.
+/// The function gets `None` instead while no instance of the writer has been complete.
 ///
 /// ```
 /// use fass::shared::Sample;
@@ -103,14 +102,15 @@ pub struct LatestUse<T>(Latest<T>);
 pub struct Sample<'a, T> {
     /// The value.
     pub value: &'a T,
-    /// The job of the writer's DAG that it is of.
+    /// The job of the writer's DAG in which the value was written.
     pub job: u64,
-    /// When the writer's instance was complete, on the clock of [`crate::now_ns`].
+    /// The completion time of the writer's instance in nanoseconds, on the clock of
+    /// [`crate::now_ns`].
     pub completed_ns: u64,
 }
 
 impl<T> Sample<'_, T> {
-    /// Returns the time since the writer was complete, in nanoseconds.
+    /// Returns the time since the completion of the writer's instance, in nanoseconds.
     pub fn age_ns(&self) -> u64 {
         crate::now_ns().saturating_sub(self.completed_ns)
     }
@@ -125,7 +125,7 @@ impl<T> Clone for Sample<'_, T> {
 impl<T> Copy for Sample<'_, T> {}
 
 impl<T: Message + Sync> Latest<T> {
-    /// Returns the use of a subtask that samples the value.
+    /// Returns the use for a subtask sampling the value.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn sample(&self) -> LatestUse<T> {
         let shared = Rc::clone(&self.shared);
@@ -136,9 +136,9 @@ impl<T: Message + Sync> Latest<T> {
 impl Dag {
     /// Offers the latest value of a topic of this DAG to subtasks of any DAG.
     ///
-    /// The topic's writer may be registered before or after. It counts as read by
-    /// that, so the writer may be the DAG's sink. The type must be the writer's,
-    /// which the commit checks, as it does that some subtask samples the value.
+    /// The topic's writer may be registered before or after the call. The topic counts as read, so
+    /// the writer may be the DAG's sink. The commit checks that `T` is the writer's type, and that
+    /// some subtask samples the value.
     ///
     /// See [`Latest`].
     #[track_caller]
@@ -178,7 +178,7 @@ impl<T: Message + Sync> Uses for LatestUse<T> {
     }
 }
 
-/// Its values show with the completions of its topic's writer.
+/// The values become visible with the completions of the topic's writer.
 impl DraftPart for Rc<dyn AnyLatest> {
     fn tie(self: Box<Self>, dag: &mut TiedDag<'_>) {
         if let Some(writer) = writer(dag.verified, self.topic()) {
@@ -187,13 +187,14 @@ impl DraftPart for Rc<dyn AnyLatest> {
     }
 }
 
-/// Returns the subtask that writes a topic.
+/// Returns the subtask writing a topic.
 pub(super) fn writer(dag: &sched_dag::Dag, topic: &str) -> Option<usize> {
     let mut topics = dag.topics().iter();
     Some(topics.find(|of| of.name == topic)?.writer.index())
 }
 
-/// A subtask, the latest value that it samples, of whatever DAG, and the number that it has there.
+/// A subtask, the latest value (of any DAG) it samples, and its number among the samplers of that
+/// value.
 pub(crate) struct SampleUse(
     pub(crate) usize,
     pub(crate) Rc<dyn AnyLatest>,
@@ -203,7 +204,7 @@ pub(crate) struct SampleUse(
 impl DraftPart for SampleUse {
     fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
         let Self(subtask, latest, _) = self;
-        // The value's DAG has to be in this very commit, or nobody ever writes it.
+        // The value's DAG has to be in the same commit; otherwise nobody ever writes the value.
         writer_of(of.drafts, latest).is_none().then(|| {
             let says = format_args!(
                 "samples the latest value of topic `{}`, whose dag is not in the commit; commit both \
@@ -215,7 +216,7 @@ impl DraftPart for SampleUse {
     }
 }
 
-/// Returns the position of the DAG whose topic a latest value is of.
+/// Returns the position of the DAG with the topic of a latest value.
 pub(crate) fn writer_of(drafts: &Drafts, latest: &Rc<dyn AnyLatest>) -> Option<usize> {
     let is_it = |offered: &Rc<dyn AnyLatest>| ptr::addr_eq(Rc::as_ptr(offered), Rc::as_ptr(latest));
     (drafts.iter()).position(|draft| draft.borrow().all().any(is_it))

@@ -1,11 +1,11 @@
-//! The life of a run, as functions change it: DAGs that rest, modes, and the end.
+//! Changes of a run by functions: pausing DAGs, changing modes, and ending the run.
 //!
-//! A subtask that may change what runs says so at its registration, as one that raises a signal
-//! does. A request of its function takes effect when its instance is complete (R3); the rules L1
-//! to L6 are in `sched-dag/src/lifecycle.rs`.
+//! A subtask has to declare such changes at registration, as for raising a signal. A request by its
+//! function takes effect when the instance is complete (R3); the rules L1 to L6 are in
+//! `sched-dag/src/lifecycle.rs`.
 //!
-//! Modes are named sets of DAGs, one of which runs; `sched-dag/src/lifecycle.rs` has the
-//! rules, M1 to M7.
+//! Modes are named sets of DAGs, of which one set runs at a time; `sched-dag/src/lifecycle.rs` has
+//! the rules, M1 to M7.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -31,7 +31,7 @@ use crate::draft::part::{
 use crate::run::effect::{AT_ONCE, GO, RequestKind, RequestTarget, STOP, WHEN_IDLE, Wish};
 use crate::run::plan::Plan;
 
-/// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
+/// The use of a DAG by a subtask that may pause and resume the DAG: the function gets a [`Switch`].
 /// Made by [`Dag::switching`].
 ///
 /// See [`Switch`].
@@ -40,10 +40,10 @@ pub struct SwitchUse {
     target: Arc<RequestTarget>,
 }
 
-/// The handle by which a function pauses and resumes a DAG.
+/// The handle of a function for pausing and resuming a DAG.
 ///
-/// A paused DAG releases no job: those that become due are skipped, and keep their numbers and
-/// their places on the grid. Jobs in flight when it is paused go on to their end.
+/// A paused DAG releases no job: jobs due meanwhile are skipped, and keep their numbers and their
+/// places on the grid. Jobs in flight at the pause run to their end.
 ///
 /// # Examples
 ///
@@ -87,33 +87,32 @@ pub struct Switch<'a> {
 }
 
 impl Switch<'_> {
-    /// Pauses the DAG when this instance is complete. In place of a resumption that the same
-    /// instance has asked for.
+    /// Pauses the DAG when this instance is complete. The call replaces an earlier request of the
+    /// same instance to resume.
     pub fn pause(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
 
-    /// Resumes the DAG when this instance is complete. In place of a pause that the same
-    /// instance has asked for.
+    /// Resumes the DAG when this instance is complete. The call replaces an earlier request of the
+    /// same instance to pause.
     pub fn resume(&mut self) {
         self.wish.store(GO, Ordering::Relaxed);
     }
 }
 
-/// The use of the run by a subtask that may end it: the function gets a [`Shutdown`]. Made by
+/// The use of the run by a subtask that may end the run: the function gets a [`Shutdown`]. Made by
 /// [`shutting_down`].
 ///
 /// See [`Shutdown`].
 #[derive(Debug)]
 pub struct ShutdownUse(());
 
-/// The handle by which a function ends the run, in order: nothing more is released, and what is in
-/// flight
-/// comes to its end.
+/// The handle of a function for ending the run in an orderly way: no further job is released, and
+/// jobs in flight run to their end.
 ///
 /// # Examples
 ///
-/// A robot that runs until it has arrived:
+/// A robot that runs until its arrival:
 ///
 /// ```
 /// use core::time::Duration;
@@ -151,13 +150,13 @@ pub struct Shutdown<'a> {
 }
 
 impl Shutdown<'_> {
-    /// Ends the run when this instance is complete. It cannot be taken back.
+    /// Ends the run when this instance is complete. The request cannot be withdrawn.
     pub fn request(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
 }
 
-/// Returns the use of a subtask that may end the run.
+/// Returns the use for a subtask that may end the run.
 ///
 /// See [`Shutdown`].
 #[must_use = "a use has no effect until a subtask is registered with it"]
@@ -166,7 +165,7 @@ pub const fn shutting_down() -> ShutdownUse {
 }
 
 impl Dag {
-    /// Returns the use of a subtask, of any DAG, that may pause and resume this one.
+    /// Returns the use for a subtask, of any DAG, that may pause and resume this DAG.
     ///
     /// The commit must have this DAG, too. See [`Switch`].
     #[track_caller]
@@ -178,8 +177,8 @@ impl Dag {
         }
     }
 
-    /// Lets the DAG be paused from the start of scheduling on, until a [`Switch`], or a person
-    /// at the console, resumes it.
+    /// Starts the DAG in the paused state; it stays paused until a [`Switch`], or a person at the
+    /// console, resumes it.
     ///
     /// ```
     /// use core::time::Duration;
@@ -202,8 +201,8 @@ impl Dag {
     }
 }
 
-/// Makes what serves the requests of all DAGs. Only what is stated here names it, so an app that
-/// states nothing of that kind has no code for it.
+/// Adds the code serving lifecycle requests to the plan. Only statements in this file refer to the
+/// code, so an app without such statements does not contain it.
 fn plan_lifecycle(drafts: &Drafts, plan: &mut Plan) {
     let dags = || (0..).map(DagId).zip(drafts);
     let paused = dags().filter(|(_, draft)| draft.borrow().has::<Paused>());
@@ -214,7 +213,7 @@ fn plan_lifecycle(drafts: &Drafts, plan: &mut Plan) {
     plan.lifecycle = Some(Box::new(changes.with_modes(dags_of_modes(drafts))));
 }
 
-/// The DAG is paused at the beginning.
+/// Marks a DAG as paused at the start.
 struct Paused;
 
 impl DraftPart for Paused {}
@@ -237,17 +236,17 @@ implement_asking!(ShutdownUse, Shutdown, |stated, draft, subtask| {
     ask(draft, subtask, RequestKind::Run)
 });
 
-/// Notes that completions of a subtask may ask for a change of what is on.
+/// Records that completions of a subtask may request a lifecycle change.
 fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
     draft.add(PartKind::Lifecycle, plan_lifecycle as Planner);
     draft.ask(subtask, of)
 }
 
-/// The modes of a run: sets of DAGs, one of which runs at a time.
+/// The modes of a run: sets of DAGs, of which one runs at a time.
 ///
-/// A DAG that is in some mode is paused in all others; one that is in none runs in every mode. A
-/// run begins in the mode that is made first. Functions enter modes, by their completions. Clones
-/// are handles of the same modes.
+/// A DAG in some mode is paused in all other modes; a DAG in no mode runs in every mode. A run
+/// begins in the mode made first. Functions enter modes through their completions. Clones are
+/// handles of the same modes.
 ///
 /// # Examples
 ///
@@ -298,7 +297,8 @@ pub struct Modes {
     modes: ModeSet,
 }
 
-/// A mode. Clones are handles of the same one. Made by [`Modes::mode`].
+/// A mode: a named set of DAGs running together. Clones are handles of the same mode. Made by
+/// [`Modes::mode`].
 ///
 /// See [`Modes`].
 #[derive(Clone)]
@@ -307,14 +307,14 @@ pub struct Mode {
     number: ModeId,
 }
 
-/// The use of a mode by a subtask that may enter it: the function gets an [`ModeSwitch`]. Made by
-/// [`Mode::entering`].
+/// The use of a mode by a subtask that may enter the mode: the function gets a [`ModeSwitch`]. Made
+/// by [`Mode::entering`].
 ///
 /// See [`Modes`].
 #[derive(Debug)]
 pub struct ModeUse(Mode);
 
-/// The handle by which a function enters a mode.
+/// The handle of a function for entering a mode.
 ///
 /// See [`Modes`].
 #[derive(Debug)]
@@ -323,16 +323,16 @@ pub struct ModeSwitch<'a> {
 }
 
 impl ModeSwitch<'_> {
-    /// Enters the mode when this instance is complete. Jobs of the old mode that are in flight
-    /// go on next to those of the new.
+    /// Enters the mode when this instance is complete. Jobs of the old mode still in flight run to
+    /// their end next to jobs of the new mode.
     ///
     /// See [`Modes`].
     pub fn at_once(&mut self) {
         self.wish.store(AT_ONCE, Ordering::Relaxed);
     }
 
-    /// Asks for the mode when this instance is complete. From then on the DAGs that leave release
-    /// nothing, and the mode is entered when none of them has a job in flight.
+    /// Requests the mode when this instance is complete. From then on the DAGs leaving the run
+    /// release nothing, and the mode is entered when none of them has a job in flight.
     ///
     /// See [`Modes`].
     pub fn when_idle(&mut self) {
@@ -341,13 +341,13 @@ impl ModeSwitch<'_> {
 }
 
 impl Modes {
-    /// Makes a handle without modes. A commit has those of one handle.
+    /// Makes a handle without modes. All modes of a commit belong to one handle.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Makes a mode in which these DAGs run, and no other ones that are in some mode. The first
-    /// mode is the one in which the run begins.
+    /// Makes a mode in which the given DAGs run, and no other DAGs that are in some mode. The run
+    /// begins in the mode made first.
     ///
     /// # Panics
     ///
@@ -375,7 +375,7 @@ impl Modes {
 }
 
 impl Mode {
-    /// Returns the use of a subtask, of any DAG, that may enter the mode.
+    /// Returns the use for a subtask, of any DAG, that may enter the mode.
     ///
     /// See [`Modes`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
@@ -389,10 +389,10 @@ implement_asking!(ModeUse, ModeSwitch, |entering, draft, subtask| {
     ask(draft, subtask, RequestKind::Mode(entering.0.number))
 });
 
-/// A mode as stated so far.
+/// A mode as declared so far.
 struct ModeDraft {
     name: String,
-    /// With the names that they had when the mode was made.
+    /// The DAGs, with the names they had when the mode was made.
     dags: Vec<(Arc<RequestTarget>, String)>,
 }
 
@@ -401,7 +401,7 @@ type ModeSet = Rc<RefCell<Vec<ModeDraft>>>;
 
 impl DraftPart for ModeSet {}
 
-/// Notes that a DAG is in modes, or has a subtask that may enter one.
+/// Records that a DAG is in modes, or has a subtask that may enter one.
 fn state(draft: &mut DagDraft, modes: &ModeSet) {
     draft.add(PartKind::Modes, Rc::clone(modes));
     draft.add(PartKind::Modes, check_modes as CommitCheck);
@@ -416,7 +416,7 @@ pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
     modes.map_or(Vec::new(), |modes| modes.iter().map(dags).collect())
 }
 
-/// Adds all that is wrong with the modes of a commit.
+/// Adds all faults of the modes of a commit.
 fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
     let mut add = |code, text| faults.push(Fault::Worded { code, text });
     let found = of_commit(drafts);
@@ -455,10 +455,11 @@ fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
             );
             add("mode_starts_paused", text);
         }
-        // What brings about a safe state is on wherever the DAG is that may need it.
+        // The handler of faults brings about a safe state, so it has to be on in every mode in
+        // which its DAG runs.
         let handler = draft.all().next();
         let handler = handler.and_then(|FaultSignal(target)| dag_of(drafts, target));
-        // A handler in no mode is never paused by one.
+        // No mode ever pauses a handler outside all modes.
         let Some(handler) = handler.filter(|&handler| in_some(handler)) else {
             continue;
         };
@@ -477,7 +478,7 @@ fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
     }
 }
 
-/// Returns the modes that a commit names, each handle once.
+/// Returns the modes named in a commit, each handle once.
 fn of_commit(drafts: &Drafts) -> Vec<ModeSet> {
     let mut found: Vec<ModeSet> = Vec::new();
     for draft in drafts {

@@ -1,26 +1,29 @@
-//! Locks: data that instances change in sections of their functions, one at a time.
+//! Locks: data changed by instances in sections of their functions, one instance at a time.
 //!
-//! A DAG needs none: its values move along its edges, and what its subtasks share is a
-//! [`State`](crate::shared::State). A lock is for what is no DAG, such as a driver's registers that
-//! subtasks of several DAGs change.
+//! A DAG needs no lock: its values move along its edges, and its subtasks share data in a
+//! [`State`](crate::shared::State). A lock protects data outside the DAGs, such as a driver's
+//! registers changed by subtasks of several DAGs.
 //!
-//! For our purposes a *section* is one call of [`Lock::with`]. Sections of one lock exclude each
-//! other, on all cores, and waiting cores take turns. Where instances are preempted, one in a section
-//! is not, or else it would block every core that wants the lock: so a section delays all that its core
-//! should do next. Hence a lock states its [longest section](Lock::longest), and a subtask how many it
-//! [enters](Lock::entering); the analysis charges for both.
+//! Here a *section* is one call of [`Lock::with`]. Sections of one lock exclude each other, on all
+//! cores, and waiting cores take turns. Even where the platform preempts instances, an instance in
+//! a section keeps its core, since otherwise it would block every core waiting for the lock. So a
+//! section delays all other work of its core. Hence a lock declares its [longest
+//! section](Lock::longest), and a subtask the number of sections it [enters](Lock::entering); the
+//! analysis charges for both.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - An instance whose subtask does not state the lock, or fewer sections, fails before it enters.
-//! - Where a lock has no longest section, no DAG on the cores of its users has a bound.
-//! - A section that takes longer than stated is said in the [log](mod@crate::log): bounds do not
-//!   hold then. One that takes longer than [`LONGEST_SECTION`] is preempted.
+//! - An instance fails before entering a section if its subtask does not declare the lock, or has
+//!   used up the declared sections.
+//! - While a lock has no longest section, no DAG on the cores of its users has a bound.
+//! - The [log](mod@crate::log) reports a section longer than declared: the bounds do not hold then.
+//!   A section longer than [`LONGEST_SECTION`] is preempted.
 //!
-//! # What is not
+//! # Limits
 //!
-//! - A fault in a section loses the lock: its data may be half changed, and what enters it later fails.
-//! - Sections do not nest, of different locks neither.
+//! - A fault in a section makes the lock unusable: the data may be half changed, and later sections
+//!   fail.
+//! - Sections do not nest, not even sections of different locks.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -37,10 +40,10 @@ use crate::run::cell::{ExclusiveCell, SetOnce};
 use crate::run::lock_words::LockWords;
 use crate::run::replaceable::Reset;
 
-/// For how long a section may put off its core's preemption.
+/// The longest time for which a section may delay the preemption of its core: 1 ms.
 pub const LONGEST_SECTION: Duration = Duration::from_millis(1);
 
-/// Data that one instance at a time may use.
+/// Data for use by one instance at a time.
 ///
 /// ```
 /// use core::time::Duration;
@@ -62,27 +65,27 @@ pub const LONGEST_SECTION: Duration = Duration::from_millis(1);
 pub struct Lock<T> {
     name: &'static str,
     longest_ns: Option<u64>,
-    /// The longest section that was said to be too long.
+    /// The longest section already reported as too long.
     said_ns: AtomicU64,
     first_user: SetOnce<Arc<LockUser>>,
     words: LockWords,
     data: ExclusiveCell<T>,
 }
 
-/// A subtask that enters sections, among those of its lock.
+/// A subtask entering sections, in the list of its lock.
 struct LockUser {
     is_taken: AtomicBool,
-    /// The latest instance: its plan, its DAG and subtask, and its job. A fault may keep the user, and
-    /// these, beyond the plan's run.
+    /// The latest instance: its plan, its DAG and subtask, and its job. After a fault the user,
+    /// with these numbers, may outlive the plan's run.
     plan: AtomicU64,
     ids: AtomicU64,
     job: AtomicU64,
-    /// How many sections it may still enter.
+    /// The number of sections that the instance may still enter.
     left: AtomicU32,
     next: SetOnce<Arc<Self>>,
 }
 
-/// The statement of a subtask that its instances enter sections of a lock. Made by [`Lock::entering`].
+/// A subtask's declaration that its instances enter sections of a lock. Made by [`Lock::entering`].
 /// See [`Lock`].
 #[must_use = "a use has no effect until a subtask is registered with it"]
 pub struct LockUse {
@@ -91,14 +94,14 @@ pub struct LockUse {
     permit: Arc<Permit>,
 }
 
-/// The sections that a subtask may enter. See [`Lock`].
+/// The permission of a subtask to enter sections. See [`Lock`].
 pub struct Permit {
     user: Arc<LockUser>,
     sections: u32,
 }
 
 impl<T> Lock<T> {
-    /// Makes a lock that is free. Locks of one name count as one in the analysis.
+    /// Makes a free lock. The analysis treats locks with the same name as one lock.
     pub const fn new(name: &'static str, data: T) -> Self {
         Self {
             name,
@@ -113,11 +116,11 @@ impl<T> Lock<T> {
         }
     }
 
-    /// States the longest time that a section takes, with what interrupts it.
+    /// Declares the longest duration of a section, interrupts during the section included.
     ///
     /// # Panics
     ///
-    /// If that is longer than [`LONGEST_SECTION`].
+    /// If the duration is longer than [`LONGEST_SECTION`].
     #[must_use]
     pub const fn longest(mut self, section: Duration) -> Self {
         assert!(
@@ -128,12 +131,13 @@ impl<T> Lock<T> {
         self
     }
 
-    /// States that each instance of a subtask enters so many sections at most.
+    /// Declares that each instance of a subtask enters at most `sections` sections.
     pub fn entering(&self, sections: u32) -> LockUse {
         let mut place = &self.first_user;
         let user = loop {
             place.set(Arc::default());
             let Some(user) = place.get() else { continue };
+            // A dropped permit frees its user for the next one, so the list stays short.
             if !user.is_taken.swap(true, Relaxed) {
                 break Arc::clone(user);
             }
@@ -146,14 +150,15 @@ impl<T> Lock<T> {
         }
     }
 
-    /// Waits until nobody uses the data and lends it to `section`.
+    /// Waits until nobody uses the data and lends the data to `section`.
     ///
-    /// The app's main function needs no statement: no run goes on then.
+    /// The app's main function needs no declaration, since no run goes on then.
     ///
     /// # Panics
     ///
-    /// If the caller is an instance that has not stated it, or fewer sections, or while a run goes on
-    /// none; if it is in a section already; or if a fault has ended a section of this lock.
+    /// If the caller is an instance whose subtask does not declare the lock, or has entered all
+    /// declared sections; if the caller is no instance while a run goes on; if the caller is in a
+    /// section already; or if a fault has ended a section of this lock.
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         let (platform, name) = (expect_installed(), self.name);
@@ -167,7 +172,8 @@ impl<T> Lock<T> {
         }
         let (mut section, mut result) = (Some(section), None);
         let took_ns = platform.section(&self.words, &mut || {
-            // What a fault has ended never gives its claim back.
+            // A section ended by a fault never releases its claim of the data, so a later `change`
+            // fails.
             if let (Some(section), Some(data)) = (section.take(), self.data.change()) {
                 let mut data = ManuallyDrop::new(data);
                 result = Some(section(&mut data));
@@ -222,7 +228,7 @@ impl<T> Lock<T> {
     }
 }
 
-/// The ids of no instance.
+/// Stands for no instance.
 const NOBODY: u64 = u64::MAX;
 
 fn ids(instance: Instance) -> u64 {

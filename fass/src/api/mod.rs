@@ -1,9 +1,8 @@
-//! The API that builds DAGs: handles of DAGs, and of what subtasks use.
+//! The API for building DAGs: handles of DAGs, and of the objects used by subtasks.
 //!
-//! Everything said here is noted in a draft; nothing is judged before the commit, and
-//! nothing runs.
+//! Calls are only recorded in a draft. Nothing is checked before the commit, and nothing runs.
 
-/// Shows handles to people who debug: as what they are, and of what.
+/// Implements `Debug` for a handle: its type, and its object's name.
 macro_rules! shown_as {
     ($Handle:ident $(<$($T:ident),+>)?, |$of:ident| $what:expr) => {
         impl $(<$($T),+>)? core::fmt::Debug for $Handle $(<$($T),+>)? {

@@ -1,18 +1,19 @@
-//! Parameters: numbers that a person, a file or a test sets while DAGs run.
+//! Parameters: numbers set by a person, a file or a test while DAGs run.
 //!
-//! A parameter is like a [latest value](crate::shared::Latest) that is written from outside. It has a
-//! name, a type and a range. A *source* reads it when it starts, and sends it along edges to
-//! the subtasks that need it. So a job has one value, whatever happens meanwhile.
+//! A parameter is like a [latest value](crate::shared::Latest) written from outside, with a name, a
+//! type and a range. A *source* reads the parameter when the source starts, and sends the value
+//! along edges to the subtasks that need it. So a job has one value of the parameter, whatever
+//! happens meanwhile.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - A job's value is the one that was set last before its source started. It does not change
-//!   during the job: in each DAG one source reads a parameter, and what others get of it comes
-//!   along edges.
-//! - No value out of the range is ever set, nor one that is no number.
+//! - A job's value is the last one set before its source started. The value does not change during
+//!   the job: in each DAG one source reads the parameter, and other subtasks get the value along
+//!   edges.
+//! - A value outside the range, or a text that is no number, is never set.
 //! - Nobody waits: reading is one load.
-//! - It is recorded and replayed by what the source returns, as all that sources read. In a
-//!   replay what is set meanwhile has no effect.
+//! - The value is recorded and replayed with the results of the source, like all input of sources.
+//!   During a replay, setting a parameter has no effect.
 
 use alloc::format;
 use alloc::string::String;
@@ -27,7 +28,8 @@ use super::dag::Dag;
 use super::uses::{OutsideInput, Uses, sealed};
 use crate::draft::part::PartKind;
 
-/// A number, or a truth value, that can be set while DAGs run. A handle; clones are the same one.
+/// A number, or a truth value, that can be set while DAGs run. Clones are handles of the same
+/// parameter.
 ///
 /// # Examples
 ///
@@ -74,14 +76,15 @@ struct ParameterCell<T> {
     range: RangeInclusive<T>,
 }
 
-/// The use of a [`Parameter`]: the function gets its value. Made by [`Parameter::reading`].
+/// The use of a [`Parameter`]: the function gets the parameter's value. Made by
+/// [`Parameter::reading`].
 ///
 /// See [`Parameter`].
 #[derive(Debug)]
 pub struct ParameterUse<T>(Parameter<T>);
 
-/// A value that is not within a parameter's range, or is no number of its type. It says so in one
-/// line, with the type and the range.
+/// The rejection of a value outside a parameter's range, or of a text that is no number of its
+/// type. Displays the reason in one line, with the type and the range.
 ///
 /// See [`Parameter`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,7 +98,7 @@ impl fmt::Display for ParameterError {
 
 impl core::error::Error for ParameterError {}
 
-/// A type that a parameter can have: `bool`, `i64`, `u64`, `f64` and the shorter ones `i32`, `u32`,
+/// A type of parameter values: `bool`, `i64`, `u64`, `f64`, and the shorter types `i32`, `u32`,
 /// `f32`.
 ///
 /// ```
@@ -151,8 +154,9 @@ fn narrowed(bits: u64) -> f32 {
     f64::from_bits(bits) as f32
 }
 
-/// A parameter of whatever type, for a platform that lets people set it. Nothing else is one, as
-/// people are served with interrupts disabled where the cores are busy.
+/// A parameter of any type, as an object for platforms with a console. Only [`Parameter`]
+/// implements the trait, because where the cores are busy people are served with interrupts
+/// disabled.
 ///
 /// ```
 /// use fass::shared::{Parameter, Tunable};
@@ -169,40 +173,41 @@ fn narrowed(bits: u64) -> f32 {
 /// );
 /// ```
 pub trait Tunable: sealed::Sealed + Send + Sync {
-    /// Returns its name.
+    /// Returns the parameter's name.
     fn name(&self) -> &str;
 
-    /// Sets it to what a text says, if that is a value within the range; else `false`.
+    /// Sets the parameter from a text and returns `true`, or returns `false` if the text is no
+    /// value within the range.
     #[must_use = "`false`: it is not set"]
     fn set_text(&self, text: &str) -> bool;
 
-    /// Writes its type and its range.
+    /// Writes the parameter's type and range.
     ///
     /// # Errors
     ///
-    /// Those of `f`.
+    /// The errors of `f`.
     fn write_allowed(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 
-    /// Writes its value, and what it can be.
+    /// Writes the parameter's value, and the allowed values.
     ///
     /// # Errors
     ///
-    /// Those of `f`.
+    /// The errors of `f`.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 
-    /// Returns another handle of it.
+    /// Returns another handle of the parameter.
     fn share(&self) -> Arc<dyn Tunable>;
 }
 
 impl dyn Tunable + '_ {
-    /// Returns its value and what it can be, as text. Nothing is allocated.
+    /// Returns the parameter's value and the allowed values, as text. Nothing is allocated.
     ///
     /// See [`Tunable`].
     pub fn shown(&self) -> impl fmt::Display {
         fmt::from_fn(|f| self.write(f))
     }
 
-    /// Returns the complaint about a text that it cannot be set to. Nothing is allocated.
+    /// Returns the error message for a text that is no allowed value. Nothing is allocated.
     ///
     /// See [`Tunable`].
     #[must_use]
@@ -216,12 +221,12 @@ impl dyn Tunable + '_ {
 }
 
 impl<T: ParameterValue> Parameter<T> {
-    /// Makes a parameter with a value to begin with.
+    /// Makes a parameter with a name, an initial value and a range.
     ///
     /// # Panics
     ///
-    /// If that is not within the range, or the name is empty or has a blank, `=` or `,` in it, so
-    /// that nobody could type it.
+    /// If the initial value is not within the range; or if the name is empty or contains a blank, a
+    /// control character, `=` or `,`, so that nobody could type the name.
     #[track_caller]
     pub fn new(name: &str, initial: T, range: RangeInclusive<T>) -> Self {
         let is_typed = |c: char| !(c.is_whitespace() || c.is_control() || "=,".contains(c));
@@ -252,7 +257,7 @@ impl<T: ParameterValue> Parameter<T> {
     ///
     /// # Errors
     ///
-    /// If it is not within the range; then nothing has changed.
+    /// If the value is not within the range; then nothing has changed.
     pub fn set(&self, value: T) -> Result<(), ParameterError> {
         if self.store(value) {
             return Ok(());
@@ -264,7 +269,7 @@ impl<T: ParameterValue> Parameter<T> {
         )))
     }
 
-    /// Returns the use of a source that reads it.
+    /// Returns the use for a source reading the parameter.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn reading(&self) -> ParameterUse<T> {
         ParameterUse(self.clone())
@@ -294,7 +299,7 @@ impl<T: ParameterValue> Tunable for Parameter<T> {
         let (least, most) = (self.0.range.start(), self.0.range.end());
         f.write_str(T::NAME)?;
         match T::NAME {
-            // The words of its range are all that it has.
+            // The two values of a truth value are clear without a range.
             "bool" if least != most => Ok(()),
             _ => write!(f, " from {least} to {most}"),
         }

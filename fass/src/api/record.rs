@@ -1,4 +1,4 @@
-//! Recording topics: stating which values shall be written down.
+//! Recording topics: choosing the values to be written down.
 
 use alloc::format;
 use alloc::rc::Rc;
@@ -45,17 +45,17 @@ const BEGIN: Begin = |wish, shows| {
 impl Dag {
     /// Records the values of a topic, where the platform records.
     ///
-    /// A replay takes the values that a source wrote, in place of calling it. So if one topic of a
-    /// source is recorded, the commit refuses the DAG unless all topics of its sources are, and
-    /// all that its other subtasks sample. A replay compares the values that other subtasks write.
-    /// The values that subtasks sample of the topic are recorded, too, and given to them in a
-    /// replay. A topic that is recorded counts as read. The type must be the
-    /// writer's, which the commit checks; a [`Unique`](crate::Unique) cannot be recorded.
+    /// A replay takes a source's recorded values instead of calling the source. So if one topic of
+    /// a source is recorded, the commit refuses the DAG unless all topics of its sources are
+    /// recorded, and all topics sampled by its other subtasks. The values written by other subtasks
+    /// are compared in a replay. Values sampled from the topic are recorded, too, and a replay
+    /// gives them to the sampling subtasks. A recorded topic counts as read. `T` must be the
+    /// writer's type, checked by the commit; a [`Unique`](crate::Unique) cannot be recorded.
     ///
-    /// A value is written down when its function has returned, into a buffer that is made at the
-    /// commit, and is given to the platform when the instance is complete. One that takes more
-    /// than 4 KiB, or twice the least of its type if that is more, is lost, which the recording
-    /// says.
+    /// After its function has returned, a value is written into a buffer made at the commit. The
+    /// platform gets the value when the instance is complete. A value of more than 4 KiB, or of
+    /// more than twice the least size of its type if that is larger, is lost, and the recording
+    /// says so.
     ///
     /// ```
     /// use core::time::Duration;
@@ -105,7 +105,7 @@ impl Dag {
 
 impl DraftPart for Rc<dyn AnyRecorded> {}
 
-/// Opens the channels of all DAGs, before bodies are made: a tap is made only of an open channel.
+/// Opens the channels of all DAGs, before bodies are made, since only an open channel gets a tap.
 fn plan_channels(drafts: &Drafts, plan: &mut Plan) {
     // Nobody records or replays: no channel is opened, and no value is copied.
     if !expect_installed().crosses() {
@@ -117,7 +117,7 @@ fn plan_channels(drafts: &Drafts, plan: &mut Plan) {
         if expect_installed().replays() {
             replay_sources(&mut draft);
         }
-        // Last, so that what is put around a body is around all that it does.
+        // Last, so that the wrapper of a body encloses everything the body does.
         for (subtask, around) in around {
             draft.tie(move |dag| {
                 let body = dag.bodies.swap_remove(subtask);
@@ -129,9 +129,9 @@ fn plan_channels(drafts: &Drafts, plan: &mut Plan) {
     }
 }
 
-/// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
-/// recorded states, tells the platform, and adds their lines to those before. Returns what is
-/// put around subtasks for that.
+/// Numbers all recorded topics of a DAG, the samples of its subtasks from such topics, and its
+/// recorded states; tells the platform, and appends their lines to the plan. Returns the wrappers
+/// needed around subtasks.
 #[allow(clippy::too_many_lines, reason = "one order, to be seen whole")]
 fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Around)> {
     let draft = &*drafts[dag.index()].borrow();
@@ -174,7 +174,7 @@ fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Ar
         let topic = writer
             .as_ref()
             .and_then(|writer| recorded(writer, latest.topic()));
-        // A topic of another type, or one that is not recorded, has no probe.
+        // A topic of another type, or an unrecorded topic, has no probe.
         let probe = topic.and_then(|topic| topic.probe(&**latest, *sampler));
         if let Some((probe, schema, line)) = probe {
             let way = (schema, Arc::clone(&line));
@@ -199,9 +199,9 @@ fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Ar
             let mut users = state.users.iter();
             users.any(|user| user.updates && user.subtask == *subtask)
         };
-        // The users take turns in that order.
+        // The users take turns in topological order.
         let order = verified.topological_order().iter();
-        // The first user that changes it sees it as the job before has left it.
+        // The first user changing the state sees the value left by the job before.
         if let Some(subtask) = order.map(|subtask| subtask.index()).find(changes) {
             let line = Arc::new(ChannelState::new(&EDGE));
             let way = (kept.state.schema(), Arc::clone(&line));
@@ -223,12 +223,12 @@ fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Ar
     around
 }
 
-/// Puts others into the place of recorded sources, which a replay does not call.
+/// Replaces the functions of recorded sources, since a replay does not call them.
 fn replay_sources(draft: &mut DagDraft) {
     for subtask in 0..draft.make_bodies.len() {
         let source = &draft.spec.subtasks[subtask];
         let outputs = source.outputs.iter();
-        // The commit has made sure that all of them are recorded, or none.
+        // The commit has made sure that either all outputs are recorded, or none.
         let outputs = outputs.filter_map(|port| recorded(draft, &port.topic).cloned());
         let outputs: Vec<_> = outputs.collect();
         if source.inputs.is_empty() && !outputs.is_empty() {
@@ -237,8 +237,9 @@ fn replay_sources(draft: &mut DagDraft) {
     }
 }
 
-/// Adds what the DAGs of a commit do not record that a replay would need: of each DAG a source
-/// of which is recorded, all else that its sources write, and what its other subtasks sample.
+/// Adds a fault for each value missing from the recording but needed by a replay. In each DAG with
+/// a recorded source, those are the other topics of the sources, the answers of devices, and the
+/// topics sampled by the other subtasks.
 fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
     for (id, draft) in (0..).map(DagId).zip(drafts) {
         let draft = draft.borrow();

@@ -1,8 +1,8 @@
-//! Registering a subtask whose function another one replaces after a fault.
+//! Registering a subtask whose function is replaced by another function after a fault.
 //!
-//! Where a DAG drops a job at a fault and goes on ([`Dag::survive_faults`]), the function that
-//! failed cannot: what it had is given up as it is. So its next jobs are another
-//! function's: one *made anew* by the same factory, or one to *fall back* on, which does the
+//! A DAG can drop a job at a fault and go on ([`Dag::survive_faults`]), but the failed function
+//! cannot go on: its data is abandoned in an unknown state. So another function does the next jobs:
+//! either a function *made anew* by the same factory, or a function to *fall back* on, doing the
 //! work in a simpler way.
 
 use alloc::boxed::Box;
@@ -23,14 +23,14 @@ use crate::run::replaceable::{Alternatives, FallbackPair, RemadeFunction, defer}
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 impl Dag {
-    /// Lets the DAG go on after faults, within a limit: a fault costs the job only, where
-    /// the subtask has another function. Without it a fault ends the DAG.
+    /// Lets the DAG go on after faults, within a limit: a fault costs only its job, where the
+    /// subtask has another function. Without this call a fault ends the DAG.
     ///
-    /// See [`restarting`](Self::restarting), and [`FaultLimit`] for the memory that it takes.
+    /// See [`restarting`](Self::restarting), and [`FaultLimit`] for the memory needed.
     #[track_caller]
     pub fn survive_faults(&self, limit: FaultLimit) -> &Self {
         let mut draft = self.open();
-        // Checked once, however often it is said.
+        // Checked once, however often the app calls the method.
         if draft.spec.on_fault == OnFault::EndDag {
             draft.add(PartKind::Replacement, |of: &CheckedDag<'_>| {
                 let says = "drops a job at a fault and goes on, and no subtask of it has another \
@@ -49,8 +49,8 @@ impl Dag {
 
     /// Begins the registration of a subtask whose function is made anew after a fault.
     ///
-    /// The commit calls `make` for the function. The first instance after a fault calls it again,
-    /// in its own time; a fault of `make` then ends the DAG.
+    /// The commit calls `make` to get the function. The first instance after a fault calls `make`
+    /// again, as a part of its own execution time; a fault of `make` in that call ends the DAG.
     ///
     /// # Examples
     ///
@@ -115,8 +115,8 @@ impl Dag {
         })
     }
 
-    /// Begins the registration of a subtask that falls back on a second function after a
-    /// fault of the first one. A fault of the second one ends the DAG.
+    /// Begins the registration of a subtask falling back on a second function after a fault of the
+    /// first. A fault of the second ends the DAG.
     ///
     /// ```
     /// use fass::{SubtaskAttributes, create_dag};
@@ -145,10 +145,11 @@ impl Dag {
     }
 }
 
-// The bound is each method's own, so that the compiler says our sentence where it is not met.
+// The bound is on each method, so that the compiler shows our own message where the bound is not
+// met.
 impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
-    /// Works like [`Dag::restarting`]. The states that the subtask uses are reset, too, to
-    /// what is given by [`State::reset_to`](crate::shared::State::reset_to).
+    /// Works like [`Dag::restarting`]. The states used by the subtask are reset, too, to the value
+    /// provided by [`State::reset_to`](crate::shared::State::reset_to).
     ///
     /// See [`Dag::restarting`].
     #[track_caller]
@@ -175,8 +176,7 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         })
     }
 
-    /// Works like [`Dag::falling_back`]; states are reset as by
-    /// [`restarting`](Self::restarting).
+    /// Works like [`Dag::falling_back`]; states are reset as by [`restarting`](Self::restarting).
     ///
     /// ```
     /// use fass::{SubtaskAttributes, create_dag};
@@ -212,7 +212,7 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
     }
 }
 
-/// Makes a function that begins the uses, lends them for one call, and ends them.
+/// Wraps a function to begin the uses, lend them for one call, and end them.
 fn wrap<U: ResettableUses + 'static, F, Args, Ret>(
     mut held: U::Held,
     mut f: F,
@@ -225,22 +225,22 @@ where
     move |args: Args| f(U::borrow(&mut U::enter(&mut held)), args)
 }
 
-/// The functions of a subtask, and the states that are reset with them.
+/// The functions of a subtask, and the states reset together with them.
 type Replacement<Args, Ret> = (Box<dyn Alternatives<Args, Ret>>, Vec<Arc<dyn Reset>>);
 
-/// A subtask whose function another one replaces after a fault.
+/// The number of a subtask whose function is replaced after a fault.
 pub(super) struct Replaceable(pub(super) usize);
 
 impl DraftPart for Replaceable {}
 
-/// Takes note of such a subtask.
+/// Records a subtask with a replaceable function.
 fn note_replaceable(draft: &mut DagDraft, subtask: usize) {
-    // The first stands for all.
+    // The first such subtask stands for all in the check.
     if !draft.has::<Replaceable>() {
         draft.add(PartKind::Replacement, move |of: &CheckedDag<'_>| {
             let says = "has another function for after a fault, and a fault ends the dag; let the dag \
                         survive faults by `survive_faults`, or register one function";
-            // It would be made anew after a fault that ends the DAG.
+            // A fault ends the DAG, so the function would never be replaced.
             let is_in_vain = of.draft.spec.on_fault == OnFault::EndDag;
             is_in_vain.then(|| of.fault("replaced_in_vain", subtask, says))
         });

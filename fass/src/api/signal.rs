@@ -1,16 +1,16 @@
-//! Signals: events that release sporadic DAGs.
+//! Signals: events releasing sporadic DAGs.
 //!
-//! A *sporadic* DAG has no period. Each job is released by a *signal*, and never
-//! earlier than one *minimum inter-arrival time* after the job before; that is
-//! enforced, whatever happens outside, so the DAG can be analysed as one with that
-//! period. An early signal waits, one of them; more are dropped and counted
+//! A *sporadic* DAG has no period. Each job is released by a *signal*, and never earlier than one
+//! *minimum inter-arrival time* after the job before. The scheduler enforces this distance,
+//! whatever happens outside, so the DAG can be analysed like a periodic DAG with that period. One
+//! early signal waits; further early signals are dropped and counted
 //! (`sched-dag/src/scheduler/signals.rs` has the rules).
 //!
 //! Signals come from three places:
 //!
-//! - a subtask, of any DAG, that says so at registration ([`Signal::raising`]). Its
-//!   signal takes effect when its instance is complete (R3), not in mid-function;
-//! - the platform: a byte from a serial port, say, or a test in virtual time;
+//! - a subtask, of any DAG, with the signal declared at registration ([`Signal::raising`]). The
+//!   signal takes effect when the subtask's instance is complete (R3), not in mid-function;
+//! - the platform: a byte from a serial port, for example, or a test in virtual time;
 //! - the app's code outside subtasks ([`Signal::raise`]).
 
 use alloc::boxed::Box;
@@ -29,11 +29,11 @@ use crate::platform;
 use crate::run::effect::RequestTarget;
 use crate::run::effect::{GO, RequestKind, Wish};
 
-/// A signal, which releases a sporadic DAG. Clones are handles of the same signal.
+/// A signal for releasing a sporadic DAG. Clones are handles of the same signal.
 ///
 /// # Examples
 ///
-/// A brake DAG that runs when an obstacle was seen, at most every 50 ms:
+/// A brake DAG, released when an obstacle was seen, at most every 50 ms:
 ///
 /// ```
 /// use core::time::Duration;
@@ -74,14 +74,14 @@ pub struct Signal {
     pub(super) target: Arc<RequestTarget>,
 }
 
-/// The use of a [`Signal`] by a subtask that may raise it: the function gets a
-/// [`Raiser`]. Made by [`Signal::raising`].
+/// The use of a [`Signal`] by a subtask that may raise the signal: the function gets a [`Raiser`].
+/// Made by [`Signal::raising`].
 ///
 /// See [`Signal`].
 #[derive(Debug)]
 pub struct SignalUse(Signal);
 
-/// The handle by which a function raises a signal. See [`Signal`].
+/// The handle of a function for raising a signal. See [`Signal`].
 #[derive(Debug)]
 pub struct Raiser<'a> {
     wish: &'a AtomicU8,
@@ -97,7 +97,7 @@ impl Raiser<'_> {
 }
 
 impl Signal {
-    /// Returns the use of a subtask that may raise the signal.
+    /// Returns the use for a subtask that may raise the signal.
     ///
     /// The commit must have the signal's DAG, too.
     #[must_use = "a use has no effect until a subtask is registered with it"]
@@ -105,14 +105,13 @@ impl Signal {
         SignalUse(self.clone())
     }
 
-    /// Raises the signal now, from outside all subtasks. Once the DAG's run is over
-    /// this does nothing.
+    /// Raises the signal now, from outside all subtasks. After the end of the DAG's run the call
+    /// does nothing.
     ///
     /// # Panics
     ///
-    /// If the signal's DAG is not committed, or in a subtask's function: what a
-    /// subtask does to other DAGs is declared at its registration
-    /// ([`raising`](Self::raising)).
+    /// If the signal's DAG is not committed, or if a subtask's function makes the call: a subtask
+    /// has to declare its effects on other DAGs at registration ([`raising`](Self::raising)).
     ///
     /// ```
     /// use core::time::Duration;
@@ -137,9 +136,9 @@ impl Signal {
     }
 
     /// Returns the arguments of [`Platform::raise`](crate::platform::Platform::raise): the number
-    /// of the plan and the DAG. `None` before the commit.
+    /// of the plan and the DAG. Returns `None` before the commit.
     ///
-    /// For platforms that raise signals by themselves.
+    /// For platforms raising signals by themselves.
     ///
     /// ```
     /// use core::time::Duration;
@@ -155,21 +154,22 @@ impl Signal {
 }
 
 impl Dag {
-    /// Makes the DAG sporadic, with the least time between two releases, and returns its signal,
-    /// which can be raised by subtasks of all DAGs, or from outside.
+    /// Makes the DAG sporadic, with the least time between two releases, and returns its signal.
+    /// Subtasks of all DAGs can raise the signal, and so can code outside.
     ///
-    /// See [`Signal`]. Without a limit of [`jobs`](Self::jobs) the DAG keeps no run going: the run
-    /// ends when all others have ended.
+    /// See [`Signal`]. Without a limit of [`jobs`](Self::jobs) the DAG does not keep a run going:
+    /// the run ends after all other DAGs have ended.
     #[track_caller]
     pub fn sporadic(&self, min_inter_arrival: Duration) -> Signal {
         self.open().set_sporadic(min_inter_arrival);
         self.signal()
     }
 
-    /// Has a signal raised when a fault ends the DAG: a panic, an exception, an exceeded budget.
-    /// The DAG that the signal releases brings the system into a safe state; as a DAG it has its
-    /// place in the schedule, and a bound. It is released in the step that ends the DAG, and should
-    /// sample nothing that the ended DAG would have to renew.
+    /// Sets a signal to be raised when a fault ends the DAG: a panic, an exception, an exceeded
+    /// budget. The DAG released by the signal brings the system into a safe state; as a DAG it has
+    /// its place in the schedule, and a bound. The release happens in the step that ends the faulty
+    /// DAG. The released DAG should sample nothing written by the faulty DAG, since nobody renews
+    /// those values any more.
     ///
     /// ```
     /// use core::time::Duration;
@@ -199,7 +199,7 @@ impl Dag {
     #[track_caller]
     pub fn on_fault(&self, signal: &Signal) -> &Self {
         let mut draft = self.open();
-        // The last one counts.
+        // The last call counts.
         draft.parts.retain(|(kind, _)| *kind != PartKind::OnFault);
         draft.add(PartKind::OnFault, FaultSignal(Arc::clone(&signal.target)));
         drop(draft);
@@ -223,12 +223,13 @@ implement_asking!(SignalUse, Raiser, |raising, draft, subtask| {
     draft.ask(subtask, RequestKind::Signal(target))
 });
 
-/// The signal that is raised when a fault ends the DAG.
+/// The signal to be raised when a fault ends the DAG.
 pub(super) struct FaultSignal(pub(super) Arc<RequestTarget>);
 
 impl DraftPart for FaultSignal {
     fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
-        // The fault of any subtask raises it; the first stands for them.
+        // A fault of any subtask raises the signal; the check names the first subtask for all of
+        // them.
         let first = (0..of.draft.spec.subtasks.len()).next()?;
         unknown_signal(of, first, &self.0)
     }
@@ -238,7 +239,7 @@ impl DraftPart for FaultSignal {
     }
 }
 
-/// Returns a fault if the DAG of a signal that a subtask may raise is not in the commit.
+/// Returns a fault if a subtask may raise a signal whose DAG is not in the commit.
 pub(super) fn unknown_signal(
     of: &CheckedDag<'_>,
     subtask: usize,

@@ -1,30 +1,28 @@
-//! States: what several subtasks of one DAG share from job to job.
+//! States: values shared by several subtasks of one DAG, and kept from job to job.
 //!
-//! A closure may keep what it alone needs. A value that *several* functions need, such as
-//! a pose that one estimates and another corrects, is a [`State`]: declared with
-//! [`Dag::state`], and used by the subtasks that say so at registration
-//! ([`Dag::using`]). So the flow is in the model, where a mutex hides it.
+//! A closure may keep data for itself alone. A value needed by *several* functions, such as a pose
+//! estimated by one function and corrected by another, is a [`State`]. [`Dag::state`] declares a
+//! state, and subtasks declare their access at registration ([`Dag::using`]). So the data flow is
+//! in the model, where a mutex would hide the flow.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - In each job the users take turns in one order, the same in every run: that of
-//!   the DAG's paths and, where there is none, that of registration. Readers
-//!   between two updates may run at the same time. The commit adds the precedence
-//!   edges that this takes, and the analysis sees them
-//!   (`sched-dag/src/verify/topics.rs` has the rule).
-//! - Job k + 1 finds what job k left: a DAG whose subtasks share a state has one job
-//!   in flight. A `Dag::in_flight` beyond 1 is then refused.
-//! - Nobody waits for a state in mid-function, so there is no blocking to account
-//!   for, and no priority is inverted.
+//! - In each job the users take turns in the same order in every run: the order of the DAG's paths
+//!   or, between subtasks without a path, the order of registration. Readers between two updates
+//!   may run at the same time. The commit adds the necessary precedence edges, and the analysis
+//!   sees them (`sched-dag/src/verify/topics.rs` has the rule).
+//! - Job k + 1 finds the value left by job k: a DAG whose subtasks share a state has one job in
+//!   flight. The commit refuses a `Dag::in_flight` beyond 1.
+//! - No function waits for a state, so there is no blocking to account for, and no priority
+//!   inversion.
 //!
-//! # What is not
+//! # Limits
 //!
-//! - A subtask that is registered before the updater sees what the job before left.
-//! - A recording has nothing of a state unless that is asked for ([`State::record`]).
-//! - Jobs do not overlap as in a pipeline. Where they must, let one subtask own the
-//!   state and send what others need along an edge.
-//! - A state does not leave its DAG. Between DAGs there is the [latest
-//!   value](crate::shared::Latest).
+//! - A subtask registered before the updater sees the value left by the job before.
+//! - A recording contains a state only on request ([`State::record`]).
+//! - Jobs do not overlap as in a pipeline. Where they must, let one subtask own the state and send
+//!   the needed data along an edge.
+//! - A state does not leave its DAG. Between DAGs use the [latest value](crate::shared::Latest).
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -45,9 +43,9 @@ use crate::run::cell::{ReadClaim, WriteClaim};
 use crate::run::line::KeptState;
 use crate::run::replaceable::{Reset, ResettableState};
 
-/// A value that can be a state: of any type that several cores may use in turn.
+/// A type usable as a state: safe to use from several cores in turn.
 ///
-/// Apps need not implement it; they meet it in [`Dag::state`].
+/// Apps need not implement the trait; they meet the trait as a bound of [`Dag::state`].
 ///
 /// ```
 /// fn is_state<T: fass::shared::StateValue>() {}
@@ -64,7 +62,7 @@ pub trait StateValue: Send + Sync + 'static {}
 #[diagnostic::do_not_recommend]
 impl<T: Send + Sync + 'static> StateValue for T {}
 
-/// A state that subtasks of one DAG share. Made by [`Dag::state`].
+/// A value shared by subtasks of one DAG and kept from job to job. Made by [`Dag::state`].
 ///
 /// # Examples
 ///
@@ -102,10 +100,10 @@ pub struct State<T> {
     value: Arc<ResettableState<T>>,
 }
 
-/// Provides so many values of a state for after faults.
+/// Provides the given number of values of a state, for resets after faults.
 type ProvideResets = Box<dyn FnOnce(u32)>;
 
-/// The statements about a state: its values for after faults, and that it is recorded.
+/// The options of a state: its values for resets after faults, and its recording.
 #[derive(Default)]
 pub(super) struct StateOptions {
     /// The position among the DAG's states.
@@ -120,7 +118,7 @@ impl DraftPart for Rc<StateOptions> {
         let is_replaceable = |user: &usize| of.draft.all().any(|Replaceable(other)| other == user);
         let mut users = state.users.iter().map(|user| user.subtask);
         let user = users.find(is_replaceable)?;
-        // A fault may leave the state half changed, so somebody has to say what it begins with
+        // A fault may leave the state half changed, so the app has to provide a value for starting
         // again.
         self.provide.borrow().is_none().then(|| {
             let says = format_args!(
@@ -142,37 +140,36 @@ impl DraftPart for Rc<StateOptions> {
     }
 }
 
-/// The use of a [`State`] that may change it: the function gets a `&mut T`. Made
-/// by [`State::update`].
+/// Access to a [`State`] for reading and changing: the function gets a `&mut T`. Made by
+/// [`State::update`].
 ///
 /// See [`State`].
 #[derive(Debug)]
 pub struct StateUpdate<T>(State<T>);
 
-/// The use of a [`State`] that only reads it: the function gets a `&T`. Made by
-/// [`State::read`].
+/// Access to a [`State`] for reading only: the function gets a `&T`. Made by [`State::read`].
 ///
 /// See [`State`].
 #[derive(Debug)]
 pub struct StateRead<T>(State<T>);
 
 impl<T: StateValue> State<T> {
-    /// Returns the use of a subtask that may change the state.
+    /// Returns the use for a subtask reading and changing the state.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn update(&self) -> StateUpdate<T> {
         StateUpdate(self.clone())
     }
 
-    /// Returns the use of a subtask that only reads the state. Readers between two
-    /// updates may run at the same time.
+    /// Returns the use for a subtask only reading the state. Readers between two updates may run at
+    /// the same time.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn read(&self) -> StateRead<T> {
         StateRead(self.clone())
     }
 
-    /// States what the state is reset to after a fault of a subtask that uses it, where the
-    /// DAG goes on ([`Dag::survive_faults`]). The commit makes a value for each fault that is
-    /// survived.
+    /// Sets the function providing the state's value after a fault. Such a reset follows the fault
+    /// of a subtask using the state, where the DAG goes on ([`Dag::survive_faults`]). The commit
+    /// calls `make` once for each fault that the DAG may survive.
     ///
     /// See [`Dag::restarting`](crate::Dag::restarting).
     ///
@@ -188,14 +185,13 @@ impl<T: StateValue> State<T> {
         self
     }
 
-    /// Records the state every 64 jobs, where the platform records: before the first function is
-    /// called that may change it in such a job. It does so if topics of the DAG are recorded
-    /// ([`Dag::record`]), too; then a replay can begin there.
+    /// Records the state every 64 jobs, where the platform records: before the first function that
+    /// may change the state in such a job. Only a DAG with recorded topics ([`Dag::record`])
+    /// records its states, too; a replay can then begin at a recorded state.
     ///
-    /// A value that a closure keeps for itself is not recorded, so what shall be is to be a state.
-    /// A value
-    /// that takes more than 4 KiB, or twice the least of its type if that is more, is lost, as one
-    /// of a topic is.
+    /// A recording does not contain values kept in a closure, so make such a value a state to have
+    /// the value recorded. A value of more than 4 KiB, or of more than twice the least size of its
+    /// type if that is larger, is lost, as for a topic.
     ///
     /// ```
     /// use core::time::Duration;
@@ -241,7 +237,7 @@ impl<T: StateValue> State<T> {
         self.record_every(64)
     }
 
-    /// Records the state every so many jobs.
+    /// Records the state every `jobs` jobs.
     ///
     /// See [`record`](Self::record).
     ///
@@ -260,7 +256,7 @@ impl<T: StateValue> State<T> {
         self
     }
 
-    /// Notes a use, and returns the value that the subtask will claim.
+    /// Registers a use, and returns the value for the subtask to claim.
     fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<ResettableState<T>> {
         let user = StateUser { subtask, updates };
         dag.draft.borrow_mut().spec.states[self.options.position]
@@ -281,10 +277,9 @@ impl<T> Clone for State<T> {
 }
 
 impl Dag {
-    /// Adds a state that subtasks of this DAG share, with its value before job 0.
+    /// Adds a state shared by subtasks of this DAG, with the given name and value before job 0.
     ///
-    /// A subtask uses it by [`using`](Self::using). See [`State`] for what is
-    /// guaranteed.
+    /// A subtask gets access by [`using`](Self::using). See [`State`] for the guarantees.
     #[track_caller]
     #[must_use = "a state that no subtask uses is a fault at commit"]
     pub fn state<T: StateValue>(&self, name: &str, initial: T) -> State<T> {
@@ -307,8 +302,8 @@ impl Dag {
     }
 }
 
-/// Implements a use of a state: what a function borrows, whether it updates that, and how the value
-/// is claimed.
+/// Implements a use of a state, given the borrowed type, whether the use updates the value, and how
+/// the value is claimed.
 macro_rules! implement_use {
     ($Use:ident: $Borrowed:ty, $updates:literal, $claim:ident -> $Guard:ident) => {
         impl<T> sealed::Sealed for $Use<T> {}

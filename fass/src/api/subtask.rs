@@ -1,26 +1,23 @@
-//! Registering a subtask step by step: its function, the topics that it reads and writes, and its
-//! deadline.
+//! Registering a subtask step by step: its function, its input and output topics, and its deadline.
 //!
 //! The paper's three functions ([`Dag::register_periodic_subtask`], [`Dag::register_subtask`],
-//! [`Dag::register_sink_subtask`]) say the same in a line. This way takes what they cannot: a
-//! subtask that *uses* something besides its inputs ([`Dag::using`]), one whose function is
+//! [`Dag::register_sink_subtask`]) do the same in one line. The steps cover cases beyond the three:
+//! a subtask *using* an object besides its inputs ([`Dag::using`]), a subtask whose function is
 //! *replaced* after a fault ([`Dag::restarting`]), the source of a *sporadic* DAG
 //! ([`Dag::sporadic`]).
 //!
 //! # Untyped subtasks
 //!
-//! A function's tuples state a graph at compile time, with at most 16 inputs
-//! and outputs a subtask. A graph that is read from a file, or generated, has
-//! neither: its subtasks are *untyped*. An untyped subtask is a function of the
-//! job's number alone, its edges are stated one by one
-//! ([`Dag::precede`](crate::Dag::precede)), any number of them, and carry no data.
+//! A function's tuples fix a graph at compile time, with at most 16 inputs and 16 outputs per
+//! subtask. A graph read from a file, or generated, has neither limit: its subtasks are *untyped*.
+//! An untyped subtask is a function of the job's number alone. Its edges are added one by one
+//! ([`Dag::precede`](crate::Dag::precede)), in any number, and carry no data.
 //!
-//! All else is as for typed subtasks. The commit verifies the same graph of the
-//! same model. Each edge has its ring of slots, through which a token
-//! goes for every job: an instance takes the tokens of *its* job from all
-//! predecessors before the function is called (R2), and gives its own only after
-//! the function has returned (R3). A platform that starts an instance early is
-//! found out here as it is with typed subtasks.
+//! Everything else is as for typed subtasks. The commit verifies the same graph of the same model.
+//! Each edge has a ring of slots, and a token passes through the ring for every job. An instance
+//! takes the tokens of *its* job from all predecessors before the function is called (R2), and
+//! gives its own token only after the function has returned (R3). So a platform starting an
+//! instance too early is detected, as with typed subtasks.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -37,10 +34,10 @@ use crate::run::message::MessageType;
 use crate::run::subtask::{MakeBody, defer, defer_untyped};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
-/// A subtask whose function is known, to be registered by [`register`](Self::register).
+/// A subtask with a known function, before its registration by [`register`](Self::register).
 ///
-/// Made by [`Dag::subtask`], [`Dag::source`], [`Dag::restarting`] and [`Dag::falling_back`], and
-/// those of [`SubtaskBuilder`](crate::shared::SubtaskBuilder).
+/// Made by [`Dag::subtask`], [`Dag::source`], [`Dag::restarting`] and [`Dag::falling_back`], and by
+/// the same methods of [`SubtaskBuilder`](crate::shared::SubtaskBuilder).
 ///
 /// ```
 /// use core::time::Duration;
@@ -65,20 +62,21 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 pub struct Subtask<'d> {
     dag: &'d Dag,
     body: BeginBody<'d>,
-    /// Takes note of it, and of what its function is.
+    /// Records the kind of the function in the draft, such as async or replaceable, when the
+    /// subtask is registered.
     note: fn(&mut DagDraft, usize),
     reads: &'d [&'d str],
     writes: &'d [&'d str],
-    /// The types of its inputs and of its outputs, by functions: an image has little room.
+    /// Functions returning the types of the inputs and of the outputs: an image has little room.
     types: [fn() -> Vec<MessageType>; 2],
     due: Option<Duration>,
 }
 
-/// Makes the body of a subtask when it is registered, which then has this number: what it uses is
-/// noted of that number, whichever subtasks are begun or registered meanwhile.
+/// Makes the body of a subtask at registration, given the subtask's number. The uses are recorded
+/// under that number, whichever subtasks are begun or registered meanwhile.
 type BeginBody<'d> = Box<dyn FnOnce(&Dag, usize) -> MakeBody + 'd>;
 
-/// Takes note of a subtask whose function is not async.
+/// Refuses declared waits of a subtask whose function is not async.
 fn note_plain(draft: &mut DagDraft, subtask: usize) {
     let says =
         "states waits, and its function is not async; register an async one, or state no waits";
@@ -86,8 +84,8 @@ fn note_plain(draft: &mut DagDraft, subtask: usize) {
 }
 
 impl Dag {
-    /// Begins the registration of a source: a function without inputs, which every release
-    /// starts. A statement of its own says when the DAG is released: [`period`](Self::period) or
+    /// Begins the registration of a source: a function without inputs, started by every release. A
+    /// separate call sets when the DAG is released: [`period`](Self::period) or
     /// [`sporadic`](Self::sporadic).
     ///
     /// See [`Subtask`].
@@ -133,7 +131,7 @@ impl<'d> Subtask<'d> {
         Self { note, ..self }
     }
 
-    /// Names the topics of its inputs, one for each element of the function's argument.
+    /// Names the input topics, one for each element of the function's argument tuple.
     pub fn reads(self, topics: &'d [&'d str]) -> Self {
         Self {
             reads: topics,
@@ -141,7 +139,7 @@ impl<'d> Subtask<'d> {
         }
     }
 
-    /// Names the topics of its outputs, one for each element that the function returns.
+    /// Names the output topics, one for each element of the function's result tuple.
     pub fn writes(self, topics: &'d [&'d str]) -> Self {
         Self {
             writes: topics,
@@ -149,8 +147,9 @@ impl<'d> Subtask<'d> {
         }
     }
 
-    /// States the time after a release by which it shall have finished, as a sink, where that is
-    /// not its DAG's [`relative_deadline`](Dag::relative_deadline).
+    /// Sets the relative deadline of the subtask, as a sink: the time from a release to the latest
+    /// finish. Needed where the deadline differs from the DAG's
+    /// [`relative_deadline`](Dag::relative_deadline).
     pub fn due(self, relative_deadline: Duration) -> Self {
         Self {
             due: Some(relative_deadline),
@@ -158,15 +157,15 @@ impl<'d> Subtask<'d> {
         }
     }
 
-    /// Registers it.
+    /// Registers the subtask.
     ///
-    /// See [`Subtask`]. The commit reports all that is wrong with it.
+    /// See [`Subtask`]. The commit reports all faults of the subtask.
     #[track_caller]
     pub fn register(self, attributes: SubtaskAttributes) {
         let _ = self.register_labelled(attributes);
     }
 
-    /// Registers it, and returns how messages call it.
+    /// Registers the subtask, and returns its name in messages.
     #[inline(never)]
     #[track_caller]
     pub(super) fn register_labelled(self, attributes: SubtaskAttributes) -> SubtaskLabel {
@@ -193,7 +192,7 @@ impl fmt::Debug for Subtask<'_> {
     }
 }
 
-/// A subtask without types, by which edges name it. Made by
+/// A subtask without types, as the end of edges. Made by
 /// [`Dag::register_untyped_subtask`](crate::Dag::register_untyped_subtask).
 ///
 /// ```
@@ -217,15 +216,14 @@ pub struct UntypedSubtask {
 shown_as!(UntypedSubtask, |of| of.subtask);
 
 impl Dag {
-    /// Registers a subtask without types, for a graph that is known only at run
-    /// time: a function of the job's number, with any number of edges.
+    /// Registers a subtask without types, for a graph known only at run time: a function of the
+    /// job's number, with any number of edges.
     ///
-    /// Its edges are those stated with [`precede`](Self::precede). Without one
-    /// leading to it, it is a source. The DAG's [`period`](Self::period) and
-    /// [`relative_deadline`](Self::relative_deadline) are stated for themselves.
-    /// The guarantees are the same as for typed subtasks: the function is called
-    /// when all predecessors of its job are complete, and successors follow when
-    /// it has returned.
+    /// [`precede`](Self::precede) adds the edges. A subtask without an edge leading to it is a
+    /// source. [`period`](Self::period) and [`relative_deadline`](Self::relative_deadline) set the
+    /// DAG's times. The guarantees are the same as for typed subtasks: the function is called after
+    /// all predecessors of its job are complete, and successors follow after the function has
+    /// returned.
     ///
     /// ```
     /// use core::time::Duration;
@@ -266,15 +264,14 @@ impl Dag {
         }
     }
 
-    /// Adds an edge: of each job, `later` starts only when `earlier` is complete.
+    /// Adds an edge: in each job, `later` starts only after `earlier` is complete.
     ///
     /// See [`register_untyped_subtask`](Self::register_untyped_subtask). The commit reports all
-    /// that is wrong with the graph.
+    /// faults of the graph.
     ///
     /// # Panics
     ///
-    /// Also if one of the two is a subtask of another DAG: there are no edges
-    /// between DAGs.
+    /// Also if `earlier` or `later` is a subtask of another DAG: there are no edges between DAGs.
     #[track_caller]
     pub fn precede(&self, earlier: &UntypedSubtask, later: &UntypedSubtask) -> &Self {
         for end in [earlier, later] {
@@ -288,8 +285,8 @@ impl Dag {
         self
     }
 
-    /// Sets the time after a release by which an untyped sink shall have finished, where
-    /// that is less than its DAG's. (A typed sink states it at its registration.)
+    /// Sets the relative deadline of an untyped sink: the time from a release to the sink's latest
+    /// finish, where shorter than the DAG's. (A typed sink states its deadline at registration.)
     ///
     /// ```
     /// use core::time::Duration;
@@ -305,7 +302,7 @@ impl Dag {
     ///
     /// # Panics
     ///
-    /// Also if it is a subtask of another DAG.
+    /// Also if `sink` is a subtask of another DAG.
     #[track_caller]
     pub fn sink_deadline(&self, sink: &UntypedSubtask, relative_deadline: Duration) -> &Self {
         assert!(

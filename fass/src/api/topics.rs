@@ -1,14 +1,14 @@
-//! The topics of a subtask's inputs or outputs, as an app lists them.
+//! The topics of a subtask's inputs or outputs, as listed by an app.
 //!
-//! The length of an array is part of its type, so a list that does not have one topic for each
-//! element of the function's tuple does not compile. That of a `Vec` is known when it is there: the
-//! commit counts it.
+//! The length of an array is part of its type, so an array without exactly one topic for each
+//! element of the function's tuple does not compile. The length of a `Vec` is known only at run
+//! time: the commit counts the topics.
 
 use alloc::vec::Vec;
 
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
-/// Names of topics: an array, or, as in the paper, a `Vec`.
+/// A list of topic names: an array, or, as in the paper, a `Vec`.
 ///
 /// ```
 /// use core::time::Duration;
@@ -33,10 +33,10 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
     note = "a topic is named by a `&str`, of a `String` by `.as_str()`; a `Vec` of them is a list, too"
 )]
 pub trait Topics {
-    /// The number of topics, if the type tells it.
+    /// The number of topics, if the type tells the number.
     const COUNT: Option<usize>;
 
-    /// Returns the names, in the order of the elements.
+    /// Returns the names, in the order of the tuple's elements.
     ///
     /// See [`Topics`].
     fn names(&self) -> &[&str];
@@ -58,7 +58,7 @@ impl Topics for Vec<&str> {
     }
 }
 
-/// Returns the topics of a function's argument. A list of another length does not compile.
+/// Returns the topics of a function's argument. An array of another length does not compile.
 pub(super) fn of_inputs<Args: VecToSubs, List: Topics>(list: &List) -> &[&str] {
     const {
         assert!(
@@ -69,7 +69,7 @@ pub(super) fn of_inputs<Args: VecToSubs, List: Topics>(list: &List) -> &[&str] {
     list.names()
 }
 
-/// Returns the topics of a function's result. A list of another length does not compile.
+/// Returns the topics of a function's result. An array of another length does not compile.
 pub(super) fn of_outputs<Ret: VecToPubs, List: Topics>(list: &List) -> &[&str] {
     const {
         assert!(
@@ -80,7 +80,8 @@ pub(super) fn of_outputs<Ret: VecToPubs, List: Topics>(list: &List) -> &[&str] {
     list.names()
 }
 
-/// Reports whether a list of so many topics may be that of a tuple with `arity` elements.
+/// Reports whether a list with `count` topics fits a tuple with `arity` elements. An unknown count
+/// always fits.
 const fn may_have(count: Option<usize>, arity: usize) -> bool {
     match count {
         Some(count) => count == arity,

@@ -1,13 +1,12 @@
-//! Uses of a subtask besides its inputs, stated at registration.
+//! Uses of a subtask besides its inputs, declared at registration.
 //!
-//! Values of the same job come along edges, as arguments. Values from elsewhere are stated with
-//! [`Dag::using`]: a [`State`](crate::shared::State) that subtasks of the DAG share, the [latest
-//! value](crate::shared::Latest) of a topic of any DAG, a [signal](crate::shared::Signal) that the
-//! subtask may raise, a [wire](crate::shared::Wire) for bytes, a
-//! [parameter](crate::shared::Parameter) that is set from outside, a DAG that it may
-//! [pause](crate::shared::Switch), a [mode](crate::shared::Modes) that it may enter, the
-//! [end](crate::shared::Shutdown) of the run. The function then gets what it uses as its *first*
-//! argument, in front of the inputs:
+//! Values of the same job come along edges, as arguments. [`Dag::using`] declares access to
+//! anything else: a [`State`](crate::shared::State) shared by subtasks of the DAG, the [latest
+//! value](crate::shared::Latest) of a topic of any DAG, a [signal](crate::shared::Signal) to raise,
+//! a [wire](crate::shared::Wire) for bytes, a [parameter](crate::shared::Parameter) set from
+//! outside, a DAG to [pause](crate::shared::Switch), a [mode](crate::shared::Modes) to enter, the
+//! [end](crate::shared::Shutdown) of the run. The function then gets the declared use as its
+//! *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|
@@ -27,12 +26,11 @@
 //! | [`Device::asking`](crate::shared::Device::asking) | `Asker<Q, A>` | a wait |
 //! | [`Lock::entering`](crate::shared::Lock::entering) | `()` | blocking |
 //!
-//! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
-//! all of them for one call only, nothing can be kept beyond the instance.
+//! Several uses form a tuple of up to 8, and the function gets a tuple. Since the function borrows
+//! all of them for one call only, the function can keep nothing beyond the instance.
 //!
-//! The methods of [`SubtaskBuilder`] are those of [`Dag`]. Each wraps the function in one that
-//! begins the
-//! uses, lends them to the function for one call, and ends them.
+//! The methods of [`SubtaskBuilder`] are the same as for [`Dag`]. Each wraps the given function.
+//! The wrapper begins the uses, lends them to the function for one call, and ends them.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -53,9 +51,9 @@ pub(crate) mod sealed {
     pub trait Sealed {}
 }
 
-/// One thing that a subtask uses, or a tuple of up to 8.
+/// A use of a subtask, or a tuple of up to 8 uses.
 ///
-/// Apps do not call its methods; they meet the trait in [`Dag::using`].
+/// Apps do not call the trait's methods; they meet the trait as a bound of [`Dag::using`].
 ///
 /// ```
 /// use fass::shared::{State, Uses};
@@ -74,22 +72,23 @@ pub(crate) mod sealed {
     note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()`, `wire.reading(decode)`, `wire.writing()`, `parameter.reading()`, `clock.reading()`, `device.asking()` and `lock.entering(1)`"
 )]
 pub trait Uses: sealed::Sealed {
-    /// The argument of the function.
+    /// The first argument of the function.
     type Borrowed<'a>;
-    /// The part that the subtask keeps from its registration on.
+    /// The part kept by the subtask from its registration on.
     #[doc(hidden)]
     type Held: Send + 'static;
-    /// The part that it has for the time of an instance.
+    /// The part held during an instance.
     #[doc(hidden)]
     type Guard<'a>;
 
-    /// Reports whether it may be used by subtasks of this DAG, as most may by those of any.
+    /// Reports whether subtasks of this DAG may have the use. Most uses are open to subtasks of any
+    /// DAG.
     #[doc(hidden)]
     fn is_of(&self, _dag: &Dag) -> bool {
         true
     }
 
-    /// Notes that a subtask uses it.
+    /// Records in the draft that a subtask has the use.
     #[doc(hidden)]
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held;
 
@@ -97,15 +96,15 @@ pub trait Uses: sealed::Sealed {
     #[doc(hidden)]
     fn enter(held: &mut Self::Held) -> Self::Guard<'_>;
 
-    /// Lends it to the function.
+    /// Lends the use to the function.
     #[doc(hidden)]
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a>;
 }
 
-/// Uses of a subtask whose function can be replaced after a fault: states, which are then
-/// reset, or a tuple of such.
+/// Uses of a subtask whose function can be replaced after a fault: a state, reset after the fault,
+/// or a tuple of states.
 ///
-/// Apps do not call its methods; they meet the trait in
+/// Apps do not call the trait's methods; they meet the trait as a bound of
 /// [`SubtaskBuilder::restarting`](crate::shared::SubtaskBuilder::restarting).
 ///
 /// ```
@@ -121,7 +120,7 @@ pub trait Uses: sealed::Sealed {
     note = "let another subtask sample the latest value or raise the signal, and send along an edge"
 )]
 pub trait ResettableUses: Uses {
-    /// Returns the part that another function of the subtask keeps.
+    /// Returns the part kept by another function of the subtask.
     #[doc(hidden)]
     fn another(held: &Self::Held) -> Self::Held;
 
@@ -130,8 +129,8 @@ pub trait ResettableUses: Uses {
     fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>>;
 }
 
-/// Implements the use of a subtask whose completions may ask for something: what it borrows is a
-/// place for the wish, and `hold` says what that is about.
+/// Implements a use for requests made by completions. The function borrows a place for its wish,
+/// and `$hold` returns that place and registers the request's kind.
 macro_rules! implement_asking {
     ($Use:ty, $Borrowed:ident, $hold:expr) => {
         impl sealed::Sealed for $Use {}
@@ -215,8 +214,8 @@ implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guar
 implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard)(G g g_guard));
 implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guard)(F f f_guard)(G g g_guard)(H h h_guard));
 
-/// An input of a subtask from outside, by a use: "reads parameter `gain`". Sources alone take them, and
-/// each thing once, so that a job has one value of it.
+/// An input of a subtask from outside, through a use: "reads parameter `gain`". Only sources take
+/// such inputs, and each input once, so that a job has one value of the input.
 pub(super) struct OutsideInput {
     pub(super) subtask: usize,
     pub(super) takes: String,
@@ -225,7 +224,8 @@ pub(super) struct OutsideInput {
 impl DraftPart for OutsideInput {
     fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
         let Self { subtask, takes } = self;
-        // A replay gives sources their values; what others take from outside it could not repeat.
+        // A replay supplies the values of sources; outside input of other subtasks could not be
+        // repeated.
         if !is_source(of, self) {
             let says = format_args!(
                 "is no source and {takes}; let the source do that, and send it along an edge"
@@ -250,10 +250,9 @@ fn is_source(of: &CheckedDag<'_>, input: &OutsideInput) -> bool {
     spec.subtasks[subtask].inputs.is_empty() && !spec.edges.iter().any(follows)
 }
 
-/// A DAG whose next subtask uses something. Made by [`Dag::using`].
+/// A DAG whose next subtask has uses. Made by [`Dag::using`].
 ///
-/// Its methods are those of [`Dag`], for functions that get what they use as their
-/// first argument.
+/// Its methods are the same as for [`Dag`], for functions with the uses as their first argument.
 ///
 /// See [`State`](crate::shared::State).
 #[derive(Debug)]
@@ -264,14 +263,14 @@ pub struct SubtaskBuilder<'d, U> {
 }
 
 impl Dag {
-    /// Begins the registration of a subtask that uses something besides its inputs.
+    /// Begins the registration of a subtask using something besides its inputs.
     ///
-    /// See [`Uses`] for what there is, and [`State`](crate::shared::State),
+    /// See [`Uses`] for the possible uses, and [`State`](crate::shared::State),
     /// [`Latest`](crate::shared::Latest) and [`Signal`](crate::shared::Signal) for examples.
     ///
     /// # Panics
     ///
-    /// Also if a state is another DAG's.
+    /// Also if a state belongs to another DAG.
     #[track_caller]
     pub fn using<U: Uses>(&self, uses: U) -> SubtaskBuilder<'_, U> {
         assert!(

@@ -1,27 +1,29 @@
 //! Registering subtasks that wait: functions that are async.
 //!
-//! Such a function is as any other of its tuples, and may await, between its inputs and its
-//! outputs, what `fass` offers: [`sleep`](crate::sleep()), [`until`](crate::until()) an instant of its
-//! job, the answer of a [device](crate::shared::Device), bytes of a
-//! [wire](crate::shared::Wire::reading). While it waits its instance has no core and
-//! no stack. The number of its waits and the limit of each are stated
-//! ([`SubtaskAttributes::wait`]), so the response time is bounded, whatever a device does.
+//! An async function has tuples like any other function. Between its inputs and its outputs it may
+//! await the waits offered by `fass`: [`sleep`](crate::sleep()), [`until`](crate::until()) an
+//! instant of its job, the answer of a [device](crate::shared::Device), bytes of a
+//! [wire](crate::shared::Wire::reading). A waiting instance has no core and no stack. The subtask
+//! declares the number of its waits and a limit for each ([`SubtaskAttributes::wait`]), so the
+//! response time is bounded, whatever a device does.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - Each job calls the function once. Its future is polled once a turn: at the start of the
-//!   instance, and when a wait has ended.
-//! - Nothing is seen of an instance before it has returned (R3): no outputs, latest values, signals.
-//! - A wait ends at its limit, also if nobody answers. No wait but a stated one is taken: see
+//! - Each job calls the function once. Its future is polled once per turn: at the start of the
+//!   instance, and after the end of each wait.
+//! - Nothing of an instance is visible before the function has returned (R3): no outputs, latest
+//!   values or signals.
+//! - A wait ends at its limit, even without an answer. Only declared waits are possible: see
 //!   [`WaitFault`](crate::WaitFault).
-//! - The future of a job that is aborted, or lost by a fault, while it waits is dropped, by the
+//! - If a job is aborted, or lost by a fault, while it waits, its future is dropped, by the
 //!   subtask's next instance or with the subtask.
-//! - After the commit nothing is allocated for it.
+//! - After the commit nothing is allocated for an async function.
 //!
-//! # What is not
+//! # Limits
 //!
-//! - A function that another one replaces after a fault ([`Dag::restarting`]) cannot wait.
-//! - A [`State`](crate::shared::State) is for the time of a call, so an async function has none.
+//! - A function that can be replaced after a fault ([`Dag::restarting`]) cannot wait.
+//! - An async function has no [`State`](crate::shared::State), since a state is lent for the time
+//!   of a call.
 
 use alloc::rc::Rc;
 use core::fmt;
@@ -35,7 +37,7 @@ use crate::draft::{NamedTopics, SubtaskAttributes};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 use crate::run::waiting::{defer, defer_untyped};
 
-/// A device has not answered within the limit of the wait.
+/// The error of a device that has not answered within the limit of the wait.
 ///
 /// ```
 /// assert_eq!(fass::shared::TimedOut.to_string(), "the device has not answered in time");
@@ -52,8 +54,8 @@ impl fmt::Display for TimedOut {
 impl core::error::Error for TimedOut {}
 
 impl Dag {
-    /// Registers a source as [`register_periodic_subtask`](Self::register_periodic_subtask) does,
-    /// whose function is async.
+    /// Registers a source whose function is async; otherwise like
+    /// [`register_periodic_subtask`](Self::register_periodic_subtask).
     ///
     /// See [`sleep`](crate::sleep()).
     #[track_caller]
@@ -75,8 +77,8 @@ impl Dag {
         self.open().set_period(period, subtask);
     }
 
-    /// Registers a subtask as [`register_subtask`](Self::register_subtask) does, whose function is
-    /// async: it may wait as its attributes state.
+    /// Registers a subtask whose function is async and may wait as declared in its attributes;
+    /// otherwise like [`register_subtask`](Self::register_subtask).
     ///
     /// ```
     /// use core::time::Duration;
@@ -120,8 +122,8 @@ impl Dag {
             .register(attributes);
     }
 
-    /// Registers a sink as [`register_sink_subtask`](Self::register_sink_subtask) does, whose
-    /// function is async.
+    /// Registers a sink whose function is async; otherwise like
+    /// [`register_sink_subtask`](Self::register_sink_subtask).
     ///
     /// See [`register_async_subtask`](Self::register_async_subtask).
     #[track_caller]
@@ -142,8 +144,8 @@ impl Dag {
             .register(attributes);
     }
 
-    /// Registers a subtask as [`register_untyped_subtask`](Self::register_untyped_subtask) does,
-    /// whose function is async.
+    /// Registers a subtask without types whose function is async; otherwise like
+    /// [`register_untyped_subtask`](Self::register_untyped_subtask).
     ///
     /// ```
     /// use core::time::Duration;
@@ -171,8 +173,8 @@ impl Dag {
         }
     }
 
-    /// Begins the registration of a source as [`source`](Self::source) does, whose function is
-    /// async.
+    /// Begins the registration of a source whose function is async; otherwise like
+    /// [`source`](Self::source).
     ///
     /// See [`Subtask`] and [`register_async_subtask`](Self::register_async_subtask).
     pub fn async_source<F, Fut, Ret>(&self, mut f: F) -> Subtask<'_>
@@ -184,8 +186,8 @@ impl Dag {
         self.async_subtask(move |()| f())
     }
 
-    /// Begins the registration of a subtask as [`subtask`](Self::subtask) does, whose function is
-    /// async.
+    /// Begins the registration of a subtask whose function is async; otherwise like
+    /// [`subtask`](Self::subtask).
     ///
     /// See [`Subtask`] and [`register_async_subtask`](Self::register_async_subtask).
     pub fn async_subtask<F, Args, Fut, Ret>(&self, f: F) -> Subtask<'_>
@@ -199,7 +201,7 @@ impl Dag {
     }
 }
 
-/// For uses that are not borrowed but given, such as that of a device: the function's future has
+/// For uses given to the function, such as a device, rather than lent: the function's future owns
 /// them.
 impl<'d, U: Uses + 'd> SubtaskBuilder<'d, U> {
     /// Works like [`Dag::async_source`].

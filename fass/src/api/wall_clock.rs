@@ -1,12 +1,12 @@
 //! Wall clocks: from the instants of a run to Unix time.
 //!
-//! Unix time is an instant, such as [`now_ns`](crate::now_ns), plus an *offset*. The machine states
-//! the offset at first, and peers may correct it. A *source* reads the offset when it starts, as it
-//! reads a [parameter](crate::shared::Parameter), and sends it along edges: so a job has one offset,
-//! which is recorded and replayed with what the source returns.
+//! Unix time is an instant, such as [`now_ns`](crate::now_ns), plus an *offset*. The machine sets
+//! the offset at first, and peers may correct the offset later. A *source* reads the offset when
+//! the source starts, like a [parameter](crate::shared::Parameter), and sends the time along edges:
+//! so a job has one offset, recorded and replayed with the source's results.
 //!
-//! No clock states an offset by itself: what nobody asks for is in no image, and a run in virtual
-//! time has the Unix time that its test states, or none.
+//! No clock sets an offset by itself: an image without a wall clock contains no code for one. A run
+//! in virtual time has the Unix time set by its test, or none.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -19,10 +19,10 @@ use super::uses::{OutsideInput, Uses, sealed};
 use crate::draft::part::PartKind;
 use crate::run::waiting::nanoseconds;
 
-/// Stands for an offset that nobody has stated.
+/// Stands for an offset not yet set.
 const UNKNOWN: u64 = u64::MAX;
 
-/// A clock of Unix time. A handle; clones are the same one.
+/// A clock of Unix time. Clones are handles of the same clock.
 ///
 /// # Examples
 ///
@@ -69,34 +69,34 @@ recording::recordable! {
 
 impl UnixTime {
     /// Returns the nanoseconds since 1970, without leap seconds, of an instant on the clock of
-    /// [`now_ns`](crate::now_ns); `None` if nobody has stated them.
+    /// [`now_ns`](crate::now_ns). Returns `None` while the offset is unknown.
     pub fn of(self, instant_ns: u64) -> Option<u64> {
         (self.offset_ns != UNKNOWN).then(|| self.offset_ns.saturating_add(instant_ns))
     }
 }
 
 impl WallClock {
-    /// Makes a clock that does not know the time.
+    /// Makes a clock without a time.
     pub fn new() -> Self {
         Self(Arc::new(AtomicU64::new(UNKNOWN)))
     }
 
-    /// Returns the use of a source that reads it.
+    /// Returns the use for a source reading the clock.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn reading(&self) -> WallClockUse {
         WallClockUse(self.clone())
     }
 
-    /// Returns the Unix time of an instant on the clock of [`now_ns`](crate::now_ns), in nanoseconds,
-    /// for a platform: a DAG [reads](Self::reading) it.
+    /// Returns the Unix time of an instant on the clock of [`now_ns`](crate::now_ns), in
+    /// nanoseconds. For platforms; a DAG [reads](Self::reading) the clock.
     pub fn at(&self, instant_ns: u64) -> Option<u64> {
         let offset_ns = self.0.load(Ordering::Relaxed);
         UnixTime { offset_ns }.of(instant_ns)
     }
 
-    /// States the Unix time of an instant, for the jobs to come: by what a peer has said, say, whose
-    /// word need not be right. The first time counts as it is. A later one moves the clock by `most`
-    /// at most, also backwards: intervals are those of [`now_ns`](crate::now_ns).
+    /// Sets the Unix time of an instant, for the jobs to come; for example by the word of a peer,
+    /// possibly wrong. The first time counts as given. A later time moves the clock by at most
+    /// `most`, also backwards; so take intervals from [`now_ns`](crate::now_ns).
     pub fn correct(&self, instant_ns: u64, unix_ns: u64, most: Duration) {
         let most_ns = nanoseconds(most);
         let wanted_ns = unix_ns.saturating_sub(instant_ns).min(UNKNOWN - 1);

@@ -1,31 +1,31 @@
 //! Wires: how bytes come in and go out while DAGs run.
 //!
-//! For our purposes a *wire* is a way for packets between a device, such as a serial port or a
-//! network card, and the functions of an app; a *packet* is bytes that belong together. One source
-//! receives on a wire, and one subtask sends on it. Which device it is the platform is told, not the
-//! DAG: so the same functions run on the machine and, with bytes that a test gives, in virtual
+//! Here a *wire* is a path for packets between a device, such as a serial port or a network card,
+//! and the functions of an app; a *packet* is a group of bytes that belong together. One source
+//! receives on a wire, and one subtask sends. Only the platform knows the device behind a wire, not
+//! the DAG: so the same functions run on the machine and, with bytes given by a test, in virtual
 //! time.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - An instance of the receiver is given the packets that were whole by its start and that no
-//!   earlier one has taken: those since the last job, with the time at which each was whole. If
-//!   the receiver is the source of a sporadic DAG, each packet raises its signal.
-//! - What an instance sends goes when it is complete (R3), all of it or nothing, in the order
-//!   of jobs: as one packet, unless it ends [more](Sender::end_packet). Of an instance that fails
-//!   nothing goes.
-//! - Nobody waits, but an async function that [reads or writes](super::wire_waits): not the device
-//!   for the receiver, nor the sender for the device. Packets without room are lost, on the way out
-//!   all those of an instance, and the newest: earlier ones stay. Losses are counted
-//!   ([`Wire::counts`]).
-//! - The decoder runs in the receiver's instance. If it panics, that is contained as if
-//!   the function had.
+//! - An instance of the receiver gets the packets complete at its start and not taken by an earlier
+//!   instance: the packets since the last job, each with the time of its last byte. If the receiver
+//!   is the source of a sporadic DAG, each packet raises the DAG's signal.
+//! - Bytes sent by an instance go out when the instance is complete (R3), all or nothing, in the
+//!   order of jobs: as one packet, unless the instance [ends](Sender::end_packet) several packets.
+//!   A failing instance sends nothing.
+//! - Nobody waits, except an async function that [reads or writes](super::wire_waits). The device
+//!   does not wait for the receiver, nor the sender for the device. Packets without room are lost;
+//!   on the way out, all packets of an instance. Lost packets are always the newest: earlier
+//!   packets stay. Losses are counted ([`Wire::counts`]).
+//! - The decoder runs in the receiver's instance. A panic of the decoder is contained like a panic
+//!   of the function.
 //!
-//! # What is not
+//! # Limits
 //!
-//! - A job of a sporadic DAG may find no packet, if one came while the job before was about to
-//!   start and was taken by that.
-//! - How soon a byte that was sent leaves the device is the platform's.
+//! - A job of a sporadic DAG may find no packet: the job before was about to start when the packet
+//!   came, and took the packet as well.
+//! - The delay of a sent byte until it leaves the device depends on the platform.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -46,11 +46,11 @@ use crate::run::effect::RequestTarget;
 use crate::run::wire::buffer::Buffer;
 use crate::run::wire::{Framing, PacketTaker, SendCompletion, WireInput, WireOutput};
 
-/// A way for bytes in and out of a run. Clones are handles of the same wire.
+/// A path for bytes into and out of a run. Clones are handles of the same wire.
 ///
 /// # Examples
 ///
-/// A DAG that answers each number with its square:
+/// A DAG answering each number with its square:
 ///
 /// ```
 /// use core::fmt::Write;
@@ -98,19 +98,20 @@ pub(super) struct WireState {
     name: String,
     pub(super) incoming: Arc<WireInput>,
     pub(super) outgoing: Arc<WireOutput>,
-    /// Tells the subtask that waits for a packet, or for bytes to have gone, if there is one.
+    /// Tells the subtask waiting for a packet, or for the departure of bytes, if there is such a
+    /// subtask.
     pub(super) on_packet: SetOnce<Box<dyn Fn() + Send + Sync>>,
     pub(super) on_gone: SetOnce<Box<dyn Fn() + Send + Sync>>,
     is_received: AtomicBool,
     is_sent_on: AtomicBool,
     /// Whether a platform has the device's end.
     is_connected: AtomicBool,
-    /// The signal that its packets raise, if a sporadic DAG begins with them.
+    /// The signal raised by packets, if the receiver is the source of a sporadic DAG.
     signal: SetOnce<Arc<RequestTarget>>,
     link: Parameter<bool>,
 }
 
-/// Options of a wire.
+/// Options of a wire: the end of packets, their length, and the room for them.
 ///
 /// ```
 /// use fass::shared::{Framing, Wire, WireOptions};
@@ -121,14 +122,15 @@ pub(super) struct WireState {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WireOptions {
-    /// Where packets end: lines, unless stated.
+    /// The rule for the end of packets; lines by default.
     pub framing: Framing,
-    /// How many bytes a packet that comes has at most, a carriage return before a line feed
-    /// included: 256 unless stated. (Those of [`Framing::Fixed`] have what that says.) One that is
-    /// sent may have 1,984 at least, or what the device takes if that is less.
+    /// The greatest length of an incoming packet in bytes, including a carriage return before a
+    /// line feed; 256 by default. ([`Framing::Fixed`] states its own length.) An outgoing packet
+    /// may always have 1,984 bytes, or the device's limit if that is less.
     pub longest_bytes: usize,
-    /// For how many packets there is room on the way in, and for as many on the way out: 16 unless
-    /// stated, and rounded up to a power of two. Each takes its bytes, and 2 KiB at least.
+    /// The number of incoming packets with room on the wire, and the same number of outgoing
+    /// packets; 16 by default, and rounded up to a power of two. Each packet takes the memory of
+    /// its longest length, and at least 2 KiB.
     pub room: usize,
 }
 
@@ -142,25 +144,25 @@ impl Default for WireOptions {
     }
 }
 
-/// Counts of a wire. Packets are counted when they are whole, bytes without those that
-/// the framing adds.
+/// Counts of a wire. A packet is counted when its last byte is there. Bytes are counted without the
+/// bytes added by the framing.
 ///
 /// See [`Wire`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WireCounts {
     /// Packets that came, and found room.
     pub packets: u64,
-    /// Their bytes.
+    /// The bytes of `packets`.
     pub bytes: u64,
-    /// Packets that came and found none.
+    /// Packets that came, and found no room.
     pub lost_packets: u64,
-    /// Their bytes.
+    /// The bytes of `lost_packets`.
     pub lost_bytes: u64,
-    /// Packets that were too long, or that the decoder refused; the latter found room.
+    /// Packets too long, or refused by the decoder; refused packets had found room.
     pub malformed: u64,
-    /// Bytes that complete instances have sent.
+    /// Bytes sent by complete instances.
     pub sent_bytes: u64,
-    /// Bytes that they have sent and that found no room.
+    /// Bytes sent by complete instances, without room on the wire.
     pub unsent_bytes: u64,
 }
 
@@ -170,7 +172,7 @@ impl Wire {
         Self::with(name, WireOptions::default())
     }
 
-    /// Makes a wire with a name for reports.
+    /// Makes a wire with options, and a name for reports.
     ///
     /// See [`WireOptions`].
     pub fn with(name: &str, options: WireOptions) -> Self {
@@ -194,9 +196,9 @@ impl Wire {
         }
     }
 
-    /// Returns the use of the source that receives: `decode` says what a packet means, or
-    /// `None` if it is malformed, which is counted. (A replay takes what a source wrote, so it
-    /// needs no bytes; a subtask with inputs cannot receive.)
+    /// Returns the use for the receiving source. `decode` turns a packet into a value, or returns
+    /// `None` for a malformed packet, which is counted. (In a replay the recorded values replace
+    /// the source, so no bytes are needed. A subtask with inputs cannot receive.)
     ///
     /// See [`Wire`].
     ///
@@ -213,7 +215,7 @@ impl Wire {
         }
     }
 
-    /// Returns the use of the subtask that sends.
+    /// Returns the use for the sending subtask.
     ///
     /// See [`Wire`].
     ///
@@ -227,9 +229,9 @@ impl Wire {
         SendUse(self.clone())
     }
 
-    /// Returns the use of the subtask that sends values, each as one packet: `encode` writes a value
-    /// into the packet's place, and returns how many bytes it has. If these are more than the place,
-    /// the instance's packets are lost.
+    /// Returns the use for the subtask sending values, each as one packet: `encode` writes a value
+    /// into the packet's place, and returns the length of the value in bytes. If the length is more
+    /// than the place, the instance's packets are lost.
     ///
     /// ```
     /// use fass::shared::{ValueSender, Wire};
@@ -247,7 +249,6 @@ impl Wire {
     /// let dag = fass::create_dag();
     /// let sink = dag.using(wire.sending_values(encode)).subtask(square).reads(&["number"]);
     /// ```
-    ///
     /// # Panics
     ///
     /// If another subtask sends on the wire.
@@ -278,8 +279,8 @@ impl Wire {
         );
     }
 
-    /// Returns the state of its link, for a DAG to read as any [`Parameter`]: whether the cable is in,
-    /// and there is an address. A serial port always has a link.
+    /// Returns the state of the wire's link, readable by a DAG like any [`Parameter`]: `true` while
+    /// the cable is plugged in, and there is an address. A serial port always has a link.
     ///
     /// ```
     /// use fass::shared::Wire;
@@ -314,8 +315,9 @@ impl Wire {
     }
 }
 
-/// The device's end of a wire. There is one, which the platform takes as it connects the wire:
-/// so a function that holds a handle takes no byte of the DAG that the wire belongs to.
+/// The device's end of a wire. There is only one, and the platform takes this end when connecting
+/// the wire: so a function with a handle of the wire cannot take bytes from the DAG owning the
+/// wire.
 ///
 /// ```compile_fail,E0599
 /// let wire = fass::shared::Wire::new("numbers");
@@ -325,8 +327,8 @@ impl Wire {
 pub struct DeviceEnd(Wire);
 
 impl DeviceEnd {
-    /// Takes the device's end of the wire; returns `None` while somebody has it. Dropped, it can
-    /// be taken again.
+    /// Takes the device's end of the wire; returns `None` while somebody has the end. After a drop
+    /// the end can be taken again.
     pub fn of(wire: &Wire) -> Option<Self> {
         let is_taken = wire.shared.is_connected.swap(true, Ordering::Acquire);
         (!is_taken).then(|| Self(wire.clone()))
@@ -337,19 +339,19 @@ impl DeviceEnd {
         &self.0
     }
 
-    /// Takes bytes that have arrived at `now_ns`, on the clock of [`crate::now_ns`]. Returns
-    /// what [`Platform::raise`](crate::platform::Platform::raise) is to be told, if a packet is whole
-    /// and a sporadic DAG receives it.
+    /// Passes bytes to the wire that have arrived at `now_ns`, on the clock of [`crate::now_ns`].
+    /// If a packet is complete and a sporadic DAG receives packets, returns the arguments for
+    /// [`Platform::raise`](crate::platform::Platform::raise).
     ///
-    /// It may be called in an interrupt handler.
+    /// An interrupt handler may call the method.
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.0.shared.incoming.arrive(bytes, now_ns);
         is_whole.then(|| self.announce()).flatten()
     }
 
-    /// Takes a packet in a buffer, from a peer, by swapping the buffer for one of the wire's. Reports
-    /// whether the packet is there, to be [announced](Self::announce). Where packets are lines, a line
-    /// feed at the end is no part of the packet.
+    /// Passes a packet from a peer to the wire, by swapping its buffer for a buffer of the wire.
+    /// Returns `true` if the packet is on the wire and has to be [announced](Self::announce). Where
+    /// packets are lines, a line feed at the end is no part of the packet.
     ///
     /// See [`arrive`](Self::arrive).
     #[must_use]
@@ -358,7 +360,8 @@ impl DeviceEnd {
         incoming.swap(packet, Some(from), now_ns)
     }
 
-    /// Takes a packet by a copy of its bytes, and counts one that is too long or finds no room.
+    /// Passes a packet to the wire by copying its bytes. Counts a packet that is too long or finds
+    /// no room.
     ///
     /// See [`swap_in`](Self::swap_in).
     #[must_use]
@@ -366,9 +369,9 @@ impl DeviceEnd {
         self.0.shared.incoming.arrive(packet, now_ns)
     }
 
-    /// Ends the wait for a packet, if there is one, and returns what
-    /// [`Platform::raise`](crate::platform::Platform::raise) is to be told, as
-    /// [`arrive`](Self::arrive) does. Under no lock of the device's: the wait may be ended at once.
+    /// Ends a subtask's wait for a packet, if there is one, and returns the arguments for
+    /// [`Platform::raise`](crate::platform::Platform::raise), like [`arrive`](Self::arrive). Call
+    /// the method without a lock of the device: the wait may end at once.
     ///
     /// See [`swap_in`](Self::swap_in).
     pub fn announce(&self) -> Option<(u64, DagId)> {
@@ -378,21 +381,20 @@ impl DeviceEnd {
         self.released()
     }
 
-    /// Reports whether there is a packet to go, or the rest of a packet.
+    /// Reports whether a packet, or the rest of a packet, is waiting for departure.
     pub fn has_bytes_to_go(&self) -> bool {
         !self.0.shared.outgoing.is_empty()
     }
 
-    /// Begins as a device of packets, of so many bytes at most. `ready` is called when there are some
-    /// to go, in the completion of the sending instance. It
-    /// must not block.
+    /// Connects a device of packets with at most `most_bytes` bytes each. The completion of a
+    /// sending instance calls `ready` when packets are to be sent. `ready` must not block.
     ///
     /// See [`swap_out`](Self::swap_out).
     pub fn begin_packets(&self, most_bytes: usize, ready: fn()) {
         self.0.shared.outgoing.begin_packets(most_bytes, ready);
     }
 
-    /// Returns the DAG that packets release, once there is one.
+    /// Returns the DAG released by packets, if there is one.
     ///
     /// See [`announce`](Self::announce).
     #[must_use]
@@ -400,7 +402,7 @@ impl DeviceEnd {
         self.0.shared.signal.get()?.get()
     }
 
-    /// Says whether the device has a link.
+    /// Sets whether the device has a link.
     ///
     /// See [`Wire::link`].
     pub fn set_link(&self, is_up: bool) {
@@ -408,9 +410,9 @@ impl DeviceEnd {
         let _ = self.0.shared.link.set(is_up);
     }
 
-    /// Hands over the oldest packet to go, and its addressee. `send` may swap the buffer, and reports
-    /// whether the packet has gone, as does this. Behind that the end of the wait is
-    /// [told](Self::tell_gone).
+    /// Passes the oldest outgoing packet, and its addressee, to `send`. `send` may swap the buffer,
+    /// and returns whether the packet has gone; the method returns the same. Afterwards
+    /// [`tell_gone`](Self::tell_gone) ends a subtask's wait.
     ///
     /// See [`depart`](Self::depart).
     pub fn swap_out(&self, send: impl FnOnce(&mut Buffer, Option<SocketAddrV4>) -> bool) -> bool {
@@ -418,8 +420,8 @@ impl DeviceEnd {
         outgoing.take_packet(|packet| send(&mut packet.buffer, packet.peer))
     }
 
-    /// Ends the wait until all has gone, if there is one and nothing is left to go. Under no lock of
-    /// the device's.
+    /// Ends a subtask's wait for departure, if there is one and nothing is left to go. Call the
+    /// method without a lock of the device.
     ///
     /// See [`swap_out`](Self::swap_out).
     pub fn tell_gone(&self) {
@@ -429,7 +431,7 @@ impl DeviceEnd {
         }
     }
 
-    /// Takes the next byte that is to go, if there is one.
+    /// Takes the next outgoing byte, if there is one.
     #[must_use]
     pub fn depart(&self) -> Option<u8> {
         let byte = self.0.shared.outgoing.take_byte()?;
@@ -445,7 +447,7 @@ impl Drop for DeviceEnd {
 }
 
 impl PartialEq for Wire {
-    /// Reports whether both are handles of one wire.
+    /// Reports whether both are handles of the same wire.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.shared, &other.shared)
     }
@@ -453,7 +455,7 @@ impl PartialEq for Wire {
 
 shown_as!(Wire, |of| of.name());
 
-/// The use of a wire by the subtask that receives. Made by [`Wire::receiving`].
+/// The use of a wire by the receiving subtask. Made by [`Wire::receiving`].
 ///
 /// See [`Wire`].
 pub struct ReceiveUse<T> {
@@ -461,20 +463,20 @@ pub struct ReceiveUse<T> {
     decode: fn(&[u8]) -> Option<T>,
 }
 
-/// The use of a wire by the subtask that sends. Made by [`Wire::sending`].
+/// The use of a wire by the sending subtask. Made by [`Wire::sending`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
 pub struct SendUse(Wire);
 
-/// The use of a wire by the subtask that sends values. Made by [`Wire::sending_values`].
+/// The use of a wire by the subtask sending values. Made by [`Wire::sending_values`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
 pub struct SendValuesUse<T>(SendUse, fn(&T, &mut [u8]) -> usize);
 
-/// The packets that an instance is given, the oldest first. Those that it does not take stay
-/// for the next one.
+/// The packets received by an instance, the oldest first. Packets not taken stay for the next
+/// instance.
 ///
 /// See [`Wire`].
 pub struct Received<'a, T> {
@@ -482,26 +484,26 @@ pub struct Received<'a, T> {
     mark: usize,
 }
 
-/// A received packet: its value, and when it was whole.
+/// A received packet: its value, and the time of its last byte.
 ///
 /// See [`Wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packet<T> {
-    /// The value that the decoder has made of its bytes.
+    /// The value decoded from the packet's bytes.
     pub value: T,
-    /// When its last byte came, on the clock of [`crate::now_ns`].
+    /// The time of the packet's last byte in nanoseconds, on the clock of [`crate::now_ns`].
     pub received_ns: u64,
-    /// Whom it is from; `None` where the device knows of no peers.
+    /// The sender of the packet; `None` where the device has no peers.
     pub from: Option<SocketAddrV4>,
 }
 
-/// The handle by which a function sends: bytes, or text by [`core::fmt::Write`].
+/// The handle of a function for sending: bytes, or text by [`core::fmt::Write`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
 pub struct Sender<'a>(&'a Wire);
 
-/// The handle by which a function sends values. See [`Wire::sending_values`].
+/// The handle of a function for sending values. See [`Wire::sending_values`].
 #[derive(Debug)]
 pub struct ValueSender<'a, T>(&'a Wire, fn(&T, &mut [u8]) -> usize);
 
@@ -525,7 +527,7 @@ impl<T> Iterator for Received<'_, T> {
             decode,
             taker,
         } = &mut *self.held;
-        // Each turn takes a packet, and there are no more than up to the mark.
+        // The loop ends: each pass takes a packet, and only packets up to the mark are taken.
         loop {
             let packet = taker.take(self.mark, |packet| {
                 decode(packet.buffer.content()).map(|value| Packet {
@@ -543,8 +545,8 @@ impl<T> Iterator for Received<'_, T> {
 }
 
 impl<T> Received<'_, T> {
-    /// Has `look` see the bytes of the next packet in their place, with the packet's time and sender:
-    /// nothing is decoded, or copied. `None` if there is no more.
+    /// Shows `look` the bytes of the next packet in their place, with the packet's time and sender,
+    /// without decoding or copying. Returns `None` if there is no packet left.
     ///
     /// ```
     /// use fass::shared::Received;
@@ -572,16 +574,16 @@ impl Sender<'_> {
         self.0.shared.outgoing.stage(bytes);
     }
 
-    /// Ends the packet: later bytes are another packet's. Otherwise all bytes of an instance are one
-    /// packet. To a device of bytes there is no difference.
+    /// Ends the packet: later bytes belong to another packet. Otherwise all bytes of an instance
+    /// are one packet. A device of bytes sees no difference.
     ///
     /// See [`Sender::to`].
     pub fn end_packet(&mut self) {
         self.0.shared.outgoing.end_packet();
     }
 
-    /// Addresses this packet, and those after. Without an address the device decides: for the stated
-    /// peer, or else for the last sender.
+    /// Sets the addressee of this packet and later packets. Without an addressee the device
+    /// decides: the stated peer, or else the last sender.
     ///
     /// ```
     /// use fass::shared::{Packet, Sender};
@@ -607,7 +609,7 @@ impl fmt::Write for Sender<'_> {
     }
 }
 
-/// The receiving end of a wire, which its subtask keeps.
+/// The receiving end of a wire, kept by its subtask.
 ///
 /// See [`Wire`].
 #[doc(hidden)]
@@ -644,7 +646,7 @@ impl<T: 'static> Uses for ReceiveUse<T> {
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        // That of an instance that a fault has ended.
+        // A fault may have ended the last instance with a packet still taken.
         held.taker.give_back();
         held
     }

@@ -1,20 +1,20 @@
-//! Wires that an async function waits for: for a packet, or until bytes have gone.
+//! Wires in async functions: waiting for a packet, or for the departure of bytes.
 //!
-//! To such a function a wire is two [devices](super::device), whose driver is where its bytes arrive
-//! and depart. A *read* is a question for the next packet, and a *write* one for the time at which
-//! the device has taken what was written. Each takes one wait of those that the subtask states.
+//! To an async function a wire is two [devices](super::device), whose drivers are the arrival and
+//! the departure of bytes. A *read* asks for the next packet; a *write* asks when the device has
+//! taken the written bytes. Each takes one of the subtask's declared waits.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - A read ends with the oldest packet that no earlier one has got, or at its limit. What comes
-//!   after that stays for the next read.
-//! - What is written is on its way when its wait has begun, not before; it stays so if the limit
+//! - A read ends with the oldest packet not read before, or at its limit. A packet coming later
+//!   stays for the next read.
+//! - Written bytes go out when the wait has begun, not before. They still go out if the limit
 //!   passes first, or the instance fails after the wait.
-//! - Both take no time if the packet is there, or all has gone.
+//! - A read takes no time if the packet is already there, and a write none if all bytes have gone.
 //!
-//! # What is not
+//! # Limits
 //!
-//! - Bytes that find no room are lost, all those of a write, and that ends at its limit.
+//! - Bytes without room are lost, all bytes of the write together, and the write ends at its limit.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -34,7 +34,7 @@ use crate::run::cell::SharedCell;
 use crate::run::wire::{SendCompletion, SharedTaker, WireInput, WireOutput};
 
 impl Wire {
-    /// Returns the use of the async subtask that reads: `decode` says what a packet means.
+    /// Returns the use for a reading async subtask: `decode` turns a packet into a value.
     ///
     /// A modem is asked for its signal, and may be slow:
     ///
@@ -67,10 +67,9 @@ impl Wire {
     /// assert!(responses.eq([Some(3_000_000), Some(5_000_000)]));
     /// assert_eq!(machine.sent(&modem), b"signal?\nsignal?\n");
     /// ```
-    ///
     /// # Panics
     ///
-    /// If another subtask receives on the wire, or reads.
+    /// If another subtask receives or reads on the wire.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn reading<T>(&self, decode: fn(&[u8]) -> T) -> ReadUse<T>
@@ -78,7 +77,7 @@ impl Wire {
         T: Send + Sync + 'static,
     {
         self.claim_in();
-        // Packets stay where they arrive; the device only says when there is one.
+        // Packets stay where they arrive; the device only reports that there is one.
         let (device, driver) = create_device(self.name());
         let input = Arc::clone(&self.shared.incoming);
         let taker = input.taker().map(SharedTaker::new);
@@ -92,13 +91,13 @@ impl Wire {
         ReadUse(device, taker)
     }
 
-    /// Returns the use of the async subtask that writes.
+    /// Returns the use for a writing async subtask.
     ///
     /// See [`reading`](Self::reading).
     ///
     /// # Panics
     ///
-    /// If another subtask sends on the wire, or writes.
+    /// If another subtask sends or writes on the wire.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn writing(&self) -> WriteUse {
@@ -110,8 +109,9 @@ impl Wire {
     }
 }
 
-/// Makes what the place where bytes arrive, or depart, does when the wait for them may end. Of several
-/// cores that do so at once the first one does for all.
+/// Makes the callback for the place where bytes arrive or depart, called when the wait for them may
+/// end. If several cores call at once, the first call does the work for all, since a driver's end
+/// is for one caller at a time.
 fn telling<A: Send + Sync + 'static>(driver: DeviceDriver<(), A>) -> Box<dyn Fn() + Send + Sync> {
     let (driver, asked) = (SharedCell::new(driver), AtomicU32::new(0));
     Box::new(move || {
@@ -128,7 +128,7 @@ fn telling<A: Send + Sync + 'static>(driver: DeviceDriver<(), A>) -> Box<dyn Fn(
     })
 }
 
-/// The packets of a wire.
+/// The received packets of a wire, as a source of answers.
 struct Packets<T> {
     input: Arc<WireInput>,
     taker: Arc<SharedTaker>,
@@ -146,7 +146,7 @@ impl<T: Send + Sync> AnswerSource<T> for Packets<T> {
     }
 }
 
-/// Nothing of a wire that is to go.
+/// The departure of all bytes of a wire, as a source of answers.
 struct AllGone(Arc<WireOutput>);
 
 impl AnswerSource<()> for AllGone {
@@ -159,31 +159,31 @@ impl AnswerSource<()> for AllGone {
     }
 }
 
-/// The use of a wire by the async subtask that reads. Made by [`Wire::reading`].
+/// The use of a wire by a reading async subtask. Made by [`Wire::reading`].
 ///
 /// See [`Wire::reading`].
 pub struct ReadUse<T>(Device<(), T>, Arc<SharedTaker>);
 
-/// The use of a wire by the async subtask that writes. Made by [`Wire::writing`].
+/// The use of a wire by a writing async subtask. Made by [`Wire::writing`].
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
 pub struct WriteUse(Device<(), ()>, Wire);
 
-/// The handle by which an async function reads packets.
+/// The handle of an async function for reading packets.
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
 pub struct WireReader<T>(Asker<(), T>);
 
-/// The handle by which an async function writes bytes.
+/// The handle of an async function for writing bytes.
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
 pub struct WireWriter(Asker<(), ()>, Wire);
 
 impl<T: Recordable + Send + Sync + 'static> ReadUse<T> {
-    /// Records what is read, and a replay takes that, as of a [`Device`].
+    /// Records the packets read, for a replay to take, as for a [`Device`].
     ///
     /// See [`Device::record`].
     #[must_use = "the use itself is returned"]
@@ -194,8 +194,8 @@ impl<T: Recordable + Send + Sync + 'static> ReadUse<T> {
 }
 
 impl WriteUse {
-    /// Records how long writing takes, and a replay takes that, as of a [`Device`]. It writes all the
-    /// same.
+    /// Records the duration of writes, for a replay, as for a [`Device`]. A replay writes the bytes
+    /// all the same.
     ///
     /// See [`Device::record`].
     #[must_use = "the use itself is returned"]
@@ -212,33 +212,37 @@ impl<T> WireReader<T> {
     ///
     /// # Errors
     ///
-    /// [`TimedOut`] if none is there by then. With [`within`](PendingAnswer::within) that is sooner.
+    /// [`TimedOut`] if no packet is there at the limit. [`within`](PendingAnswer::within) shortens
+    /// the limit.
     ///
     /// # Panics
     ///
-    /// With a [`WaitFault`](crate::WaitFault), when it is polled, if the wait is not as stated.
+    /// With a [`WaitFault`](crate::WaitFault), when polled, if the wait differs from the subtask's
+    /// declared waits.
     pub fn read(&self) -> PendingAnswer<'_, (), T> {
         self.0.ask(())
     }
 }
 
 impl WireWriter {
-    /// Writes bytes, and waits until the device has taken them, or until the limit of the wait.
+    /// Writes bytes, and waits until the device has taken the bytes, or until the limit of the
+    /// wait.
     ///
     /// See [`Wire::reading`].
     ///
     /// # Errors
     ///
-    /// [`TimedOut`] if it has not by then; or there was no room for them, and they are lost, which
-    /// [`Wire::counts`] tells.
+    /// [`TimedOut`] if the device has not taken the bytes by then; or if there was no room. Lost
+    /// bytes are counted in [`Wire::counts`].
     ///
     /// # Panics
     ///
-    /// With a [`WaitFault`](crate::WaitFault), if the wait is not as stated.
+    /// With a [`WaitFault`](crate::WaitFault), if the wait differs from the subtask's declared
+    /// waits.
     pub async fn write(&self, bytes: &[u8]) -> Result<(), TimedOut> {
         self.0.check_turn().await;
         let has_room = self.1.shared.outgoing.stage(bytes);
-        // What is lost nobody takes.
+        // Lost bytes never depart, so there is no question to ask.
         self.0.ask_if(has_room.then_some(())).await
     }
 }
@@ -274,7 +278,7 @@ impl Uses for WriteUse {
     type Guard<'a> = &'a WireWriter;
 
     fn hold(self, dag: &Dag, subtask: usize) -> WireWriter {
-        // First: whether it has gone is asked when it is on its way.
+        // First: the question whether the bytes have gone comes after they are on their way.
         let effect = SendCompletion(Arc::clone(&self.1.shared.outgoing));
         dag.draft.borrow_mut().act(subtask, Box::new(effect));
         WireWriter(self.0.asking().hold(dag, subtask), self.1)
