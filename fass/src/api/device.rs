@@ -445,9 +445,9 @@ impl<Q, A: Recordable + Send + Sync + 'static> Device<Q, A> {
     /// took, after the instance that got the answer is complete. A replay takes the recorded
     /// answers instead of asking: its waits are as long as in the recorded run.
     ///
-    /// Answers are recorded only in a DAG with recorded topics ([`Dag::record`]). If a topic of a
-    /// source is recorded, recording the answers is mandatory. Answers of a job with more than 4
-    /// KiB together are lost. Call the method before the commit.
+    /// Answers are recorded along with topics, so record topics of the DAG, too ([`Dag::record`]).
+    /// If a topic of a source is recorded, recording the answers is mandatory. Answers of a job
+    /// with more than 4 KiB together are lost. Call the method before the commit.
     ///
     /// ```
     /// use core::time::Duration;

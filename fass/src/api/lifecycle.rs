@@ -331,8 +331,8 @@ impl ModeSwitch<'_> {
         self.wish.store(AT_ONCE, Ordering::Relaxed);
     }
 
-    /// Requests the mode when this instance is complete. From then on the DAGs leaving the run
-    /// release nothing, and the mode is entered when none of them has a job in flight.
+    /// Requests the mode when this instance is complete. From then on the DAGs paused by the new
+    /// mode release nothing, and the mode is entered when none of them has a job in flight.
     ///
     /// See [`Modes`].
     pub fn when_idle(&mut self) {

@@ -214,6 +214,7 @@ impl<T> Lock<T> {
 
     fn judge(&self, took_ns: u64) {
         let longest_ns = self.longest_ns.unwrap_or(u64::MAX);
+        // Only a new longest section is reported, so repeated overruns do not flood the log.
         if took_ns > longest_ns && self.said_ns.fetch_max(took_ns, Relaxed) < took_ns {
             let text = "a section has taken longer than its lock states, so no bound holds";
             let lock = self.name;

@@ -186,8 +186,8 @@ impl<T: StateValue> State<T> {
     }
 
     /// Records the state every 64 jobs, where the platform records: before the first function that
-    /// may change the state in such a job. Only a DAG with recorded topics ([`Dag::record`])
-    /// records its states, too; a replay can then begin at a recorded state.
+    /// may change the state in such a job. States are recorded along with topics, so record topics
+    /// of the DAG, too ([`Dag::record`]); a replay can then begin at a recorded state.
     ///
     /// A recording does not contain values kept in a closure, so make such a value a state to have
     /// the value recorded. A value of more than 4 KiB, or of more than twice the least size of its

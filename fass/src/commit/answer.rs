@@ -1,38 +1,34 @@
 //! Answers of an accepted commit: warnings, bounds against deadlines, and their proofs.
 //!
-//! Where WCETs are given, the commit asks `sched_dag::analysis` for the model
-//! that the platform will run: its policy, its preemption, its cores and its
-//! overheads. The answer for a DAG is a *bound*, the most time that any of its
-//! jobs takes from its release to its completion, with the test that proves it;
-//! or that there is no proof, and why. *Not proven* is not *infeasible*: all
-//! tests are sufficient ones.
+//! Given WCETs, the commit asks `sched_dag::analysis` about the platform's model: its policy, its
+//! preemption, its cores and its overheads. The answer for a DAG is a *bound*, the greatest time of
+//! any job from its release to its completion, together with the test proving the bound; or the
+//! reason why there is no proof. *Not proven* is not *infeasible*: all tests are only sufficient.
 //!
-//! # What follows from an answer
+//! # Consequences of an answer
 //!
-//! - By itself nothing: DAGs that are not proven are launched as others are.
-//!   Whether a proof is needed is for the app to say, with
-//!   [`Dag::demand_proof`](crate::Dag::demand_proof); then its lack is a fault.
-//! - A DAG that is *certain* to miss its deadlines at its WCETs is launched as
-//!   well, with a warning. A WCET may be far above what instances take, and
-//!   overload has its rules (the overrun policy), so it is no mistake by
-//!   itself. Two exceptions are faults of the model whatever is demanded: the
-//!   WCET of a single subtask beyond the deadline, and times that overflow.
-//! - A DAG without all its WCETs is not analysed, and neither are those that
-//!   it may delay; they are not proven. A WCET of 0 is none.
+//! - By itself an answer has no consequence: DAGs without a proof are launched like others. An app
+//!   needing a proof says so with [`Dag::demand_proof`](crate::Dag::demand_proof); then the lack of
+//!   a proof is a fault.
+//! - A DAG *certain* to miss its deadlines at its WCETs is launched as well, with a warning. A WCET
+//!   may be far above the actual execution times, and the overrun policy handles overload, so a
+//!   certain miss is not necessarily a mistake. Two exceptions are always faults of the model: a
+//!   WCET of a single subtask beyond the deadline, and an overflow of times.
+//! - A DAG with a missing WCET is not analysed, and neither are the DAGs possibly delayed by such a
+//!   DAG; they are not proven. A WCET of 0 counts as missing.
 //!
 //! # How old a sampled value can be
 //!
-//! Let the writer's DAG have period T and a proven bound R. Take a sample at time t
-//! and the latest job k that was complete by then. Job k + 1, released T later, was
-//! not, and is so within R: t < r(k) + T + R. So the *staleness*, counted from the
-//! nominal release of the job that the value is of, is less than T + R; this is the
-//! term of one hop in the end-to-end bound of A. Davare et al., Period Optimization
-//! for Hard Real-time Distributed Automotive Systems, DAC 2007
+//! Let the writer's DAG have period T and a proven bound R. Take a sample at time t and the latest
+//! job k complete by then. Job k + 1, released T later, was not complete yet, and completes within
+//! R: t < r(k) + T + R. So the *staleness*, counted from the nominal release of the value's job, is
+//! less than T + R. T + R is also the term of one hop in the end-to-end bound of A. Davare et al.,
+//! Period Optimization for Hard Real-time Distributed Automotive Systems, DAC 2007
 //! (doi:10.1145/1278480.1278553).
 //!
-//! It holds from the writer's first completion on, and for as long as jobs come: not
-//! behind the last job of a DAG with a limit, nor while one is paused or after it was
-//! ended, and never for a sporadic writer, whose signals may stay away.
+//! The bound holds from the writer's first completion on, and as long as jobs come: not after the
+//! last job of a DAG with a limit, nor while a DAG is paused or after its end. For a sporadic
+//! writer there is no such bound, because its signals may stay away.
 
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
@@ -57,7 +53,7 @@ use crate::platform::RunConfig;
 use crate::run::latest::Staleness;
 use crate::run::plan::CommitWords;
 
-/// An accepted commit.
+/// An accepted commit: its warnings, and its answers about deadlines and staleness.
 ///
 /// # Examples
 ///
@@ -86,7 +82,7 @@ pub struct Commit {
 }
 
 impl Commit {
-    /// Returns the warnings: oddities that the commit accepted.
+    /// Returns the warnings about oddities accepted by the commit.
     ///
     /// ```
     /// # use core::time::Duration;
@@ -105,14 +101,14 @@ impl Commit {
         &self.warnings
     }
 
-    /// Returns for each DAG, in the order of the commit, a bound of its response
-    /// time and the test that proves it, or why there is none.
+    /// Returns the answer for each DAG, in the order of the commit: a bound of the response time
+    /// and the test proving the bound, or the reason why there is none.
     ///
-    /// Bounds hold for the platform's policy, preemption and cores, with its
-    /// measured overheads added to the WCETs
+    /// Bounds hold for the platform's policy, preemption and cores, with the platform's measured
+    /// overheads added to the WCETs
     /// ([`RunConfig::overheads`](crate::platform::RunConfig::overheads)), and as long as no
-    /// instance executes for longer than its WCET. A DAG that is *not proven*
-    /// may meet its deadlines all the same.
+    /// instance executes for longer than its WCET. A DAG that is *not proven* may meet its
+    /// deadlines all the same.
     ///
     /// ```
     /// # use core::time::Duration;
@@ -143,7 +139,7 @@ impl Commit {
         &self.answers.of_dags[self.task_set.find(dag).index()]
     }
 
-    /// Returns the witnesses of the bounds, for `./scripts/check-witness` to compute again.
+    /// Returns the witnesses of the bounds, for recomputation by `./scripts/check-witness`.
     ///
     /// ```
     /// # use core::time::Duration;
@@ -161,18 +157,17 @@ impl Commit {
         self.answers.witness(&self.task_set)
     }
 
-    /// Returns for each subtask that samples a latest value, in the order of the
-    /// commit, how old that value can be; see [`Staleness`].
+    /// Returns the greatest age of each sampled latest value, one entry for each sampling subtask,
+    /// in the order of the commit; see [`Staleness`].
     ///
     /// See [`Latest`](crate::shared::Latest) for an example.
     pub fn staleness(&self) -> &[Staleness] {
         &self.staleness
     }
 
-    /// Returns the first DAG that is not proven to meet its deadlines: one that
-    /// cannot be analysed, else one that is certain to miss them at its WCETs,
-    /// else the most urgent one for which no test gives a bound. `None` if every
-    /// DAG is proven.
+    /// Returns the first DAG not proven to meet its deadlines: a DAG that cannot be analysed, else
+    /// a DAG certain to miss its deadlines at its WCETs, else the most urgent DAG without a bound
+    /// from any test. Returns `None` if every DAG is proven.
     ///
     /// ```
     /// # use core::time::Duration;
@@ -191,11 +186,11 @@ impl Commit {
     }
 }
 
-/// A chain of subtasks from a source to a sink, from DAG to DAG by samples of latest values, and
-/// how long an effect can take along it. Made by [`Commit::chains`] and
+/// A chain of subtasks from a source to a sink, and the longest time of an effect along the chain.
+/// A chain crosses DAGs where a subtask samples a latest value. Made by [`Commit::chains`] and
 /// [`Commit::chains_between`]; measured after a run by the platform's `latencies`.
 ///
-/// [`sched_dag::chains`] says what the times are, and why the bounds hold.
+/// [`sched_dag::chains`] defines the times, and proves the bounds.
 ///
 /// ```
 /// use core::time::Duration;
@@ -233,9 +228,9 @@ impl Commit {
 pub struct EndToEnd {
     /// The chain.
     pub chain: Chain,
-    /// How old an output of it can be at its finish, counted from the nominal release of the job
-    /// that it goes back to; `None` if a DAG of the chain has no proven bound, or one but the
-    /// last is sporadic.
+    /// The greatest age of an output at its finish, counted from the nominal release of the job at
+    /// the chain's beginning from which the output derives. `None` if a DAG of the chain has no
+    /// proven bound, or if a DAG before the last is sporadic.
     pub output_age: Option<Duration>,
     /// The longest reaction time, and the longest data age; `None` if a DAG of the chain has no
     /// proven bound, or is sporadic.
@@ -244,15 +239,15 @@ pub struct EndToEnd {
 }
 
 impl fmt::Display for EndToEnd {
-    /// Writes the subtasks at which it enters and leaves DAGs.
+    /// Writes the subtasks at which the chain enters and leaves DAGs.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.names)
     }
 }
 
 impl Commit {
-    /// Returns the chains that cross DAGs, from each source that samples nothing to each sink
-    /// that no DAG samples; at most 1000.
+    /// Returns the chains crossing DAGs, from each source without samples to each sink not sampled
+    /// by any DAG; at most 1000.
     ///
     /// See [`EndToEnd`].
     pub fn chains(&self) -> Vec<EndToEnd> {
@@ -260,8 +255,8 @@ impl Commit {
         self.with_bounds(chains)
     }
 
-    /// Returns the chains from one subtask to another, each named as `dag/subtask`, by name or
-    /// number; none if there is no such subtask, or nothing leads there.
+    /// Returns the chains from one subtask to another, each subtask given as `dag/subtask`, by name
+    /// or number. The list is empty if there is no such subtask, or no path between the two.
     ///
     /// See [`EndToEnd`].
     pub fn chains_between(&self, from: &str, to: &str) -> Vec<EndToEnd> {
@@ -277,7 +272,7 @@ impl Commit {
         let of_sample = |sample: &Staleness| {
             let (writer, reader) = (sample.writer_dag.id, sample.reader_dag.id);
             let topics = self.task_set.dag(writer).topics();
-            // A writer that was not committed has no topic; the commit has told that already.
+            // An uncommitted writer has no topic; the commit has reported that already.
             let topic = topics.iter().find(|topic| topic.name == sample.topic)?;
             Some(SampledEdge {
                 writer: (writer, topic.writer),
@@ -337,17 +332,17 @@ impl Commit {
 pub struct DagAnswer {
     /// The DAG.
     pub dag: DagLabel,
-    /// Where it runs; `None` if the cores are not divided.
+    /// The DAG's cluster; `None` if the cores are not divided.
     pub cluster: Option<ClusterPlacement>,
-    /// Its table, if lists of cores have the DAG.
+    /// The DAG's table, if the DAG is in lists of cores.
     pub table: Option<TablePlacement>,
     /// The verdict on the DAG.
     pub verdict: Verdict,
     /// The answer about each sink, in the order of registration.
     pub sinks: Vec<SinkAnswer>,
-    /// Where the overheads are from that each instance was charged.
+    /// The origin of the overheads charged to each instance.
     pub overheads: OverheadSource,
-    /// Where the WCET of each subtask is from, in the order of registration.
+    /// The origin of each subtask's WCET, in the order of registration.
     pub wcets: Vec<WcetSource>,
 }
 
@@ -363,15 +358,15 @@ pub struct DagAnswer {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClusterPlacement {
-    /// Which it is.
+    /// The number of the cluster.
     pub cluster: ClusterId,
-    /// The numbers of the cores that may execute it, ascending.
+    /// The numbers of the cores allowed to execute the DAG, ascending.
     pub cores: Vec<u32>,
-    /// Why the commit has put it there; `None` if the app has.
+    /// The reason why the commit has chosen the cluster; `None` if the app has chosen.
     pub why: Option<AssignmentReason>,
 }
 
-/// The table of a DAG: the cores that execute its subtasks in a stated or chosen order.
+/// The table of a DAG: the cores executing its subtasks in a stated or chosen order.
 ///
 /// ```
 /// use fass::commit::TablePlacement;
@@ -387,9 +382,9 @@ pub struct ClusterPlacement {
 pub struct TablePlacement {
     /// The numbers of the cores with lists, ascending.
     pub cores: Vec<u32>,
-    /// How many DAGs are in the table.
+    /// The number of DAGs in the table.
     pub dags: usize,
-    /// Whether the DAG is the first of these.
+    /// Whether the DAG is the first in the table.
     pub is_first: bool,
 }
 
@@ -418,10 +413,9 @@ pub struct TablePlacement {
 pub struct SinkAnswer {
     /// The sink.
     pub sink: SubtaskLabel,
-    /// By when it shall have finished, from the nominal release.
+    /// The deadline of the sink's finish, from the nominal release.
     pub relative_deadline: Duration,
-    /// The most time from a job's nominal release to the sink's finish, if the DAG is
-    /// proven.
+    /// The greatest time from a job's nominal release to the sink's finish, if the DAG is proven.
     pub bound: Option<Duration>,
 }
 
@@ -437,12 +431,12 @@ pub struct SinkAnswer {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Every job is complete within a bound, which is at most the deadline, as
-    /// long as no instance takes longer than its WCET.
+    /// Every job is complete within a bound not beyond the deadline, as long as no instance takes
+    /// longer than its WCET.
     Proven {
-        /// The most time from a job's nominal release to its completion.
+        /// The greatest time from a job's nominal release to its completion.
         bound: Duration,
-        /// The test that gave it.
+        /// The test proving the bound.
         test: SchedulabilityTest,
     },
     /// No test gives a bound.
@@ -458,7 +452,7 @@ impl Verdict {
         }
     }
 
-    /// Returns why there is no bound, if there is none.
+    /// Returns the reason why there is no bound, or `None` for a proven DAG.
     ///
     /// ```
     /// use core::time::Duration;
@@ -479,7 +473,7 @@ impl Verdict {
 #[derive(Clone, Debug)]
 pub(crate) struct CommitAnswers {
     pub(crate) of_dags: Arc<[DagAnswer]>,
-    /// The position of the first DAG that fails.
+    /// The position of the first DAG without a proof.
     pub(crate) first_unproven: Option<usize>,
     /// The bounds, for the platform.
     pub(crate) proven: ProvenBounds,
@@ -487,7 +481,7 @@ pub(crate) struct CommitAnswers {
 }
 
 impl CommitAnswers {
-    /// Analyses what a platform will run on these terms.
+    /// Analyses the task set a platform will run on the given terms.
     pub(crate) fn new(task_set: &TaskSet, terms: &RunConfig) -> Self {
         let settings = terms.settings();
         let answer = analysis::answer(task_set, &settings);
@@ -505,7 +499,7 @@ impl CommitAnswers {
             };
             let cluster = task_set.dag(dag).cluster();
             DagAnswer {
-                // On undivided cores there is nothing to tell.
+                // On undivided cores there is nothing to report.
                 cluster: task_set.is_divided().then(|| ClusterPlacement {
                     cluster,
                     cores: task_set.cores_of_dag(dag, settings.cores),
@@ -533,12 +527,12 @@ impl CommitAnswers {
         }
     }
 
-    /// Returns a witness for the bounds of the DAGs that they were made for.
+    /// Returns a witness for the proven bounds of the DAGs in `task_set`.
     pub(crate) fn witness(&self, task_set: &TaskSet) -> String {
         analysis::witness(task_set, &self.settings)
     }
 
-    /// Returns the warnings that follow: DAG and reason of what is certain.
+    /// Returns the DAGs certain to miss their deadlines, each with the reason, for warnings.
     pub(crate) fn certain_misses(&self) -> impl Iterator<Item = (DagLabel, String)> {
         self.of_dags.iter().filter_map(|answer| {
             let unproven = answer.verdict.unproven()?;
@@ -588,19 +582,19 @@ impl fmt::Display for DagAnswer {
         if let Some(placement) = &self.cluster {
             write!(f, "; it runs {placement}")?;
         }
-        // Of a table of its own the reason for its cores has told.
+        // For a table with a single DAG the cluster's reason has said this already.
         let is_told = self.cluster.as_ref().is_some_and(|of| of.why.is_some());
         if let Some(table) = &self.table
             && (table.dags > 1 || !is_told)
         {
             write!(f, "; it is {table}")?;
         }
-        // What is observed is never called proven.
+        // Observed WCETs are never called proven.
         let observed = self.wcets.iter().filter_map(|source| match source {
             WcetSource::Observed { margin_percent } => Some(margin_percent),
             _ => None,
         });
-        // All observed WCETs of a commit have one margin: it is one file's.
+        // All observed WCETs of a commit come from one file, so they have the same margin.
         if let Some(margin) = observed.clone().next() {
             let (count, all) = (observed.count(), self.wcets.len());
             write!(
@@ -646,7 +640,7 @@ impl fmt::Display for TablePlacement {
     }
 }
 
-/// Cores in words.
+/// Core numbers in words.
 struct CoreNumbers<'c>(&'c [u32]);
 
 impl fmt::Display for CoreNumbers<'_> {
@@ -692,7 +686,7 @@ pub(super) fn staleness(
     found
 }
 
-/// Returns how old a value of a DAG can be, by the answer about that.
+/// Returns the greatest age of a DAG's values, given the answer about the DAG.
 fn bound(writer: &sched_dag::Dag, answer: &DagAnswer) -> Option<Duration> {
     let response = answer.verdict.bound().filter(|_| !writer.is_sporadic())?;
     Duration::from_nanos(writer.renewal_ns()).checked_add(response)

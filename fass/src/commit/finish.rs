@@ -1,14 +1,13 @@
-//! The commit: from drafts to a running plan, or to all that is wrong with them.
+//! The commit: from drafts to a running plan, or to all faults of the drafts.
 //!
-//! Five steps, each of which either goes through for all DAGs or stops there:
+//! A commit has five steps. Each step either succeeds for all DAGs or ends the commit:
 //!
-//! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
-//!    there is one, nothing has happened; the handles are as they were.
-//! 2. *Assign.* Where the platform leaves that to the commit, the cores are divided among the
-//!    DAGs.
-//! 3. *Answer.* The response times are bounded where that can be done, for the
-//!    model that the platform will run. A lacking proof that was demanded ends
-//!    the commit as a fault does.
+//! 1. *Verify.* All faults of all DAGs are collected, from this crate and from the model. If there
+//!    is any, nothing has happened; the handles are unchanged.
+//! 2. *Assign.* Where the platform leaves the division to the commit, or only a division gives a
+//!    demanded proof, the cores are divided among the DAGs.
+//! 3. *Answer.* The response times are bounded where possible, for the platform's model. The lack
+//!    of a demanded proof ends the commit like a fault.
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
 
@@ -33,21 +32,19 @@ use crate::draft::part::{CheckedDag, CommitCheck, Drafts, PartKind, Planner, one
 use crate::platform;
 use crate::platform::{LaunchError, RunConfig};
 
-/// Verifies DAGs and hands them to the installed platform, which schedules them.
+/// Verifies DAGs and hands them to the installed platform for scheduling.
 ///
-/// It ends construction: the DAGs can no longer be changed. They are verified
-/// for the platform's policy and cores, with the paper's construction policy:
-/// one source, one sink, one writer a topic.
+/// The commit ends construction: the DAGs can no longer be changed. The commit verifies the DAGs
+/// for the platform's policy and cores, with the paper's construction policy: one source, one sink,
+/// one writer per topic.
 ///
-/// It also answers about deadlines where WCETs are given; see
-/// [`Commit::answers`].
+/// Given WCETs, the commit also answers about deadlines; see [`Commit::answers`].
 ///
 /// # Errors
 ///
-/// A [`CommitError`] with *every* fault of every DAG. Nothing runs then, and the
-/// handles can still be added to and committed again, with one exception: after
-/// [`Fault::NotLaunched`] the functions are gone with the refused plan, and the
-/// DAGs must be built anew.
+/// A [`CommitError`] with *every* fault of every DAG. Nothing runs then, and the app can still add
+/// to the handles and commit again, with one exception: after [`Fault::NotLaunched`] the functions
+/// are gone with the refused plan, and the DAGs must be built anew.
 ///
 /// # Examples
 ///
@@ -77,18 +74,18 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
     finish_create_dags_with(dags, ConstructionPolicy::paper())
 }
 
-/// Works like [`finish_create_dags`] for other shapes of graph: with several
-/// sources or sinks, or of several parts. Nothing else changes.
+/// Works like [`finish_create_dags`] for other shapes of graphs: with several sources or sinks, or
+/// with several parts. Nothing else changes.
 ///
-/// A topic has one writer whatever `construction` says: an input is one value a job,
-/// and which of two it were would depend on the schedule.
+/// A topic has one writer whatever `construction` says: an input is one value per job, and with two
+/// writers the value would depend on the schedule.
 ///
-/// All sources of a job become ready at its release; a job is complete when all
-/// its sinks are.
+/// All sources of a job become ready at its release; a job is complete when all its sinks are
+/// complete.
 ///
 /// # Errors
 ///
-/// As [`finish_create_dags`], except for the shapes that `construction` allows.
+/// As for [`finish_create_dags`], except for the shapes allowed by `construction`.
 ///
 /// # Examples
 ///
@@ -118,15 +115,16 @@ pub fn finish_create_dags_with(
 }
 
 /// Works like [`finish_create_dags_with`], with a list for each of some cores: the order of
-/// subtasks there, kept in every lap of the DAGs' common period.
+/// subtasks on the core, kept in every lap of the DAGs' common period.
 ///
-/// A word of a list is `DAG.SUBTASK`, or `DAG.SUBTASK#N` for job N of a lap; entries in
-/// parentheses may begin before the entry in front of them has ended. A DAG is in lists whole, and
-/// on the cores of its lists these go before everything else. `docs/dag-file.md` has the notation.
+/// A word of a list is `DAG.SUBTASK`, or `DAG.SUBTASK#N` for job N of a lap; entries in parentheses
+/// may begin before the entry in front of them has ended. If one subtask of a DAG is in lists, all
+/// its subtasks have to be. On their cores, listed subtasks go before everything else.
+/// `docs/dag-file.md` has the notation.
 ///
 /// # Errors
 ///
-/// As [`finish_create_dags_with`], and [`DagFault::CoreList`](sched_dag::DagFault::CoreList).
+/// As for [`finish_create_dags_with`], and [`DagFault::CoreList`](sched_dag::DagFault::CoreList).
 ///
 /// # Examples
 ///
@@ -152,6 +150,7 @@ pub fn finish_create_dags_in_order(
     construction: ConstructionPolicy,
     lists: &[&str],
 ) -> Result<Commit, CommitError> {
+    // Whatever the caller allows: with two writers an input would depend on the schedule.
     let construction = ConstructionPolicy {
         writers: CountLimit::One,
         ..construction
@@ -159,8 +158,8 @@ pub fn finish_create_dags_in_order(
     let drafts: Vec<_> = dags.iter().map(|dag| Rc::clone(&dag.draft)).collect();
     let with = |policy, cores| CommitOptions::new(policy, cores).with_construction(construction);
     let Some(platform) = platform::installed() else {
-        // What else is wrong does not depend on the platform, except for the
-        // attributes; under EDF none is needed.
+        // Without a platform the commit can still report the other faults. Only the needed
+        // attributes depend on the platform; EDF needs none.
         let mut error = match verify(&drafts, with(Policy::Edf, 1), None) {
             Ok(accepted) => CommitError {
                 faults: Vec::new(),
@@ -203,6 +202,7 @@ pub fn finish_create_dags_in_order(
         Arc::clone(&staleness),
     );
     let launched = platform.launch(plan);
+    // The launch has decided whether functions are told a recorded time.
     platform::clock::settle_clock(platform);
     match launched {
         Ok(()) => Ok(Commit {
@@ -215,7 +215,8 @@ pub fn finish_create_dags_in_order(
     }
 }
 
-/// Fixes the set if it has a certificate, unless something may change what runs.
+/// Fixes the set if there is a certificate, and reports success. Fails if a subtask may change the
+/// running DAGs, or a DAG starts paused.
 fn fix(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) -> bool {
     let Some(certificate) = &terms.certificate else {
         return true;
@@ -228,8 +229,8 @@ fn fix(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) -> bool {
     !may_change
 }
 
-/// Divides the cores if the commit is to, or if that alone gives a proof that is demanded. Stated
-/// lists stand for a division.
+/// Divides the cores if the commit has to, or if only a division gives a demanded proof. Stated
+/// lists count as a division.
 fn divide(
     task_set: &mut TaskSet,
     terms: &RunConfig,
@@ -250,8 +251,8 @@ fn divide(
     Ok(())
 }
 
-/// Divides cores that are not, where a proof is demanded that only a division gives. DAGs that are
-/// in modes have to stay together, as a mode is entered by one cluster.
+/// Divides undivided cores, where only a division gives a demanded proof. All DAGs in modes have to
+/// stay together, since a single cluster enters a mode.
 fn divide_to_prove(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) {
     let is_free = |dag: &sched_dag::Dag| !dag.states_cluster();
     if task_set.is_divided() || !task_set.dags().iter().all(is_free) {
@@ -261,6 +262,7 @@ fn divide_to_prove(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) {
     if analysis::answer(task_set, &settings).is_proven() {
         return;
     }
+    // Tried on a copy: where a division gives no proof either, the cores stay undivided.
     let mut divided = task_set.clone();
     let is_assigned = assign_clusters(&mut divided, terms).is_ok();
     let cluster = |dag: &DagId| divided.dag(*dag).cluster();
@@ -276,7 +278,7 @@ fn divide_to_prove(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) {
     }
 }
 
-/// Returns a fault for each DAG that demands a proof and has none.
+/// Returns a fault for each DAG with a demanded but missing proof.
 fn lacking_proofs(drafts: &Drafts, answers: &CommitAnswers) -> Vec<Fault> {
     let demanding =
         (drafts.iter().zip(&*answers.of_dags)).filter(|(draft, _)| draft.borrow().demands_proof);
@@ -289,7 +291,7 @@ fn lacking_proofs(drafts: &Drafts, answers: &CommitAnswers) -> Vec<Fault> {
     lacking.collect()
 }
 
-/// Reports for each DAG whether it stands in the list before, too.
+/// Reports for each DAG whether the DAG occurs earlier in the list, too.
 fn repeated(drafts: &Drafts) -> Vec<bool> {
     let address = |number: usize| Rc::as_ptr(&drafts[number]);
     let mut is_repeated = alloc::vec![false; drafts.len()];
@@ -323,7 +325,7 @@ fn verify(
         }
         let mut spec = draft.spec_with_known_types();
         if specs.len() < number && spec.name.is_empty() {
-            // DAGs were left out before it, so the model counts differently.
+            // DAGs before this one were left out, so the model counts differently.
             spec.to_mut().name = number.to_string();
         }
         let checked = CheckedDag {
@@ -345,7 +347,7 @@ fn verify(
     for (_, check) in one_of_each::<CommitCheck>(drafts) {
         check(drafts, &mut faults);
     }
-    // A commit of nothing but repeated DAGs has been told what is wrong.
+    // For a commit of nothing but repeated DAGs the faults are already reported.
     if specs.is_empty() && !faults.is_empty() {
         let warnings = Vec::new();
         return Err(CommitError { faults, warnings });
@@ -362,8 +364,8 @@ fn verify(
     }
 }
 
-/// Reports whether a fault of the model only repeats one of ours: a period or a
-/// deadline is missing because it was too long to be noted.
+/// Reports whether a fault of the model only repeats a fault of this crate: a period or a deadline
+/// is missing because the stated duration was too long.
 fn is_consequence(fault: &sched_dag::DagFault, ours: &[Fault]) -> bool {
     let (label, missing) = match fault {
         sched_dag::DagFault::MissingPeriod { dag } => (dag, "period"),
@@ -375,8 +377,8 @@ fn is_consequence(fault: &sched_dag::DagFault, ours: &[Fault]) -> bool {
     })
 }
 
-/// Divides a platform's cores for a task set, as [`sched_dag::analysis::assign()`] does; an error
-/// says which DAG gets no cores, and why.
+/// Divides a platform's cores for a task set, like [`sched_dag::analysis::assign()`]. The error
+/// names the DAG without cores, and the reason.
 fn assign_clusters(task_set: &mut TaskSet, terms: &RunConfig) -> Result<(), LaunchError> {
     analysis::assign(task_set, &terms.settings()).map_err(
         |NotAssigned {

@@ -1,12 +1,12 @@
 //! The commit: its options, its answers and its faults.
 //!
-//! [`finish_create_dags`](crate::finish_create_dags) is all that most apps need of it.
+//! Most apps need only [`finish_create_dags`](crate::finish_create_dags).
 //!
-//! - Asked for: other shapes of graph, by [`finish_create_dags_with`], and lists of cores, by
+//! - Options: other shapes of graphs, by [`finish_create_dags_with`], and lists of cores, by
 //!   [`finish_create_dags_in_order`].
-//! - Answered: [`Commit`] has warnings, a [`DagAnswer`] for each DAG with its proven bound or the
-//!   reason that there is none, and how old sampled values can be ([`Staleness`]).
-//! - Refused: a [`CommitError`] has every [`Fault`] of every DAG.
+//! - Answers: a [`Commit`] has warnings, a [`DagAnswer`] for each DAG with its proven bound or the
+//!   reason for the lack of a bound, and the greatest age of sampled values ([`Staleness`]).
+//! - Faults: a [`CommitError`] has every [`Fault`] of every DAG.
 
 pub(crate) mod answer;
 pub(crate) mod finish;

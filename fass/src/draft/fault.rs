@@ -1,8 +1,8 @@
-//! Reasons why a commit is refused, in words.
+//! Reasons for refusing a commit, in words.
 //!
-//! Every fault states a fact, names the offender, and says what to do. The
-//! faults of the graph itself are [`sched_dag::DagFault`]s; the ones here can only
-//! be seen from this side: the shape of functions, durations, the platform.
+//! Every fault states a fact, names the offender, and gives a remedy. The faults of the graph
+//! itself are [`sched_dag::DagFault`]s; the faults here are visible only to this crate: the shape
+//! of functions, durations, the platform.
 
 use alloc::string::String;
 use alloc::vec;
@@ -17,7 +17,7 @@ use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet, Warning, word
 use crate::platform::LaunchError;
 
 worded! {
-    /// One reason why a commit was refused.
+    /// A reason for refusing a commit.
     ///
     /// # Examples
     ///
@@ -46,42 +46,40 @@ worded! {
     /// assert_eq!(codes, ["output_arity"]);
     /// ```
     pub enum Fault {
-        /// No platform is installed that could schedule the DAGs.
+        /// No platform is installed to schedule the DAGs.
         NoPlatform = "no_platform",
             "no platform is installed that could run the DAGs; boot the kernel, or make a \
              `virtual_time::VirtualTime` first";
-        /// The same DAG stands twice in one commit.
+        /// The same DAG occurs twice in one commit.
         GivenTwice { dag: DagLabel } = "given_twice",
             "{dag} is given twice in one commit; give it once";
         /// The DAG was committed before.
         AlreadyCommitted { dag: DagLabel } = "already_committed",
             "{dag} is committed already; build a new DAG and commit that";
-        /// A function takes another number of inputs, `expected`, than its list names
-        /// topics, `given`.
+        /// A function takes `expected` inputs, but its list names `given` topics.
         InputArity { dag: DagLabel, subtask: SubtaskLabel, expected: usize, given: usize } =
             "input_arity",
             "{subtask} of {dag} takes {} but lists {}; list one topic for each element of its \
              argument tuple", CountedNoun(*expected, "input"), CountedNoun(*given, "input topic");
-        /// A function returns another number of outputs, `expected`, than its list names
-        /// topics, `given`.
+        /// A function returns `expected` outputs, but its list names `given` topics.
         OutputArity { dag: DagLabel, subtask: SubtaskLabel, expected: usize, given: usize } =
             "output_arity",
             "{subtask} of {dag} returns {} but lists {}; list one topic for each element of its \
              result tuple", CountedNoun(*expected, "output"), CountedNoun(*given, "output topic");
-        /// A duration, of a DAG or of one of its subtasks, does not fit into 64 bits of
-        /// nanoseconds (584 years); `what` says what it is for.
+        /// A duration, of a DAG or of one of its subtasks, does not fit into 64 bits of nanoseconds
+        /// (584 years); `what` names the kind of duration.
         DurationTooLong { dag: DagLabel, subtask: Option<SubtaskLabel>, what: &'static str } =
             "duration_too_long",
             "the {what} of {}{dag} is too long; give at most {} ns", part(subtask), u64::MAX;
-        /// Two sources of one DAG state different periods, in nanoseconds; `subtask` the
-        /// second one.
+        /// Two sources of one DAG state different periods, in nanoseconds; `subtask` is the second
+        /// source.
         PeriodsDiffer { dag: DagLabel, subtask: SubtaskLabel, first_ns: u64, second_ns: u64 } =
             "periods_differ",
             "{subtask} gives {dag} a period of {:?} where {:?} were given before; a DAG has one \
              period, make two DAGs or give the same period",
             Duration::from_nanos(*second_ns), Duration::from_nanos(*first_ns);
-        /// Of two sources of one DAG one is periodic and one sporadic; `subtask` is the one
-        /// registered second.
+        /// One source of a DAG is periodic and another sporadic; `subtask` is the source registered
+        /// second.
         ActivationsDiffer { dag: DagLabel, subtask: SubtaskLabel } = "activations_differ",
             "{subtask} has a period, and its {dag} is sporadic, released by a signal; make two \
              DAGs, or leave one of the two out";
@@ -89,14 +87,14 @@ worded! {
         WcetsRefused { dag: DagLabel, fault: WcetFault } = "wcets_refused", "{fault}: {dag}";
         /// A part of a DAG is at fault, such as a signal, a device or a mode.
         Worded { code: &'static str, text: String } = of *code, "{text}";
-        /// The commit is to find the clusters, and a DAG gets no cores.
+        /// The commit has to find the clusters, and a DAG gets no cores.
         NotAssigned(error: LaunchError) = "not_assigned", "{error}";
-        /// A certificate fixes the set, and something may change what runs.
+        /// A certificate fixes the set, but something may change the running DAGs.
         NotFixed = "not_fixed",
             "a certificate fixes the set, but a subtask may pause a DAG, enter a mode or end the run, \
              or a DAG starts paused; leave that out, or the certificate";
-        /// The DAG demands a proof that it meets its deadlines, and there is none, for that
-        /// reason. Found only where nothing else is wrong.
+        /// The DAG demands a proof of meeting its deadlines, and there is none; `unproven` has the
+        /// reason. Reported only if there are no other faults.
         NotProven { dag: DagLabel, unproven: UnprovenDag } = "not_proven",
             "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}";
         /// The graph or its attributes are at fault.
@@ -107,7 +105,7 @@ worded! {
     }
 }
 
-/// Returns which part of a DAG is at fault, if it is not the DAG itself.
+/// Returns the part of a DAG at fault, or an empty text for the DAG itself.
 fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
     fmt::from_fn(move |f| match subtask {
         Some(subtask) => write!(f, "{subtask} of "),
@@ -115,9 +113,9 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
     })
 }
 
-/// Why a DAG is not proven to meet its deadlines, with names.
+/// The reason why a DAG is not proven to meet its deadlines, with names.
 ///
-/// Its `Display` states the fact and what to do about it.
+/// Its `Display` states the fact and the remedy.
 ///
 /// # Examples
 ///
@@ -145,22 +143,22 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnprovenDag {
     reason: NotProvenReason,
-    /// The subtasks that the reason is about.
+    /// The subtasks concerned by the reason.
     subtasks: Vec<SubtaskLabel>,
-    /// The other DAG that the reason is about.
+    /// The other DAG concerned by the reason.
     other: Option<DagLabel>,
-    /// The lock that the reason is about.
+    /// The lock concerned by the reason.
     lock: String,
 }
 
 impl UnprovenDag {
-    /// Returns the reason, by which a program may decide.
+    /// Returns the reason, for decisions of a program.
     pub const fn reason(&self) -> NotProvenReason {
         self.reason
     }
 
-    /// Reports whether deadlines will be missed when every instance takes its
-    /// WCET, rather than merely not being proven to be met.
+    /// Reports whether deadlines are certain to be missed when every instance takes its WCET,
+    /// rather than merely not proven to be met.
     pub const fn is_certain(&self) -> bool {
         self.reason.is_certain()
     }
@@ -198,7 +196,7 @@ impl UnprovenDag {
     }
 }
 
-/// So many subtasks without WCET are named, and the rest counted.
+/// The greatest number of subtasks without a WCET listed by name; the others are counted.
 const MOST_NAMED: usize = 8;
 
 impl fmt::Display for UnprovenDag {
@@ -255,10 +253,10 @@ impl fmt::Display for UnprovenDag {
     }
 }
 
-/// A refused commit: all its faults, and the warnings.
+/// The error of a refused commit: all its faults, and the warnings.
 ///
-/// Its `Display` prints one line for each fault; of very many the first 20, and how
-/// many more there are.
+/// Its `Display` prints one line for each fault; with more than 20 faults, the first 20 and the
+/// number of the others.
 ///
 /// # Examples
 ///
@@ -295,7 +293,7 @@ impl CommitError {
         &self.faults
     }
 
-    /// Returns the warnings, which alone would not have refused the commit.
+    /// Returns the warnings. They alone would not have refused the commit.
     ///
     /// ```
     /// # let machine = virtual_time::VirtualTime::new();

@@ -1,11 +1,10 @@
-//! Drafts: DAGs as registered before their commit.
+//! Drafts: registered DAGs before their commit.
 //!
-//! A draft accepts everything and remembers what it could not express as a
-//! [`DagSpec`]: durations that do not fit, topic lists that do not fit the
-//! function. The commit reports those together with all other faults. So that
-//! one mistake is not reported as several, a subtask whose list does not fit
-//! keeps its topics in the spec, but with the type [`UnstatedType`], which the commit
-//! takes to be whatever the topic's other end says.
+//! A draft accepts everything, and also remembers mistakes inexpressible in a [`DagSpec`]:
+//! durations out of range, topic lists not fitting the function. The commit reports these together
+//! with all other faults. A subtask with a misfitting list keeps its topics in the spec, but with
+//! the type [`UnstatedType`], and the commit then takes the type from the topic's other end. So one
+//! mistake is not reported as several.
 
 pub(crate) mod fault;
 pub(crate) mod part;
@@ -34,38 +33,41 @@ use part::{CheckedDag, DraftPart, PartKind};
 #[derive(Default)]
 pub(crate) struct DagDraft {
     pub(crate) spec: DagSpec,
-    /// One for each of `spec.subtasks`.
+    /// One function for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
     pub(crate) is_committed: bool,
-    /// A source that states a period.
+    /// A source with a stated period.
     periodic_source: Option<SubtaskLabel>,
-    /// Whether the relative deadline is the DAG's own, rather than its sinks' longest.
+    /// Whether the DAG states its own relative deadline; otherwise the longest of its sinks'
+    /// deadlines holds.
     states_deadline: bool,
-    /// Whether the commit is to be refused unless the deadlines are proven.
+    /// Whether the commit fails unless the deadlines are proven.
     pub(crate) demands_proof: bool,
-    /// Faults that are known but for the label of its DAG.
+    /// Faults found at registration, complete except for the label of the DAG.
     pub(crate) flaws: Vec<Box<dyn Fn(DagLabel) -> Fault>>,
-    /// All else that it states, in the order of registration.
+    /// All other statements of the DAG, in the order of registration.
     pub(crate) parts: Vec<(PartKind, Box<dyn DraftPart>)>,
-    /// Which DAG it is, for others that send it signals, or pause it.
+    /// The identity of the DAG, for raising its signal or pausing the DAG.
     pub(crate) target: Arc<RequestTarget>,
 }
 
-/// The topics that a subtask names, and the types of its function.
+/// The topics named for a subtask, and the types of its function.
 #[derive(Default)]
 pub(crate) struct NamedTopics<'a> {
     pub(crate) inputs: (&'a [&'a str], &'a [MessageType]),
     pub(crate) outputs: (&'a [&'a str], &'a [MessageType]),
 }
 
-/// The type of a topic's end that no function states.
+/// The type of a topic's end without a known type.
 #[derive(Clone)]
 struct UnstatedType;
 
 impl DagDraft {
-    /// Takes what was registered, for the commit, and leaves what handles may still ask for.
+    /// Takes the registered DAG out for the commit, and leaves a remainder for later calls on
+    /// handles.
     pub(crate) fn close(&mut self) -> Self {
-        // What stays answers for the handle: its name in complaints, and where its signals go.
+        // The remainder answers for the handle: with the name in complaints, and with the target of
+        // signals.
         let committed = Self {
             spec: DagSpec {
                 name: self.spec.name.clone(),
@@ -89,7 +91,7 @@ impl DagDraft {
         let (outputs, output_types) = ends.outputs;
         self.make_bodies.push(body);
         let subtask = self.next_label(&attributes);
-        // Noted, not reported: a commit tells all faults of all DAGs at once.
+        // Noted, not reported: a commit reports all faults of all DAGs at once.
         if input_types.len() != inputs.len() {
             let subtask = subtask.clone();
             let (expected, given) = (input_types.len(), inputs.len());
@@ -119,21 +121,20 @@ impl DagDraft {
         subtask
     }
 
-    /// Returns the spec of a subtask by its attributes, without its ports.
+    /// Returns the spec of a subtask from its attributes, without its ports.
     fn specify(&mut self, subtask: &SubtaskLabel, attributes: SubtaskAttributes) -> SubtaskSpec {
         let wcet = attributes.wcet;
-        // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic
-        // here.
+        // A duration not fitting into nanoseconds becomes a fault of the commit, not a panic here.
         let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
         let mut waits = alloc::vec![Wait::default(); attributes.waits.len()];
         for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits) {
             wait.limit_ns = self.convert(limit, Some(subtask), "wait").unwrap_or(0);
-            // Else the WCET of the first segment would pass for a sum of which nothing is known for
-            // the segments; the verification refuses 0.
+            // Otherwise the WCET of the first segment would pass for the sum of all segments,
+            // although nothing is known of the others; the verification refuses 0.
             let segment = segment.or(wcet.map(|_| Duration::ZERO));
             wait.segment_ns = segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
         }
-        // The sum; where a part is missing, the verification says so.
+        // The sum of all segments; the verification reports a missing part.
         let later_ns = waits.iter().filter_map(|wait| wait.segment_ns);
         let wcet_ns = wcet_ns.map(|first_ns| later_ns.fold(first_ns, u64::saturating_add));
         let budget = attributes.budget;
@@ -150,13 +151,13 @@ impl DagDraft {
         }
     }
 
-    /// Replaces the period, whatever a source said before.
+    /// Replaces the period, whatever a source has stated before.
     pub(crate) fn replace_period(&mut self, period: Duration) {
         let period_ns = self.convert(period, None, "period");
         self.spec.period_ns = period_ns.or(self.spec.period_ns);
     }
 
-    /// States the DAG's own relative deadline.
+    /// Sets the DAG's own relative deadline.
     pub(crate) fn set_dag_deadline(&mut self, deadline: Duration) {
         if let Some(deadline_ns) = self.convert(deadline, None, "relative deadline") {
             self.spec.relative_deadline_ns = Some(deadline_ns);
@@ -168,10 +169,10 @@ impl DagDraft {
         self.spec.offset_ns = self.convert(offset, None, "offset").unwrap_or(0);
     }
 
-    /// Makes the DAG sporadic, which it cannot be if a source states a period.
+    /// Makes the DAG sporadic; a fault if a source states a period.
     pub(crate) fn set_sporadic(&mut self, min_inter_arrival: Duration) {
         self.spec.activation = Activation::Sporadic;
-        // The analysis takes the minimum inter-arrival time for the period.
+        // The analysis uses the minimum inter-arrival time as the period.
         self.replace_period(min_inter_arrival);
         if let Some(subtask) = self.periodic_source.clone() {
             self.flaw(move |dag| Fault::ActivationsDiffer {
@@ -181,7 +182,7 @@ impl DagDraft {
         }
     }
 
-    /// States the period of a source, which that of all others must be.
+    /// Sets the period of a source. All sources of a DAG need the same period.
     #[inline(never)]
     pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
         if self.spec.activation == Activation::Sporadic {
@@ -195,7 +196,7 @@ impl DagDraft {
         let Some(period_ns) = self.convert(period, Some(&subtask), "period") else {
             return;
         };
-        // The first source sets it; a second one that differs is a fault.
+        // The first source sets the period; a second source with another period is a fault.
         let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
         if first_ns != period_ns {
             self.flaw(move |dag| Fault::PeriodsDiffer {
@@ -207,29 +208,29 @@ impl DagDraft {
         }
     }
 
-    /// States the relative deadline of a sink. The DAG's is that of the sink which has the
-    /// longest, unless it states its own.
+    /// Sets the relative deadline of a sink. A DAG without a deadline of its own has the longest
+    /// deadline of its sinks.
     #[inline(never)]
     pub(crate) fn set_sink_deadline(&mut self, deadline: Duration, sink: &SubtaskLabel) {
         let Some(deadline_ns) = self.convert(deadline, Some(sink), "relative deadline") else {
             return;
         };
         self.spec.subtasks[sink.id.index()].relative_deadline_ns = Some(deadline_ns);
-        // Without a deadline of its own the DAG has that of its latest sink.
+        // Without a deadline of its own the DAG has the deadline of its latest sink.
         if !self.states_deadline {
             let longest_ns = self.spec.relative_deadline_ns.max(Some(deadline_ns));
             self.spec.relative_deadline_ns = longest_ns;
         }
     }
 
-    /// Notes that completions of a subtask may ask for something.
+    /// Records that completions of a subtask may make a request.
     pub(crate) fn ask(&mut self, subtask: usize, of: RequestKind) -> Wish {
         let wish = Wish::default();
         let asked = InstanceRequests {
             wish: Arc::clone(&wish),
             of,
         };
-        // A wish becomes a request by the completion (R3), and by nothing else.
+        // Only the completion turns a wish into a request (R3).
         self.act(subtask, Box::new(asked));
         wish
     }
@@ -238,7 +239,7 @@ impl DagDraft {
         self.flaws.push(Box::new(flaw));
     }
 
-    /// Makes waits of a subtask a fault, if it states any.
+    /// Makes any declared waits of a subtask a fault.
     pub(crate) fn refuse_waits(&mut self, code: &'static str, subtask: usize, says: &'static str) {
         if !self.spec.subtasks[subtask].waits.is_empty() {
             let fault = move |of: &CheckedDag<'_>| Some(of.fault(code, subtask, says));
@@ -246,7 +247,7 @@ impl DagDraft {
         }
     }
 
-    /// Returns how messages call a subtask that is registered.
+    /// Returns the label of a registered subtask, used in messages.
     pub(crate) fn label(&self, subtask: usize) -> SubtaskLabel {
         SubtaskLabel {
             id: SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX)),
@@ -254,8 +255,8 @@ impl DagDraft {
         }
     }
 
-    /// Returns the spec with every [`UnstatedType`] end replaced by its other end's
-    /// type, where that is known.
+    /// Returns the spec with every [`UnstatedType`] end replaced by the type of its other end, if
+    /// known.
     pub(crate) fn spec_with_known_types(&self) -> Cow<'_, DagSpec> {
         let mut spec = Cow::Borrowed(&self.spec);
         if self.has::<Rc<dyn AnyLatest>>() {
@@ -268,7 +269,7 @@ impl DagDraft {
         let unknown = MessageType::of::<UnstatedType>().id();
         let ports = (self.spec.subtasks.iter())
             .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs));
-        // The usual case borrows the spec as it is.
+        // The usual case borrows the spec unchanged.
         if ports.clone().all(|port| port.type_id != unknown) {
             return spec;
         }
@@ -279,13 +280,13 @@ impl DagDraft {
             .collect();
         for subtask in &mut spec.to_mut().subtasks {
             for port in subtask.inputs.iter_mut().chain(&mut subtask.outputs) {
-                // A list of the wrong length has no types; those of the other ends keep it from
-                // being reported twice.
+                // A list of the wrong length has no types; with the types of the other ends, no
+                // second fault is reported for the list.
                 if port.type_id == unknown
                     && let Some(other_end) = known.iter().find(|other| other.topic == port.topic)
                 {
-                    // One end with a known type is enough; two that differ are a fault of their
-                    // own.
+                    // One end with a known type is enough; two different known types are a fault of
+                    // their own.
                     port.clone_from(other_end);
                 }
             }
@@ -293,7 +294,7 @@ impl DagDraft {
         spec
     }
 
-    /// Converts a duration, or notes that it is too long.
+    /// Converts a duration to nanoseconds, or records a fault if it is too long.
     #[inline(never)]
     fn convert(
         &mut self,
@@ -322,10 +323,10 @@ impl DagDraft {
     }
 }
 
-/// Pairs topics with types; all types are unknown if the numbers differ, since
-/// it cannot be told which one is missing.
+/// Pairs topics with types. If the numbers differ, all types are unknown, since the missing topic
+/// is unknown.
 fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
-    // Which topic has which type is not known if the counts differ.
+    // Without equal counts the assignment of types to topics is unknown.
     let fits = topics.len() == types.len();
     (topics.iter().enumerate())
         .map(|(index, topic)| {
@@ -338,8 +339,8 @@ fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
 
 /// Attributes of a subtask beyond its function and its topics.
 ///
-/// The paper leaves these to the scheduling algorithm; all of them are optional
-/// here, and the commit says when the chosen policy needs one that is missing.
+/// The paper leaves the attributes to the scheduling algorithm. All of them are optional here, and
+/// the commit reports a missing attribute if the chosen policy needs the attribute.
 ///
 /// # Examples
 ///
@@ -358,7 +359,7 @@ pub struct SubtaskAttributes {
     pub(crate) name: String,
     pub(crate) priority: Option<u32>,
     pub(crate) wcet: Option<Duration>,
-    /// The limits of its waits, and the WCETs of the segments behind them.
+    /// The limits of the waits, each with the WCET of the segment after the wait.
     waits: Vec<(Duration, Option<Duration>)>,
     pub(crate) budget: Option<Duration>,
     stack_bytes: Option<u64>,
@@ -366,11 +367,10 @@ pub struct SubtaskAttributes {
 }
 
 impl SubtaskAttributes {
-    /// Starts with a name, by which reports and error messages call the subtask.
+    /// Makes attributes with a name, used for the subtask in reports and error messages.
     ///
-    /// Names are unique within a DAG. Without a name
-    /// ([`default`](Self::default)) messages say `subtask 2`, counting from 0
-    /// in the order of registration.
+    /// Names are unique within a DAG. Without a name ([`default`](Self::default)) messages say
+    /// `subtask 2`, counting from 0 in the order of registration.
     pub fn named(name: &str) -> Self {
         Self {
             name: name.into(),
@@ -380,30 +380,30 @@ impl SubtaskAttributes {
 
     /// Sets the static priority; the *smaller* number is the higher priority.
     ///
-    /// Used under [`Policy::StaticPriority`](crate::Policy::StaticPriority).
-    /// Without it the commit derives one from the graph.
+    /// Used under [`Policy::StaticPriority`](crate::Policy::StaticPriority). By default the commit
+    /// derives a priority from the graph.
     pub fn priority(mut self, priority: u32) -> Self {
         self.priority = Some(priority);
         self
     }
 
-    /// Sets the worst-case execution time: the longest that one instance
-    /// executes, preemption not counted.
+    /// Sets the worst-case execution time: the longest execution of one instance, without preempted
+    /// time.
     ///
-    /// At most `u64::MAX` nanoseconds; a longer one is a fault at commit. After a
-    /// [`wait`](Self::wait) it is that of the segment which follows that wait, and only what
-    /// executes counts.
+    /// At most `u64::MAX` nanoseconds; a longer time is a fault at commit. After a call of
+    /// [`wait`](Self::wait) the time is the WCET of the segment following that wait, and the
+    /// waiting itself does not count.
     pub fn wcet(mut self, wcet: Duration) -> Self {
         let segment = self.waits.last_mut().map(|(_, segment)| segment);
         *segment.unwrap_or(&mut self.wcet) = Some(wcet);
         self
     }
 
-    /// Adds a wait, with the time after which it ends at the latest, whatever a device does.
+    /// Adds a wait, with a limit after which the wait ends at the latest, whatever a device does.
     ///
     /// Each instance of an [async subtask](crate::Dag::register_async_subtask) takes its waits one
-    /// after the other, each once; what it executes between them are its *segments*. Their WCETs are
-    /// stated where they stand, of all segments or of none:
+    /// after the other, each once. The parts executed between the waits are the instance's
+    /// *segments*. Their WCETs are stated in the same order, for all segments or for none:
     ///
     /// ```
     /// use core::time::Duration;
@@ -417,27 +417,26 @@ impl SubtaskAttributes {
         self
     }
 
-    /// Sets the execution budget: an instance that executes longer, preemption
-    /// not counted, is ended by the platform as a fault, and its DAG with it.
+    /// Sets the execution budget: the platform ends an instance executing longer, without preempted
+    /// time, as a fault, and the instance's DAG as well.
     ///
-    /// Without it the platform may enforce a multiple of the
-    /// [WCET](Self::wcet). At most `u64::MAX` nanoseconds; a longer one is a
-    /// fault at commit.
+    /// Without a budget the platform may enforce a multiple of the [WCET](Self::wcet). At most
+    /// `u64::MAX` nanoseconds; a longer budget is a fault at commit.
     pub fn budget(mut self, budget: Duration) -> Self {
         self.budget = Some(budget);
         self
     }
 
-    /// Sets the stack that the subtask needs, in bytes, from 16 KiB to 1 MiB; another number is
-    /// a fault at commit. Without it the kernel gives 64 KiB. The stacks of a commit are all as
-    /// large as the largest; `measure=stacks` says how much of them each subtask uses.
+    /// Sets the size of the subtask's stack in bytes, from 16 KiB to 1 MiB; any other number is a
+    /// fault at commit. By default the kernel gives 64 KiB. All stacks of a commit are as large as
+    /// the largest; `measure=stacks` shows how much of its stack each subtask uses.
     pub fn stack_bytes(mut self, bytes: u64) -> Self {
         self.stack_bytes = Some(bytes);
         self
     }
 
-    /// States that a started instance keeps its core until it finishes, although the
-    /// platform preempts others.
+    /// Makes the subtask non-preemptive: a started instance keeps its core until it finishes,
+    /// although the platform preempts others.
     pub fn non_preemptive(mut self) -> Self {
         self.non_preemptive = true;
         self

@@ -1,11 +1,12 @@
-//! Parts of a draft: the statements of a DAG beyond its times, its subtasks and its edges, such as
+//! Parts of a draft: all statements of a DAG beyond its times, its subtasks and its edges, such as
 //! devices, signals and modes.
 //!
-//! A part finds its own faults, and ties itself to the plan. The file in `api` by which an app states
-//! it has both, and the commit finds them here, so the commit names few of them.
+//! A part checks itself for faults, and ties itself to the plan. Both are in the file in `api` with
+//! the app's call for the part. The commit finds the parts here, so the commit names few of them.
 //!
-//! A new part is a file in `api` that [adds](DagDraft::add) it, and a row of [`PartKind`]; what apps
-//! name of it is exported by `api/mod.rs`, and a fault of it has a row in `docs/errors.md`.
+//! A new part needs a file in `api` [adding](DagDraft::add) the part, and a row of [`PartKind`];
+//! `lib.rs` exports the names needed by apps, and each fault of the part has a row in
+//! `docs/errors.md`.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -24,7 +25,7 @@ use super::fault::Fault;
 use crate::run::effect::{Effect, RequestTarget};
 use crate::run::plan::{Plan, SubtaskCode};
 
-/// The kinds of parts, in the order in which a commit tells their faults.
+/// The kinds of parts, in the order in which a commit reports their faults.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum PartKind {
     Sample,
@@ -45,23 +46,23 @@ pub(crate) enum PartKind {
 
 /// A statement of a DAG.
 pub(crate) trait DraftPart: Any {
-    /// Returns its fault, if it has one.
+    /// Returns the part's fault, if there is one.
     fn check(&self, _of: &CheckedDag<'_>) -> Option<Fault> {
         None
     }
 
-    /// Ties it to the bodies of its DAG, after those that were added before.
+    /// Ties the part to the bodies of its DAG, after the parts added before.
     fn tie(self: Box<Self>, _dag: &mut TiedDag<'_>) {}
 }
 
 /// All drafts of a commit.
 pub(crate) type Drafts = [Rc<RefCell<DagDraft>>];
 
-/// Adds the faults that only all DAGs of a commit together show. It is a part that each DAG adds which
-/// has a part of its kind.
+/// Adds the faults visible only from all DAGs of a commit together. Such a check is itself a part,
+/// added by each DAG with a part of the kind.
 pub(crate) type CommitCheck = fn(&Drafts, &mut Vec<Fault>);
 
-/// Completes the plan of a commit, before the first DAG is tied; a part as a [`CommitCheck`] is.
+/// Completes the plan of a commit, before the first DAG is tied; a part like a [`CommitCheck`].
 pub(crate) type Planner = fn(&Drafts, &mut Plan);
 
 type Tie = Box<dyn FnOnce(&mut TiedDag<'_>)>;
@@ -70,7 +71,7 @@ impl DraftPart for CommitCheck {}
 
 impl DraftPart for Planner {}
 
-/// A function that looks for a fault is a part.
+/// A function looking for a fault is a part.
 impl<F: Fn(&CheckedDag<'_>) -> Option<Fault> + 'static> DraftPart for F {
     fn check(&self, of: &CheckedDag<'_>) -> Option<Fault> {
         self(of)
@@ -83,19 +84,19 @@ impl DraftPart for Tie {
     }
 }
 
-/// A DAG of a commit that is checked.
+/// A DAG of a commit during the check.
 pub(crate) struct CheckedDag<'c> {
     pub(crate) drafts: &'c Drafts,
     pub(crate) draft: &'c DagDraft,
     pub(crate) label: DagLabel,
 }
 
-/// A DAG whose bodies are made.
+/// A DAG with its bodies made.
 pub(crate) struct TiedDag<'t> {
     pub(crate) verified: &'t Dag,
     pub(crate) target: &'t Arc<RequestTarget>,
     pub(crate) bodies: &'t mut Vec<SubtaskCode>,
-    /// The DAG that gets a signal when a fault ends this one.
+    /// The DAG to get a signal when a fault ends this DAG.
     pub(crate) after_fault: &'t mut Option<DagId>,
 }
 
@@ -105,13 +106,13 @@ impl DagDraft {
         self.parts.push((kind, Box::new(part)));
     }
 
-    /// Adds a part that ties something.
+    /// Adds a part whose only work is tying.
     pub(crate) fn tie(&mut self, tie: impl FnOnce(&mut TiedDag<'_>) + 'static) {
         let tie: Tie = Box::new(tie);
         self.add(PartKind::Effect, tie);
     }
 
-    /// Adds an effect of a subtask's completions. They happen in the order of registration.
+    /// Adds an effect of a subtask's completions. Effects happen in the order of registration.
     pub(crate) fn act(&mut self, subtask: usize, effect: Box<dyn Effect>) {
         self.tie(move |dag| dag.bodies[subtask].add_effects([effect]));
     }
@@ -122,14 +123,14 @@ impl DagDraft {
         parts.filter_map(|(_, part)| (&**part as &dyn Any).downcast_ref())
     }
 
-    /// Reports whether it has a part of a type.
+    /// Reports whether the draft has a part of a type.
     pub(crate) fn has<P: DraftPart>(&self) -> bool {
         self.all::<P>().next().is_some()
     }
 }
 
 impl CheckedDag<'_> {
-    /// Adds the faults of its parts.
+    /// Adds the faults of the DAG's parts.
     pub(crate) fn check(&self, faults: &mut Vec<Fault>) {
         let parts = &self.draft.parts;
         let order = sorted_by_key(parts.len(), |number| parts[number].0);
@@ -148,7 +149,7 @@ impl CheckedDag<'_> {
     }
 }
 
-/// Returns the parts of a type that a commit has, one of each kind, in the order of these.
+/// Returns a commit's parts of type `P`, one of each kind, in the order of the kinds.
 pub(crate) fn one_of_each<P: DraftPart + Copy>(drafts: &Drafts) -> Vec<(PartKind, P)> {
     let mut found: Vec<(PartKind, P)> = Vec::new();
     for draft in drafts {
@@ -163,13 +164,13 @@ pub(crate) fn one_of_each<P: DraftPart + Copy>(drafts: &Drafts) -> Vec<(PartKind
     found
 }
 
-/// Returns the DAG that is meant.
+/// Returns the DAG identified by a target.
 pub(crate) fn dag_of(drafts: &Drafts, target: &Arc<RequestTarget>) -> Option<DagId> {
     let is_it = |other: &Rc<RefCell<DagDraft>>| Arc::ptr_eq(&other.borrow().target, target);
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
 }
 
-/// Returns how faults of a whole commit name a DAG.
+/// Returns the name of a DAG in faults of a whole commit.
 pub(crate) fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
     let mut name = drafts[dag.index()].borrow().spec.name.clone();
     if name.is_empty() {

@@ -1,4 +1,4 @@
-//! The reports of platforms to their [edges](super::Platform::at_edge), the same on each.
+//! Reports of platforms to their [edges](super::Platform::at_edge), the same for all platforms.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,18 +8,18 @@ use super::{LaunchError, Platform, ask_edge, with_edge};
 use crate::edge::{BootRecord, Sink};
 use crate::run::plan::Plan;
 
-/// Whether a plan has been launched with a wish, so that events are of interest.
+/// Whether a launched plan is recorded or replayed, and so needs the events.
 static IS_ON: AtomicBool = AtomicBool::new(false);
 
-/// Sets recording or replay of a plan up on a platform, if it was asked for, restores its states, and
-/// adds it to the record, if one is kept.
+/// Sets up recording or replay of a plan on a platform, if requested, restores the plan's states,
+/// and adds the plan to the record, if one is kept.
 ///
 /// See [`Platform`].
 ///
 /// # Errors
 ///
-/// If nothing of the plan is recorded, it does not fit a replay, or it is a second one; or its states
-/// cannot be restored.
+/// If nothing of the plan is recorded, if the plan does not fit a replay or is a second plan, or if
+/// its states cannot be restored.
 pub fn launch<S: Sink + Send + 'static>(
     platform: &impl Platform,
     plan: &mut Plan,
@@ -40,7 +40,8 @@ pub fn launch<S: Sink + Send + 'static>(
     Ok(())
 }
 
-/// Takes note that an instance has failed, and when on the clock. The scheduler's lock is held.
+/// Reports the failure of an instance to the edge, with its time on the clock. The scheduler's lock
+/// is held.
 ///
 /// See [`Platform`].
 pub fn failed(instance: Instance, clock_ns: u64) {
@@ -49,7 +50,8 @@ pub fn failed(instance: Instance, clock_ns: u64) {
     }
 }
 
-/// Takes what became of a job or an instance, if it is of interest. The scheduler's lock is held.
+/// Reports the fate of a job or an instance to the edge, if the edge needs the report. The
+/// scheduler's lock is held.
 ///
 /// See [`Platform`].
 pub fn happened(notice: &DriverNotice) {

@@ -1,4 +1,4 @@
-//! Time, as functions are told it and spend it.
+//! Time as seen and spent by functions.
 
 use core::time::Duration;
 
@@ -21,16 +21,15 @@ use crate::run::cell::CurrentIndex;
 pub enum Occupation {
     /// The processor computes until the time is over.
     Spin,
-    /// The processor halts until the time is over, while the scheduler sees the
-    /// instance run. More busy cores can then be studied than the host has.
+    /// The processor halts until the time is over, while the scheduler sees the instance run. So
+    /// more cores can be busy than the host has.
     Hold,
 }
 
 /// Executes for `duration` on the calling instance's core, inside a subtask.
 ///
-/// Stands for computation that an app does not have yet, or whose time is what
-/// is being studied. Preempted time does not count. In virtual time it is the
-/// only thing that takes time.
+/// Stands for computation still missing in an app, or for work whose time is being studied.
+/// Preempted time does not count. In virtual time only this function takes time.
 ///
 /// # Panics
 ///
@@ -68,10 +67,10 @@ pub fn execute_for(duration: Duration, how: Occupation) {
     expect_installed().execute_for(duration, how);
 }
 
-/// The clock: the platform's, unless it has named another one.
+/// The clock in use: the platform's `now_ns`, unless the platform has named another clock.
 static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&ASK_THE_PLATFORM);
 
-/// Tells the time, as [`now_ns`] does.
+/// A function returning the time in nanoseconds, like [`now_ns`].
 pub type Clock = fn() -> u64;
 
 pub(super) static ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
@@ -93,7 +92,7 @@ pub fn now_ns() -> u64 {
     CLOCK.get()()
 }
 
-/// Tells functions the time where that is recorded or replayed.
+/// Tells functions the time where the told time is recorded or replayed.
 static TOLD: Clock = || {
     let platform = expect_installed();
     let clock_ns = platform.now_ns();
@@ -101,7 +100,7 @@ static TOLD: Clock = || {
     with_edge(|edge| edge.tell_time(running, clock_ns)).unwrap_or(clock_ns)
 };
 
-/// Settles the clock behind [`now_ns`].
+/// Chooses the clock behind [`now_ns`].
 pub(crate) fn settle_clock(platform: &dyn Platform) {
     let tells = ask_edge(platform, |edge| edge.tells()).unwrap_or(false);
     CLOCK.set(if tells { &TOLD } else { platform.clock() });

@@ -1,14 +1,13 @@
-//! The platform: the machine below `fass`, and how one offers itself.
+//! The platform: the machine below `fass`, and its interface.
 //!
-//! `fass` names no kernel. A platform (the kernel, or virtual time on the host)
-//! installs itself once, as a logger or an allocator does, before the app
-//! commits its DAGs. The commit asks it for the policy and the cores to verify
-//! against, and leaves the [`Plan`] with it.
+//! `fass` names no kernel. A platform (the kernel, or virtual time on the host) installs itself
+//! once, like a logger or an allocator, before the app commits its DAGs. The commit asks the
+//! platform for the policy and the cores needed for verification, and hands the [`Plan`] over.
 //!
-//! # What is kept from apps
+//! # Code closed to apps
 //!
-//! Code that is called under a lock of the platform's, or in its interrupts, is no app's to give: the
-//! clock, work at the edge, what happens when a question is there, the ends of topics, parameters.
+//! Apps cannot supply code called under a lock of the platform or in its interrupts: the clock,
+//! work at the edge, callbacks for new questions, the ends of topics, parameters.
 //!
 //! ```compile_fail,E0603
 //! fass::platform::with_edge(|_| panic!("under a lock"));
@@ -91,11 +90,11 @@ pub use crate::run::lock_words::LockWords;
 pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 pub use crate::run::wire::buffer::Buffer;
 
-/// A machine that schedules committed DAGs.
+/// A machine scheduling committed DAGs.
 ///
 /// # Examples
 ///
-/// The smallest platform, which accepts a plan and runs one job of it:
+/// The smallest platform accepts a plan and runs one job:
 ///
 /// ```standalone_crate
 /// use core::time::Duration;
@@ -126,21 +125,22 @@ pub use crate::run::wire::buffer::Buffer;
 /// assert_eq!(fass::now_ns(), 0);
 /// ```
 pub trait Platform: Sync {
-    /// Returns on what terms DAGs run: a commit verifies and answers by these.
+    /// Returns the terms on which DAGs run, needed by a commit for verification and answers.
     fn terms(&self) -> RunConfig;
 
     /// Returns the time since the platform's start, in nanoseconds.
     fn now_ns(&self) -> u64;
 
-    /// Returns the clock behind [`crate::now_ns`], which is [`now_ns`](Self::now_ns) at first. It is
-    /// asked for at the installation and after each launch, for one that takes fewer instructions.
-    /// Where the [edge](Self::at_edge) records the time that functions are told, its clock does so.
+    /// Returns the clock behind [`crate::now_ns`]; by default [`now_ns`](Self::now_ns) of the
+    /// platform. A platform may name a clock with fewer instructions. `fass` asks at the
+    /// installation and after each launch. Where the [edge](Self::at_edge) records the time told to
+    /// functions, a clock of the edge is used instead.
     fn clock(&self) -> &'static Clock {
         &clock::ASK_THE_PLATFORM
     }
 
-    /// Reports whether the caller may call the app's code: it holds no lock of the platform's, and
-    /// interrupts are enabled. Only a debug build asks ([`call_app`]).
+    /// Reports whether the caller may call the app's code: the caller holds no lock of the
+    /// platform, and interrupts are enabled. Only a debug build asks ([`call_app`]).
     fn may_call_app(&self) -> bool {
         true
     }
@@ -148,113 +148,114 @@ pub trait Platform: Sync {
     /// Occupies the calling instance's core for `duration` of execution time.
     fn execute_for(&self, duration: Duration, how: Occupation);
 
-    /// Takes a signal to a sporadic DAG of the plan with a number, from outside all
-    /// subtasks ([`Signal::raise`](crate::shared::Signal::raise)); does nothing if that plan
-    /// is not, or no longer, there.
+    /// Takes a signal to a sporadic DAG of the plan with number `plan`, from outside all subtasks
+    /// ([`Signal::raise`](crate::shared::Signal::raise)). Does nothing if that plan is not, or no
+    /// longer, there.
     ///
     /// # Panics
     ///
-    /// If called by a subtask's function. A platform that does not define this
-    /// panics in any case: then only subtasks raise signals.
+    /// If called by a subtask's function. The default panics in any case: then only subtasks raise
+    /// signals.
     #[track_caller]
     fn raise(&self, _plan: u64, _dag: DagId) {
         panic!("this platform takes no signals from outside; raise them in subtasks");
     }
 
-    /// Takes the answer to a wait of the plan with a number, from outside all subtasks
-    /// ([`DeviceDriver::answer`](crate::shared::DeviceDriver::answer)), and passes it to the scheduler
-    /// of the wait's DAG as a [`Request::Answer`]; does nothing if that plan is not, or no longer,
-    /// there. Must not wait.
+    /// Takes the answer to a wait of the plan with number `plan`, from outside all subtasks
+    /// ([`DeviceDriver::answer`](crate::shared::DeviceDriver::answer)), and passes the answer to
+    /// the scheduler of the wait's DAG as a [`Request::Answer`]. Does nothing if that plan is not,
+    /// or no longer, there. Must not wait.
     ///
     /// # Panics
     ///
-    /// On a platform that does not define this.
+    /// On a platform without a definition of its own.
     fn answer(&self, _plan: u64, _wait: WaitId) {
         panic!("this platform takes no answers of devices; let no subtask wait for one");
     }
 
-    /// Returns the instance that the caller is, if it is one, with its plan's number. A platform that
-    /// does not define this lets every function enter every [`Lock`](crate::shared::Lock).
+    /// Returns the calling instance with its plan's number, or `None` if the caller is no instance.
+    /// A platform without a definition of its own lets every function enter every
+    /// [`Lock`](crate::shared::Lock).
     fn running(&self) -> Option<(u64, Instance)> {
         None
     }
 
-    /// Reports whether a run goes on, so that a caller that is no instance is a thread of the app's
-    /// own. A platform on which an app has none need not define this.
+    /// Reports whether a run goes on, so that a caller outside all instances must be a thread of
+    /// the app's own. A platform without such threads need not define the method.
     fn is_in_run(&self) -> bool {
         false
     }
 
-    /// Calls `section` once nobody else is in a section of the lock that these are the words of, and
-    /// puts the caller's preemption off for that time, for
-    /// [`LONGEST_SECTION`](crate::shared::LONGEST_SECTION) at most. Returns for how many nanoseconds;
-    /// `None`, and does not call it, if the caller is in a section already. A platform of one thread,
-    /// which runs function after function, need not define this.
+    /// Calls `section` when nobody else is in a section of the lock with the words `_lock`.
+    /// Meanwhile the caller's preemption is delayed, for at most
+    /// [`LONGEST_SECTION`](crate::shared::LONGEST_SECTION). Returns the duration of the section in
+    /// nanoseconds. If the caller is in a section already, returns `None` without calling
+    /// `section`. A platform with one thread, running function after function, need not define the
+    /// method.
     fn section(&self, _lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
         section();
         Some(0)
     }
 
-    /// Lends `work` what the platform keeps at its edge, under its lock; a platform that keeps
-    /// nothing there, or has an edge of its own kind, does not define this. The questions below
-    /// are answered by it.
+    /// Lends the platform's edge to `work`, under the edge's lock. A platform without an edge, or
+    /// with an edge of its own kind, need not define the method. The defaults of the questions
+    /// below ask the edge.
     fn at_edge(&self, _work: &mut dyn FnMut(&mut Edge)) {}
 
-    /// Reports whether the plan to come shall be recorded or replayed. If it shall not, recorded
-    /// topics ([`Dag::record`](crate::Dag::record)) cost nothing.
+    /// Reports whether the next plan is to be recorded or replayed. If not, recorded topics
+    /// ([`Dag::record`](crate::Dag::record)) cost nothing.
     fn crosses(&self) -> bool {
         ask_edge(self, |edge| edge.is_wished()).unwrap_or(false)
     }
 
-    /// Reports whether recorded topics matter that other subtasks than sources write: a replay
-    /// compares their values, and computes them if they are not there.
+    /// Reports whether recorded topics written by subtasks other than sources matter: a replay
+    /// compares their values, and computes missing ones.
     fn results_cross(&self) -> bool {
         ask_edge(self, |edge| edge.has_results()).unwrap_or(true)
     }
 
     /// Takes the recorded topics of a DAG and the hash of its names and edges, before the plan
     /// comes. Channels are numbered over all DAGs, in the order of the calls. `begin` is for
-    /// platforms that have no memory of their own for what crosses. Reports what
-    /// [`Crossing::open`](crate::edge::Crossing::open) does, or else `false`: then values come by
+    /// platforms without memory of their own for recorded values. Returns the result of
+    /// [`Crossing::open`](crate::edge::Crossing::open), or else `false`: then values come by
     /// [`record`](Self::record).
     fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
         ask_edge(self, |edge| edge.open(dag, graph, channels, begin)).unwrap_or(false)
     }
 
-    /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had
-    /// sampled of one, at the end of that instance; without
-    /// an edge it is forgotten. Must not wait.
+    /// Takes a value of a recorded topic at the completion of its writer, or a sampled value at the
+    /// end of the sampling instance. Without an edge the value is dropped. Must not wait.
     fn record(&self, value: &RecordedValue<'_>) {
         ask_edge(self, |edge| edge.record(value));
     }
 
-    /// Reports whether the plan to come shall take the values of recorded sources from
-    /// [`replay`](Self::replay), in place of calling them.
+    /// Reports whether the next plan shall take the values of recorded sources from
+    /// [`replay`](Self::replay), instead of calling the sources.
     fn replays(&self) -> bool {
         ask_edge(self, |edge| edge.is_replay()).unwrap_or(false)
     }
 
-    /// Lends the recorded value of a channel and a job to `take`, if there is one. What takes it may
-    /// be the app's, so no lock is held.
+    /// Lends the recorded value of a channel and a job to `take`, if there is one. `take` may be
+    /// the app's code, so no lock is held during the call.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         let found = ask_edge(self, |edge| edge.find(channel, job)).flatten();
         found.into_iter().for_each(|bytes| call_app(|| take(bytes)));
     }
 
-    /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
-    /// instance that is, if it is one, and the time of the run, and [keeps](LogLine::keep) it for
-    /// what shows it later; without a definition it is forgotten. Must not wait.
+    /// Takes a line of the [log](mod@crate::log) from the function running here. Adds the caller's
+    /// instance, if there is one, and the time of the run, and [keeps](LogLine::keep) the line to
+    /// be shown later. The default drops the line. Must not wait.
     fn log(&self, _line: LogLine) {}
 
-    /// Takes a plan over. Its first release is the platform's to time.
+    /// Takes a plan over. The platform decides the time of the first release.
     ///
     /// # Errors
     ///
-    /// If the platform cannot schedule the plan. Nothing of it has run then.
+    /// If the platform cannot schedule the plan. Nothing of the plan has run then.
     fn launch(&self, plan: Plan) -> Result<(), LaunchError>;
 }
 
-/// Why a platform did not take a plan, or found no cores for a DAG.
+/// The reason why a platform did not take a plan, or found no cores for a DAG.
 ///
 /// # Examples
 ///
@@ -269,7 +270,7 @@ pub struct LaunchError {
 }
 
 impl LaunchError {
-    /// States the reason: fact, offender, remedy.
+    /// Makes an error from its reason: the fact, the offender, the remedy.
     ///
     /// ```
     /// let error = fass::platform::LaunchError::new("a plan runs already; wait for its end");
@@ -292,7 +293,7 @@ impl core::error::Error for LaunchError {}
 
 static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
 
-/// A platform is installed already; the earlier one stays.
+/// The error of a second installation: the platform installed first stays.
 ///
 /// # Examples
 ///
@@ -318,8 +319,8 @@ impl core::error::Error for AlreadyInstalled {}
 ///
 /// # Examples
 ///
-/// Apps do not call it; the kernel's entry or `VirtualTime` does. See
-/// [`Platform`] for a platform of one's own.
+/// Apps do not call the function; the kernel's entry or `VirtualTime` does. See [`Platform`] for a
+/// platform of one's own.
 ///
 /// ```standalone_crate
 /// use virtual_time::VirtualTime;
@@ -337,7 +338,8 @@ pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> 
     }
 }
 
-/// Lets people look at what crosses, from the next commit on. Nothing, where no platform has an edge.
+/// Allows people to look at recorded values, from the next commit on. Does nothing where the
+/// platform has no edge.
 ///
 /// ```
 /// fass::platform::let_look(); // there is no platform
@@ -348,23 +350,24 @@ pub fn let_look() {
     with_edge(Edge::let_look);
 }
 
-/// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there is such
-/// a topic.
+/// Starts keeping the latest value of the given recorded topic; `None` stops. Reports whether there
+/// is such a topic.
 ///
 /// See [`let_look`].
 pub fn watch(topic: Option<&str>) -> bool {
     with_edge(|edge| edge.watch(topic)).unwrap_or(false)
 }
 
-/// Takes that value out, if there is a new one.
+/// Copies the watched topic's latest value into `into` and returns its description, if there is a
+/// new value.
 ///
 /// See [`let_look`].
 pub fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
     with_edge(|edge| edge.take_seen(into)).flatten()
 }
 
-/// Returns why a recording, or a replay, could not be what was wished, and how a replay differs from
-/// its recording, if that is so.
+/// Returns the reason why a requested recording or replay was impossible, and the difference of a
+/// replay from its recording, if there is any.
 ///
 /// See [`let_look`].
 #[must_use]
@@ -372,8 +375,8 @@ pub fn objections() -> [Option<String>; 2] {
     with_edge(|edge| edge.objections()).unwrap_or_default()
 }
 
-/// Does `work` with what the installed platform keeps at its edge, if it does: under a lock, so it is
-/// none of the app's.
+/// Calls `work` with the edge of the installed platform, if there is one. `work` runs under a lock,
+/// so it must not be the app's code.
 fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
     ask_edge(installed()?, work)
 }
@@ -401,8 +404,8 @@ pub(crate) fn expect_installed() -> &'static dyn Platform {
     }
 }
 
-/// Gives a value to the platform. It looks for the platform itself: a function that is called for
-/// that is, in a crate compiled for size, as long again.
+/// Gives a value to the platform. The function looks the platform up itself: in a crate compiled
+/// for size, a call for the lookup would be as long again.
 pub(crate) fn record(value: &RecordedValue<'_>) {
     match PLATFORM.get() {
         Some(platform) => platform.record(value),
@@ -415,18 +418,17 @@ fn missing() -> ! {
     panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")
 }
 
-/// Says a line of the [log](mod@crate::log), for people: a level, a text, and up to four fields.
+/// Writes a line of the [log](mod@crate::log), for people: a level, a text, and up to four fields.
 ///
-/// A field is a number, a truth value, a character or a text that lasts for ever. The line bears
-/// the DAG, the subtask and the job of the instance that says it, and the time; outside of subtasks
-/// the time only. It is shown soon, and never by the caller, which goes on after a copy of some 300
-/// bytes.
+/// A field is a number, a truth value, a character or a `'static` text. The line shows the time
+/// and, inside a subtask, the DAG, the subtask and the job of the calling instance. The caller goes
+/// on after a copy of some 300 bytes; somebody else shows the line soon afterwards.
 ///
-/// A line is no result of its instance: it is shown although that fails later.
+/// A line is no result of its instance: the line appears even if the instance fails later.
 ///
-/// On the machine and on Linux the word `log=off|error|warn|info|debug` says up to which level
-/// lines are said, `info` by default. In virtual time all are, and go to the report. Without a
-/// platform they go nowhere.
+/// On the machine and on Linux the word `log=off|error|warn|info|debug` sets the level up to which
+/// lines are written, `info` by default. In virtual time all lines are written, into the report.
+/// Without a platform they go nowhere.
 ///
 /// # Examples
 ///
@@ -463,7 +465,7 @@ macro_rules! log {
     };
 }
 
-/// Says a line of a level that is on.
+/// Writes a line of an enabled level.
 ///
 /// See [`log!`](crate::log!).
 #[cold]

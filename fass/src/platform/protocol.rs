@@ -1,8 +1,8 @@
-//! Protocols: what stands between the datagrams of one peer and several wires.
+//! Protocols: the layer between the datagrams of one peer and several wires.
 //!
-//! A wire takes the packets of a device as they are. A *protocol*, such as that of a router, has
-//! messages of its own, and its datagrams carry the packets of many wires. A platform drives it: the
-//! platform has the clock, the device and the lock under which all methods are called.
+//! A wire takes the packets of a device unchanged. A *protocol*, such as a router's, has messages
+//! of its own, and its datagrams carry the packets of many wires. A platform drives the protocol:
+//! the platform has the clock, the device, and the lock under which all methods are called.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -13,39 +13,39 @@ use crate::shared::DeviceEnd;
 
 /// A protocol, driven by a platform: one peer, and one datagram at a time.
 ///
-/// Its methods are called in interrupts, so none waits, allocates or loops without a bound, but
-/// [`begin`](Self::begin).
+/// Interrupt handlers call the methods. So no method except [`begin`](Self::begin) may wait,
+/// allocate or loop without a bound.
 ///
 /// See [`Wire`](crate::shared::Wire).
 pub trait Protocol: Send {
-    /// Begins, before the commit: takes the devices' ends of its wires, 64 at most. Datagrams have
-    /// so many bytes at most. `ready` is called when a wire has a packet to go, in the completion of
-    /// the sending instance.
+    /// Begins, before the commit: takes the device's ends of the protocol's wires, at most 64.
+    /// Datagrams have at most `most_bytes` bytes. The completion of a sending instance calls
+    /// `ready` when a wire has a packet to send.
     ///
     /// # Errors
     ///
-    /// In words, such as that a wire has a device already.
+    /// In words, for example if a wire has a device already.
     fn begin(&mut self, most_bytes: usize, ready: fn()) -> Result<Box<[Arc<DeviceEnd>]>, String>;
 
-    /// Takes a datagram of the peer's. Returns the wires that have got a packet, as bits by their
-    /// places: the platform [announces](DeviceEnd::announce) these, outside its lock.
+    /// Takes a datagram from the peer. Returns the wires with a new packet, as bits by their
+    /// places: the platform [announces](DeviceEnd::announce) them, outside its lock.
     fn hear(&mut self, datagram: &[u8], now_ns: u64) -> u64;
 
-    /// Hands over the next datagram to go, if there is one. `send` reports whether it has gone, as
-    /// does this; one that has not is handed over again. `send` may swap the buffer.
+    /// Passes the next outgoing datagram to `send`, if there is one. `send` may swap the buffer,
+    /// and returns whether the datagram has gone; the method returns the same. The next call passes
+    /// a datagram again that has not gone.
     fn send(&mut self, now_ns: u64, send: &mut dyn FnMut(&mut Buffer) -> bool) -> bool;
 
-    /// Says whether the device has a link, at the start of a run and when that changes. After
-    /// [`close`](Self::close) it begins anew.
+    /// Tells the protocol whether the device has a link, at the start of a run and after each
+    /// change. After [`close`](Self::close) the protocol begins anew.
     fn set_link(&mut self, is_up: bool);
 
-    /// Ends: what is sent afterwards says goodbye to the peer.
+    /// Ends the session: later datagrams say goodbye to the peer.
     fn close(&mut self);
 
-    /// Says in the log what people should know, such as that a session was lost, once. Not in an
-    /// instance.
+    /// Logs news for people once, such as the loss of a session. Not called in an instance.
     fn tell_news(&mut self) {}
 
-    /// Tells what it has counted, each count with its name.
+    /// Calls `tell` for each of the protocol's counts, with the name of the count.
     fn counts(&self, tell: &mut dyn FnMut(&'static str, u64));
 }

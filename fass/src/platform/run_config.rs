@@ -1,15 +1,15 @@
 //! The terms on which a platform runs DAGs.
 //!
-//! They are the same for every platform: what its scheduler does with its cores, and what a
-//! commit reckons with. A platform keeps one of these, lets apps change it before their commits,
-//! and shows it to each commit.
+//! The terms are of the same kind for every platform: how its scheduler uses its cores, and what a
+//! commit assumes. A platform keeps a [`RunConfig`], lets apps change the terms before their
+//! commits, and shows them to each commit.
 
 use alloc::borrow::Cow;
 
 use sched_dag::analysis::{AnalysisSettings, OverheadSource, Overheads};
 use sched_dag::{CoreDivision, Policy, Preemption, SchedulerOptions};
 
-/// The terms on which a platform runs the DAGs of the commits to come.
+/// The terms on which a platform runs the DAGs of coming commits.
 ///
 /// ```
 /// use fass::commit::CoreDivision;
@@ -23,19 +23,19 @@ use sched_dag::{CoreDivision, Policy, Preemption, SchedulerOptions};
 /// ```
 #[derive(Clone, Debug)]
 pub struct RunConfig {
-    /// The scheduling policy, which decides what attributes are needed; whether a started
-    /// instance may lose its core; and the number of processors that run subtasks, at least 1.
+    /// The scheduling policy, which decides what attributes are needed; whether a started instance
+    /// may lose its core; and the number of processors running subtasks, at least 1.
     pub scheduler: SchedulerOptions,
-    /// How these are divided. If they are, DAGs say which cluster is theirs
-    /// ([`Dag::cluster`](crate::Dag::cluster)).
+    /// The division of the processors into clusters. If the processors are divided, each DAG states
+    /// its cluster ([`Dag::cluster`](crate::Dag::cluster)).
     pub clusters: CoreDivision,
-    /// Whether the commit divides them ([`analysis::assign`](sched_dag::analysis::assign())).
+    /// Whether the commit divides the processors
+    /// ([`analysis::assign`](sched_dag::analysis::assign())).
     pub assigns: bool,
-    /// The cost of the platform's own work for an instance at most, as measured on it. The commit
-    /// adds
-    /// it to each WCET before it answers about deadlines
-    /// ([`Commit::answers`](crate::commit::Commit::answers)); it changes nothing else. Without
-    /// measurements, nothing is added: then WCETs have to include it.
+    /// The greatest cost of the platform's own work for an instance, as measured on the platform.
+    /// The commit adds the cost to each WCET before answering about deadlines
+    /// ([`Commit::answers`](crate::commit::Commit::answers)); nothing else depends on the cost.
+    /// Without measurements nothing is added: then WCETs have to include the cost.
     ///
     /// ```
     /// use fass::commit::Overheads;
@@ -51,25 +51,27 @@ pub struct RunConfig {
     /// assert_eq!(measured.of_an_instance_ns(Preemption::Enabled), Some(3_500));
     /// ```
     pub overheads: Overheads,
-    /// Where these are from, for the answer to say so.
+    /// The origin of the overheads, shown in the answer.
     pub overhead_source: OverheadSource,
-    /// A file of WCETs that were observed, if there is one; the commit takes what it has for its
-    /// DAGs in place of what they state. `sched_dag::wcets` has the format.
+    /// The text of a file with observed WCETs, if there is one. For the DAGs in the file the commit
+    /// replaces their stated WCETs with the observed ones. `sched_dag::wcets` has the format.
     pub wcets: Option<Cow<'static, str>>,
-    /// The word of an app that its commits to come are of a *fixed* set: all jobs are released, on time, and
-    /// no DAG is paused, resumed or ended by functions, modes or persons. The text is a certificate of
-    /// that set ([`certify`](sched_dag::analysis::certify())), by which the commit may bound responses
-    /// that depend on it. A fault, or an execution beyond its WCET, voids the bounds of all.
+    /// The app's promise that its coming commits contain a *fixed* set: all jobs are released, on
+    /// time, and no DAG is paused, resumed or ended by functions, modes or persons. The text is a
+    /// certificate of that set ([`certify`](sched_dag::analysis::certify())). Based on the
+    /// certificate the commit may prove bounds valid only for a fixed set. A fault, or an execution
+    /// beyond its WCET, voids the bounds of all DAGs.
     pub certificate: Option<Cow<'static, str>>,
-    /// The budget of a subtask that states a WCET only, in WCETs; 0 for none.
+    /// The budget of a subtask with a WCET but without a stated budget, as a multiple of the WCET;
+    /// 0 for none.
     pub budget_factor: u64,
-    /// The most events that journals have room for; 0: nothing is written down.
+    /// The greatest number of events with room in the journals; with 0 nothing is written down.
     pub most_events: u64,
 }
 
 impl RunConfig {
-    /// Makes terms of so many cores: they are not divided, static priorities and preemption rule,
-    /// nothing is charged, and there are no budgets but stated ones.
+    /// Makes terms for a number of cores: undivided cores, static priorities, preemption, no
+    /// overheads, and no budgets except stated ones.
     pub const fn of_cores(cores: u32) -> Self {
         Self {
             scheduler: SchedulerOptions {
@@ -88,8 +90,8 @@ impl RunConfig {
         }
     }
 
-    /// Divides the cores into clusters of so many each, from core 0 on; no number: they are not
-    /// divided. Each cluster schedules its own DAGs.
+    /// Divides the cores into clusters of the given sizes, from core 0 on; an empty list leaves the
+    /// cores undivided. Each cluster schedules its own DAGs.
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {
@@ -98,8 +100,8 @@ impl RunConfig {
         };
     }
 
-    /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
-    /// others share clusters of one core each. All subtasks need WCETs. See
+    /// Lets the commit divide the cores: a DAG needing several cores gets a cluster of its own, and
+    /// the others share clusters of one core each. All subtasks need WCETs. See
     /// [`ClusterPlacement`](crate::commit::ClusterPlacement).
     pub fn divide_by_commit(&mut self) {
         (self.clusters, self.assigns) = (CoreDivision::Undivided, true);
