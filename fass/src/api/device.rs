@@ -59,7 +59,7 @@ use crate::run::line::ChannelState;
 use crate::run::turn::{TurnState, WaitEnd, WaitFault};
 use crate::run::waiting::{WaitStep, nanoseconds};
 
-/// Makes a device with the given name: the end for the asking subtask, and the end for the driver.
+/// Makes a device with the given name: the asking subtask's end, and the driver's.
 ///
 /// See [`Device`].
 #[must_use]
@@ -137,13 +137,14 @@ where
 /// ```
 pub struct Device<Q, A>(Arc<DeviceCell<Q, A>>);
 
-/// The use of a [`Device`]: the function gets an [`Asker`]. Made by [`Device::asking`].
+/// The declaration that a subtask asks a [`Device`]: the function gets an [`Asker`]. Made by
+/// [`Device::asking`].
 ///
 /// See [`Device`].
 #[derive(Debug)]
 pub struct DeviceUse<Q, A>(Device<Q, A>);
 
-/// The handle of an async function for asking a device.
+/// The handle with which an async function asks a device.
 ///
 /// See [`Device`].
 pub struct Asker<Q, A>(Arc<DeviceCell<Q, A>>);
@@ -311,8 +312,8 @@ impl<Q, A> DeviceCell<Q, A> {
         }
     }
 
-    /// Panics outside a turn of the asking subtask: the question would wait in another subtask's
-    /// wait.
+    /// Panics outside a turn of the asking subtask: the question would take a wait of another
+    /// subtask.
     fn check_turn(&self, context: &Context<'_>) {
         let turn = turn_of(context.waker()).map_or(0, TurnState::address);
         if turn != self.turn.load(Ordering::Relaxed) {
@@ -390,16 +391,17 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
 }
 
 impl<Q, A> Device<Q, A> {
-    /// Returns the use for the asking subtask. A device has one such subtask.
+    /// Returns the declaration that a subtask asks the device, for [`Dag::using`]. A device has one
+    /// such subtask.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn asking(&self) -> DeviceUse<Q, A> {
         DeviceUse(Self(Arc::clone(&self.0)))
     }
 
     /// Lets each question raise `signal`, which releases the driver's sporadic DAG. The signal is
-    /// raised in the step in which the wait for the answer begins. The driver's function answers at
-    /// once, or starts work leading to an answer later. Returns `true` if `signal` is the device's
-    /// first signal; later signals have no effect.
+    /// raised in the step in which the wait for the answer begins. The driver answers at once, or
+    /// starts work leading to an answer later. Returns `true` if `signal` is the device's first
+    /// signal; later signals have no effect.
     ///
     /// Call the method before the commit; a later call has no effect. The commit must have the
     /// signal's DAG, too.
@@ -634,8 +636,8 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
         }
         polled.map(|has_timed_out| {
             let cell = this.cell;
-            // At the limit, too, an answer may be there: given before the wait began, or while the
-            // scheduler was ending the wait. A replay may post no question.
+            // At the limit, too, an answer may be there: it was there when the wait began, or came
+            // while the scheduler was ending the wait. A replay may post no question.
             let was_answered =
                 || cell.latest.load(Ordering::Relaxed) == this.number && !cell.decide(this.number);
             let is_there = this.number > 0 && (!has_timed_out || was_answered());
@@ -746,7 +748,7 @@ impl<Q, A> DeviceDriver<Q, A> {
     fn end_wait(&self, ticket: Ticket) -> bool {
         let (cell, platform) = (&self.cell, platform::expect_installed());
         let now_ns = platform.now_ns();
-        // The asking end has no core yet, and may learn only later that its wait has ended.
+        // Without a core the asking end learns only later that its wait has ended.
         if now_ns > cell.last_ns.load(Ordering::Relaxed) {
             return false;
         }
@@ -756,8 +758,7 @@ impl<Q, A> DeviceDriver<Q, A> {
             cell.took_ns.store(took_ns, Ordering::Relaxed);
         }
         let decided = cell.decide(ticket.number);
-        // Only the end deciding the question tells the scheduler, so the scheduler is told at most
-        // once.
+        // Only the end deciding the question tells the scheduler, so at most once.
         if decided {
             platform.answer(ticket.plan, ticket.wait);
         }

@@ -79,14 +79,15 @@ pub struct Latest<T> {
     pub(crate) shared: Rc<SharedLatest<T>>,
 }
 
-/// The use of a [`Latest`]: the function gets an `Option<Sample<T>>`. Made by [`Latest::sample`].
+/// The declaration that a subtask samples a [`Latest`] value: the function gets an
+/// `Option<Sample<T>>`. Made by [`Latest::sample`].
 ///
 /// See [`Latest`].
 #[derive(Debug)]
 pub struct LatestUse<T>(Latest<T>);
 
-/// The value found by a sampling subtask at its start, from the writer's latest complete instance.
-/// The function gets `None` instead while no instance of the writer has been complete.
+/// A sampled value: the value of the writer's latest complete instance when the sampling subtask
+/// started. The function gets `None` instead while no instance of the writer has been complete.
 ///
 /// ```
 /// use fass::shared::Sample;
@@ -125,7 +126,7 @@ impl<T> Clone for Sample<'_, T> {
 impl<T> Copy for Sample<'_, T> {}
 
 impl<T: Message + Sync> Latest<T> {
-    /// Returns the use for a subtask sampling the value.
+    /// Returns the declaration that a subtask samples the value, for [`Dag::using`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn sample(&self) -> LatestUse<T> {
         let shared = Rc::clone(&self.shared);

@@ -31,8 +31,8 @@ use crate::draft::part::{
 use crate::run::effect::{AT_ONCE, GO, RequestKind, RequestTarget, STOP, WHEN_IDLE, Wish};
 use crate::run::plan::Plan;
 
-/// The use of a DAG by a subtask that may pause and resume the DAG: the function gets a [`Switch`].
-/// Made by [`Dag::switching`].
+/// The declaration that a subtask may pause and resume a DAG: the function gets a [`Switch`]. Made
+/// by [`Dag::switching`].
 ///
 /// See [`Switch`].
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub struct SwitchUse {
     target: Arc<RequestTarget>,
 }
 
-/// The handle of a function for pausing and resuming a DAG.
+/// The handle with which a function pauses and resumes a DAG.
 ///
 /// A paused DAG releases no job: jobs due meanwhile are skipped, and keep their numbers and their
 /// places on the grid. Jobs in flight at the pause run to their end.
@@ -100,14 +100,14 @@ impl Switch<'_> {
     }
 }
 
-/// The use of the run by a subtask that may end the run: the function gets a [`Shutdown`]. Made by
+/// The declaration that a subtask may end the run: the function gets a [`Shutdown`]. Made by
 /// [`shutting_down`].
 ///
 /// See [`Shutdown`].
 #[derive(Debug)]
 pub struct ShutdownUse(());
 
-/// The handle of a function for ending the run in an orderly way: no further job is released, and
+/// The handle with which a function ends the run in an orderly way: no further job is released, and
 /// jobs in flight run to their end.
 ///
 /// # Examples
@@ -156,7 +156,7 @@ impl Shutdown<'_> {
     }
 }
 
-/// Returns the use for a subtask that may end the run.
+/// Returns the declaration that a subtask may end the run, for [`Dag::using`].
 ///
 /// See [`Shutdown`].
 #[must_use = "a use has no effect until a subtask is registered with it"]
@@ -165,7 +165,8 @@ pub const fn shutting_down() -> ShutdownUse {
 }
 
 impl Dag {
-    /// Returns the use for a subtask, of any DAG, that may pause and resume this DAG.
+    /// Returns the declaration that a subtask, of any DAG, may pause and resume this DAG, for
+    /// [`using`](Self::using).
     ///
     /// The commit must have this DAG, too. See [`Switch`].
     #[track_caller]
@@ -307,14 +308,14 @@ pub struct Mode {
     number: ModeId,
 }
 
-/// The use of a mode by a subtask that may enter the mode: the function gets a [`ModeSwitch`]. Made
-/// by [`Mode::entering`].
+/// The declaration that a subtask may enter a mode: the function gets a [`ModeSwitch`]. Made by
+/// [`Mode::entering`].
 ///
 /// See [`Modes`].
 #[derive(Debug)]
 pub struct ModeUse(Mode);
 
-/// The handle of a function for entering a mode.
+/// The handle with which a function enters a mode.
 ///
 /// See [`Modes`].
 #[derive(Debug)]
@@ -375,7 +376,7 @@ impl Modes {
 }
 
 impl Mode {
-    /// Returns the use for a subtask, of any DAG, that may enter the mode.
+    /// Returns the declaration that a subtask, of any DAG, may enter the mode, for [`Dag::using`].
     ///
     /// See [`Modes`].
     #[must_use = "a use has no effect until a subtask is registered with it"]

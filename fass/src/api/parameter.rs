@@ -12,8 +12,8 @@
 //!   edges.
 //! - A value outside the range, or a text that is no number, is never set.
 //! - Nobody waits: reading is one load.
-//! - The value is recorded and replayed with the results of the source, like all input of sources.
-//!   During a replay, setting a parameter has no effect.
+//! - The value is recorded and replayed with the source's results. During a replay, setting a
+//!   parameter has no effect.
 
 use alloc::format;
 use alloc::string::String;
@@ -76,8 +76,8 @@ struct ParameterCell<T> {
     range: RangeInclusive<T>,
 }
 
-/// The use of a [`Parameter`]: the function gets the parameter's value. Made by
-/// [`Parameter::reading`].
+/// The declaration that a source reads a [`Parameter`]: the function gets the parameter's value.
+/// Made by [`Parameter::reading`].
 ///
 /// See [`Parameter`].
 #[derive(Debug)]
@@ -154,7 +154,7 @@ fn narrowed(bits: u64) -> f32 {
     f64::from_bits(bits) as f32
 }
 
-/// A parameter of any type, as an object for platforms with a console. Only [`Parameter`]
+/// A parameter of any type, for a platform on which people set parameters. Only [`Parameter`]
 /// implements the trait, because where the cores are busy people are served with interrupts
 /// disabled.
 ///
@@ -176,8 +176,7 @@ pub trait Tunable: sealed::Sealed + Send + Sync {
     /// Returns the parameter's name.
     fn name(&self) -> &str;
 
-    /// Sets the parameter from a text and returns `true`, or returns `false` if the text is no
-    /// value within the range.
+    /// Sets the parameter from a text; returns `false` if the text is no value within the range.
     #[must_use = "`false`: it is not set"]
     fn set_text(&self, text: &str) -> bool;
 
@@ -269,7 +268,7 @@ impl<T: ParameterValue> Parameter<T> {
         )))
     }
 
-    /// Returns the use for a source reading the parameter.
+    /// Returns the declaration that a source reads the parameter, for [`Dag::using`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn reading(&self) -> ParameterUse<T> {
         ParameterUse(self.clone())

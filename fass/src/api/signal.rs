@@ -29,7 +29,7 @@ use crate::platform;
 use crate::run::effect::RequestTarget;
 use crate::run::effect::{GO, RequestKind, Wish};
 
-/// A signal for releasing a sporadic DAG. Clones are handles of the same signal.
+/// An event that releases a job of a sporadic DAG. Clones are handles of the same signal.
 ///
 /// # Examples
 ///
@@ -74,14 +74,14 @@ pub struct Signal {
     pub(super) target: Arc<RequestTarget>,
 }
 
-/// The use of a [`Signal`] by a subtask that may raise the signal: the function gets a [`Raiser`].
-/// Made by [`Signal::raising`].
+/// The declaration that a subtask may raise a [`Signal`]: the function gets a [`Raiser`]. Made by
+/// [`Signal::raising`].
 ///
 /// See [`Signal`].
 #[derive(Debug)]
 pub struct SignalUse(Signal);
 
-/// The handle of a function for raising a signal. See [`Signal`].
+/// The handle with which a function raises a signal. See [`Signal`].
 #[derive(Debug)]
 pub struct Raiser<'a> {
     wish: &'a AtomicU8,
@@ -97,7 +97,7 @@ impl Raiser<'_> {
 }
 
 impl Signal {
-    /// Returns the use for a subtask that may raise the signal.
+    /// Returns the declaration that a subtask may raise the signal, for [`Dag::using`].
     ///
     /// The commit must have the signal's DAG, too.
     #[must_use = "a use has no effect until a subtask is registered with it"]
@@ -138,7 +138,7 @@ impl Signal {
     /// Returns the arguments of [`Platform::raise`](crate::platform::Platform::raise): the number
     /// of the plan and the DAG. Returns `None` before the commit.
     ///
-    /// For platforms raising signals by themselves.
+    /// For platforms that raise signals.
     ///
     /// ```
     /// use core::time::Duration;

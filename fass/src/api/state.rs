@@ -140,28 +140,29 @@ impl DraftPart for Rc<StateOptions> {
     }
 }
 
-/// Access to a [`State`] for reading and changing: the function gets a `&mut T`. Made by
+/// The declaration that a subtask may change a [`State`]: the function gets a `&mut T`. Made by
 /// [`State::update`].
 ///
 /// See [`State`].
 #[derive(Debug)]
 pub struct StateUpdate<T>(State<T>);
 
-/// Access to a [`State`] for reading only: the function gets a `&T`. Made by [`State::read`].
+/// The declaration that a subtask only reads a [`State`]: the function gets a `&T`. Made by
+/// [`State::read`].
 ///
 /// See [`State`].
 #[derive(Debug)]
 pub struct StateRead<T>(State<T>);
 
 impl<T: StateValue> State<T> {
-    /// Returns the use for a subtask reading and changing the state.
+    /// Returns the declaration that a subtask may change the state, for [`Dag::using`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn update(&self) -> StateUpdate<T> {
         StateUpdate(self.clone())
     }
 
-    /// Returns the use for a subtask only reading the state. Readers between two updates may run at
-    /// the same time.
+    /// Returns the declaration that a subtask only reads the state, for [`Dag::using`]. Readers
+    /// between two updates may run at the same time.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn read(&self) -> StateRead<T> {
         StateRead(self.clone())

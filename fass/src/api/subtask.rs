@@ -34,7 +34,8 @@ use crate::run::message::MessageType;
 use crate::run::subtask::{MakeBody, defer, defer_untyped};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
-/// A subtask with a known function, before its registration by [`register`](Self::register).
+/// A subtask under construction, with a known function. [`register`](Self::register) ends the
+/// construction.
 ///
 /// Made by [`Dag::subtask`], [`Dag::source`], [`Dag::restarting`] and [`Dag::falling_back`], and by
 /// the same methods of [`SubtaskBuilder`](crate::shared::SubtaskBuilder).
@@ -192,7 +193,7 @@ impl fmt::Debug for Subtask<'_> {
     }
 }
 
-/// A subtask without types, as the end of edges. Made by
+/// A handle of a subtask without types, for naming the ends of edges. Made by
 /// [`Dag::register_untyped_subtask`](crate::Dag::register_untyped_subtask).
 ///
 /// ```

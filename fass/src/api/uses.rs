@@ -51,7 +51,7 @@ pub(crate) mod sealed {
     pub trait Sealed {}
 }
 
-/// A use of a subtask, or a tuple of up to 8 uses.
+/// Anything a subtask can use besides its inputs, or a tuple of up to 8 uses.
 ///
 /// Apps do not call the trait's methods; they meet the trait as a bound of [`Dag::using`].
 ///

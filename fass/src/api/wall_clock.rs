@@ -51,14 +51,15 @@ const UNKNOWN: u64 = u64::MAX;
 #[derive(Clone, Debug)]
 pub struct WallClock(Arc<AtomicU64>);
 
-/// The use of a [`WallClock`]: the function gets the [`UnixTime`]. Made by [`WallClock::reading`].
+/// The declaration that a source reads a [`WallClock`]: the function gets the [`UnixTime`]. Made by
+/// [`WallClock::reading`].
 ///
 /// See [`WallClock`].
 #[derive(Debug)]
 pub struct WallClockUse(WallClock);
 
 recording::recordable! {
-    /// The Unix time of a job's instants.
+    /// The conversion of a job's instants to Unix time.
     ///
     /// See [`WallClock`].
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +82,7 @@ impl WallClock {
         Self(Arc::new(AtomicU64::new(UNKNOWN)))
     }
 
-    /// Returns the use for a source reading the clock.
+    /// Returns the declaration that a source reads the clock, for [`Dag::using`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn reading(&self) -> WallClockUse {
         WallClockUse(self.clone())

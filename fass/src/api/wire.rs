@@ -8,9 +8,9 @@
 //!
 //! # Guarantees
 //!
-//! - An instance of the receiver gets the packets complete at its start and not taken by an earlier
-//!   instance: the packets since the last job, each with the time of its last byte. If the receiver
-//!   is the source of a sporadic DAG, each packet raises the DAG's signal.
+//! - An instance of the receiver gets the packets that are complete at its start and that no
+//!   earlier instance has taken: the packets since the last job, each with the time of its last
+//!   byte. If the receiver is the source of a sporadic DAG, each packet raises the DAG's signal.
 //! - Bytes sent by an instance go out when the instance is complete (R3), all or nothing, in the
 //!   order of jobs: as one packet, unless the instance [ends](Sender::end_packet) several packets.
 //!   A failing instance sends nothing.
@@ -196,9 +196,10 @@ impl Wire {
         }
     }
 
-    /// Returns the use for the receiving source. `decode` turns a packet into a value, or returns
-    /// `None` for a malformed packet, which is counted. (In a replay the recorded values replace
-    /// the source, so no bytes are needed. A subtask with inputs cannot receive.)
+    /// Returns the declaration that a source receives on the wire, for [`Dag::using`]. `decode`
+    /// turns a packet into a value, or returns `None` for a malformed packet, which is counted. (In
+    /// a replay the recorded values replace the source, so no bytes are needed. A subtask with
+    /// inputs cannot receive.)
     ///
     /// See [`Wire`].
     ///
@@ -215,7 +216,7 @@ impl Wire {
         }
     }
 
-    /// Returns the use for the sending subtask.
+    /// Returns the declaration that a subtask sends on the wire, for [`Dag::using`].
     ///
     /// See [`Wire`].
     ///
@@ -229,9 +230,9 @@ impl Wire {
         SendUse(self.clone())
     }
 
-    /// Returns the use for the subtask sending values, each as one packet: `encode` writes a value
-    /// into the packet's place, and returns the length of the value in bytes. If the length is more
-    /// than the place, the instance's packets are lost.
+    /// Returns the declaration that a subtask sends values, each as one packet, for [`Dag::using`]:
+    /// `encode` writes a value into the packet's place, and returns the length of the value in
+    /// bytes. If the length is more than the place, the instance's packets are lost.
     ///
     /// ```
     /// use fass::shared::{ValueSender, Wire};
@@ -455,7 +456,7 @@ impl PartialEq for Wire {
 
 shown_as!(Wire, |of| of.name());
 
-/// The use of a wire by the receiving subtask. Made by [`Wire::receiving`].
+/// The declaration that a source receives on a wire. Made by [`Wire::receiving`].
 ///
 /// See [`Wire`].
 pub struct ReceiveUse<T> {
@@ -463,13 +464,13 @@ pub struct ReceiveUse<T> {
     decode: fn(&[u8]) -> Option<T>,
 }
 
-/// The use of a wire by the sending subtask. Made by [`Wire::sending`].
+/// The declaration that a subtask sends on a wire. Made by [`Wire::sending`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
 pub struct SendUse(Wire);
 
-/// The use of a wire by the subtask sending values. Made by [`Wire::sending_values`].
+/// The declaration that a subtask sends values on a wire. Made by [`Wire::sending_values`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
@@ -497,13 +498,13 @@ pub struct Packet<T> {
     pub from: Option<SocketAddrV4>,
 }
 
-/// The handle of a function for sending: bytes, or text by [`core::fmt::Write`].
+/// The handle with which a function sends: bytes, or text by [`core::fmt::Write`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
 pub struct Sender<'a>(&'a Wire);
 
-/// The handle of a function for sending values. See [`Wire::sending_values`].
+/// The handle with which a function sends values. See [`Wire::sending_values`].
 #[derive(Debug)]
 pub struct ValueSender<'a, T>(&'a Wire, fn(&T, &mut [u8]) -> usize);
 

@@ -34,7 +34,8 @@ use crate::run::cell::SharedCell;
 use crate::run::wire::{SendCompletion, SharedTaker, WireInput, WireOutput};
 
 impl Wire {
-    /// Returns the use for a reading async subtask: `decode` turns a packet into a value.
+    /// Returns the declaration that an async subtask reads packets, for [`Dag::using`]: `decode`
+    /// turns a packet into a value.
     ///
     /// A modem is asked for its signal, and may be slow:
     ///
@@ -91,7 +92,7 @@ impl Wire {
         ReadUse(device, taker)
     }
 
-    /// Returns the use for a writing async subtask.
+    /// Returns the declaration that an async subtask writes, for [`Dag::using`].
     ///
     /// See [`reading`](Self::reading).
     ///
@@ -159,24 +160,24 @@ impl AnswerSource<()> for AllGone {
     }
 }
 
-/// The use of a wire by a reading async subtask. Made by [`Wire::reading`].
+/// The declaration that an async subtask reads. Made by [`Wire::reading`].
 ///
 /// See [`Wire::reading`].
 pub struct ReadUse<T>(Device<(), T>, Arc<SharedTaker>);
 
-/// The use of a wire by a writing async subtask. Made by [`Wire::writing`].
+/// The declaration that an async subtask writes. Made by [`Wire::writing`].
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
 pub struct WriteUse(Device<(), ()>, Wire);
 
-/// The handle of an async function for reading packets.
+/// The handle with which an async function reads packets.
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
 pub struct WireReader<T>(Asker<(), T>);
 
-/// The handle of an async function for writing bytes.
+/// The handle with which an async function writes bytes.
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]

@@ -143,16 +143,16 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnprovenDag {
     reason: NotProvenReason,
-    /// The subtasks concerned by the reason.
+    /// The subtasks the reason is about.
     subtasks: Vec<SubtaskLabel>,
-    /// The other DAG concerned by the reason.
+    /// The other DAG the reason is about.
     other: Option<DagLabel>,
-    /// The lock concerned by the reason.
+    /// The lock the reason is about.
     lock: String,
 }
 
 impl UnprovenDag {
-    /// Returns the reason, for decisions of a program.
+    /// Returns the reason in a form that a program can decide by.
     pub const fn reason(&self) -> NotProvenReason {
         self.reason
     }

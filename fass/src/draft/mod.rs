@@ -1,8 +1,8 @@
 //! Drafts: registered DAGs before their commit.
 //!
-//! A draft accepts everything, and also remembers mistakes inexpressible in a [`DagSpec`]:
+//! A draft accepts everything, and also remembers mistakes that a [`DagSpec`] cannot express:
 //! durations out of range, topic lists not fitting the function. The commit reports these together
-//! with all other faults. A subtask with a misfitting list keeps its topics in the spec, but with
+//! with all other faults. A subtask whose list does not fit keeps its topics in the spec, but with
 //! the type [`UnstatedType`], and the commit then takes the type from the topic's other end. So one
 //! mistake is not reported as several.
 
@@ -58,7 +58,7 @@ pub(crate) struct NamedTopics<'a> {
     pub(crate) outputs: (&'a [&'a str], &'a [MessageType]),
 }
 
-/// The type of a topic's end without a known type.
+/// Stands for the type of a topic's end when no function states the type.
 #[derive(Clone)]
 struct UnstatedType;
 

@@ -96,7 +96,7 @@ pub(crate) struct TiedDag<'t> {
     pub(crate) verified: &'t Dag,
     pub(crate) target: &'t Arc<RequestTarget>,
     pub(crate) bodies: &'t mut Vec<SubtaskCode>,
-    /// The DAG to get a signal when a fault ends this DAG.
+    /// The DAG that gets a signal when a fault ends this DAG.
     pub(crate) after_fault: &'t mut Option<DagId>,
 }
 

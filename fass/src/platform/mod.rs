@@ -90,7 +90,7 @@ pub use crate::run::lock_words::LockWords;
 pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 pub use crate::run::wire::buffer::Buffer;
 
-/// A machine scheduling committed DAGs.
+/// A machine that schedules committed DAGs.
 ///
 /// # Examples
 ///
@@ -197,9 +197,9 @@ pub trait Platform: Sync {
         Some(0)
     }
 
-    /// Lends the platform's edge to `work`, under the edge's lock. A platform without an edge, or
-    /// with an edge of its own kind, need not define the method. The defaults of the questions
-    /// below ask the edge.
+    /// Lends the platform's edge, which records and replays, to `work`, under the edge's lock. A
+    /// platform without an edge, or with an edge of its own kind, need not define the method. The
+    /// defaults of the questions below ask the edge.
     fn at_edge(&self, _work: &mut dyn FnMut(&mut Edge)) {}
 
     /// Reports whether the next plan is to be recorded or replayed. If not, recorded topics

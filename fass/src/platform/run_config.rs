@@ -65,7 +65,7 @@ pub struct RunConfig {
     /// The budget of a subtask with a WCET but without a stated budget, as a multiple of the WCET;
     /// 0 for none.
     pub budget_factor: u64,
-    /// The greatest number of events with room in the journals; with 0 nothing is written down.
+    /// The greatest number of events kept in the journals; with 0 nothing is written down.
     pub most_events: u64,
 }
 
