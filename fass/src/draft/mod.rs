@@ -1,10 +1,10 @@
 //! Drafts: registered DAGs before their commit.
 //!
 //! A draft accepts everything, and also remembers mistakes that a [`DagSpec`] cannot express:
-//! durations out of range, topic lists not fitting the function. The commit reports these together
-//! with all other faults. A subtask whose list does not fit keeps its topics in the spec, but with
-//! the type [`UnstatedType`], and the commit then takes the type from the topic's other end. So one
-//! mistake is not reported as several.
+//! durations out of range, topic lists not fitting the function. The commit reports such mistakes
+//! together with all other faults. A subtask whose list does not fit keeps its topics in the spec,
+//! but with the type [`UnstatedType`], and the commit then takes the type from the topic's other
+//! end. So one mistake is not reported as several.
 
 pub(crate) mod fault;
 pub(crate) mod part;
@@ -121,7 +121,7 @@ impl DagDraft {
         subtask
     }
 
-    /// Returns the spec of a subtask from its attributes, without its ports.
+    /// Returns the spec of a subtask from the attributes, without ports.
     fn specify(&mut self, subtask: &SubtaskLabel, attributes: SubtaskAttributes) -> SubtaskSpec {
         let wcet = attributes.wcet;
         // A duration not fitting into nanoseconds becomes a fault of the commit, not a panic here.
