@@ -1,12 +1,12 @@
-//! Effects of an instance outside its DAG, held back until it is complete.
+//! Effects of an instance outside the DAG, held back until the instance is complete.
 //!
-//! Values on edges need no holding back: their readers are started by the
-//! scheduler, and only after the completion. Latest values, signals and requests to the
-//! run as a whole have readers that do not wait for it. So the function only *prepares*
-//! them, and the platform publishes them when it reports the completion
-//! ([`SubtaskCode::complete`](crate::platform::SubtaskCode::complete)): the completion boundary (R3) holds
-//! for them as it does for edges, also in virtual time, where a function has run
-//! long before its instance is complete.
+//! Values on edges need no holding back: the scheduler starts their readers only after the
+//! completion. The readers of latest values, signals and requests to the run as a whole do not wait
+//! for the completion. So the function only *prepares* such effects, and the platform publishes
+//! them when reporting the completion
+//! ([`SubtaskCode::complete`](crate::platform::SubtaskCode::complete)). The completion boundary
+//! (R3) thus applies to effects as well as to edges, also in virtual time, where a function has run
+//! long before the instance is complete.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -15,38 +15,38 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use sched_dag::lifecycle::{ModeEntry, Request};
 use sched_dag::{DagId, ModeId};
 
-/// Something that a function has prepared, perhaps.
+/// An action that a function may have prepared for the completion.
 pub(crate) trait Effect: Send {
-    /// Publishes it if it was prepared since the last time. `ask` takes what the scheduler is
-    /// to be told.
+    /// Publishes the effect if the function has prepared the effect since the last call. `ask`
+    /// takes requests to the scheduler.
     fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request));
 
-    /// Does what is to be done at the end of a turn that ends in a wait, of so many nanoseconds at
-    /// the most. Reports whether it waits for something that is there.
+    /// Acts at the end of a turn ending in a wait. The pair holds the end of the turn and the
+    /// longest duration of the wait, in ns. Reports whether the awaited value is already there.
     fn wait(&mut self, _ended_and_limit_ns: (u64, u64), _ask: &mut dyn FnMut(Request)) -> bool {
         false
     }
 
-    /// Takes note of the turns of its subtask, by their address, if that may wait.
+    /// Stores the address of the subtask's [turns](super::turn), if the subtask may wait.
     fn bind(&mut self, _turn: usize) {}
 
-    /// Returns the word that the latest wait has changed, if a thread of the platform may sleep on
-    /// it: once.
+    /// Returns the word changed by the latest wait, if a thread of the platform may sleep on the
+    /// word. Returns each word once.
     fn bell(&mut self) -> Option<Arc<AtomicU32>> {
         None
     }
 
-    /// Takes back what the latest wait has posted: its instance is cancelled.
+    /// Withdraws the question posted by the latest wait, as the instance is cancelled.
     fn withdraw(&mut self) {}
 
-    /// Does what is to be done for an instance that has failed.
+    /// Acts for a failed instance.
     fn fail(&mut self, _failed_ns: u64) {}
 
-    /// Keeps its signals from going anywhere.
+    /// Discards all signals from now on.
     fn mute(&mut self) {}
 }
 
-/// The effect that a platform adds to a completion.
+/// An effect added by a platform to each completion.
 impl Effect for Box<dyn FnMut() + Send> {
     fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self();
@@ -58,27 +58,27 @@ impl Effect for Box<dyn FnMut() + Send> {
     }
 }
 
-/// Which DAG is meant, by a signal that releases it or a switch: known from the commit on.
+/// The DAG meant by a signal or a switch, known from the commit on.
 #[derive(Debug, Default)]
 pub(crate) struct RequestTarget {
-    /// The plan's number, 0 before the commit.
+    /// The plan's number; 0 before the commit.
     plan: AtomicU64,
     dag: AtomicU32,
 }
 
 impl RequestTarget {
-    /// Returns the plan's number and the DAG, once there are any.
+    /// Returns the plan's number and the DAG, or `None` before the commit.
     pub(crate) fn get(&self) -> Option<(u64, DagId)> {
         let plan = self.plan.load(Ordering::Acquire);
         (plan > 0).then(|| (plan, self.dag()))
     }
 
-    /// Returns the DAG; to be called behind the commit.
+    /// Returns the DAG. To be called only after the commit.
     pub(crate) fn dag(&self) -> DagId {
         DagId(self.dag.load(Ordering::Relaxed))
     }
 
-    /// Tells the signal its DAG.
+    /// Sets the plan's number and the DAG, at the commit.
     pub(crate) fn set(&self, plan: u64, dag: DagId) {
         self.dag.store(dag.0, Ordering::Relaxed);
         self.plan.store(plan, Ordering::Release);
@@ -87,16 +87,16 @@ impl RequestTarget {
 
 /// No wish.
 const NOTHING: u8 = 0;
-/// The wish that a DAG is paused, or that the run ends.
+/// The wish to pause a DAG, or to end the run.
 pub(crate) const STOP: u8 = 1;
-/// The wish that a DAG is resumed, or released by its signal.
+/// The wish to resume a DAG, or to release a DAG by a signal.
 pub(crate) const GO: u8 = 2;
-/// The wish that a mode is entered at once.
+/// The wish to enter a mode at once.
 pub(crate) const AT_ONCE: u8 = 1;
-/// The wish that a mode is entered when what leaves is idle.
+/// The wish to enter a mode once the DAGs leaving are idle.
 pub(crate) const WHEN_IDLE: u8 = 2;
 
-/// A place for what an instance wishes, at first nothing; the last word counts.
+/// A place for the wish of an instance, initially empty; the last wish counts.
 pub(crate) type Wish = Arc<AtomicU8>;
 
 /// The kind of a request.
@@ -132,7 +132,7 @@ impl Effect for InstanceRequests {
 
     fn mute(&mut self) {
         if let RequestKind::Signal(_) = self.of {
-            // A place that no function knows.
+            // A fresh place unknown to every function, so later wishes have no effect.
             self.wish = Wish::default();
         }
     }

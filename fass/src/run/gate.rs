@@ -1,14 +1,15 @@
-//! The gate to the app's code: all of it that a platform brings about is called through here.
+//! The gate to the app's code: a platform's calls of it all pass through here.
 //!
-//! It is called in an instance, in the app's main function, or nowhere; the list of places is in
-//! `docs/architecture.md`. A debug build asks the platform each time whether that is so.
+//! The app's code is called in an instance, in the app's main function, or nowhere;
+//! `docs/architecture.md` lists the places. A debug build asks the platform each time whether this
+//! holds.
 
 use super::cell::SetOnce;
 
-/// The platform's answer.
+/// The platform's check, made before each call.
 static MAY_CALL: SetOnce<fn() -> bool> = SetOnce::new();
 
-/// Has a debug build ask that before each call.
+/// Installs the function that a debug build asks before each call.
 pub(crate) fn guard(may_call: fn() -> bool) {
     MAY_CALL.set(may_call);
 }
@@ -17,7 +18,7 @@ pub(crate) fn guard(may_call: fn() -> bool) {
 ///
 /// # Panics
 ///
-/// In a debug build, if the platform says that it holds a lock here, or has disabled interrupts.
+/// In a debug build, if the platform reports a held lock or disabled interrupts.
 ///
 /// ```
 /// assert_eq!(fass::platform::call_app(|| 7), 7);

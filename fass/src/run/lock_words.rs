@@ -1,13 +1,14 @@
-//! The words of a lock, by which platforms keep its sections apart.
+//! The words of a lock, with which platforms keep the lock's sections apart.
 
 use core::sync::atomic::{AtomicU32, AtomicU64};
 
-/// The words by which a platform keeps the sections of a lock apart; 0 in a lock that nobody has or
-/// wants. See [`Platform::section`](crate::platform::Platform::section).
+/// The words with which a platform keeps the sections of a lock apart. All are 0 while nobody holds
+/// or wants the lock. See [`Platform::section`](crate::platform::Platform::section).
 #[derive(Debug)]
 pub struct LockWords {
-    /// Whether somebody is in a section, and more that the platform knows, such as whose turn is next.
+    /// Whether somebody is in a section, with further state of the platform, such as whose turn is
+    /// next.
     pub state: AtomicU32,
-    /// The cores that wait, as bits.
+    /// The waiting cores, as bits.
     pub waiting: [AtomicU64; 4],
 }

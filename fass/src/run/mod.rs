@@ -1,9 +1,8 @@
-//! The running half: a body for each subtask, and the edges between them.
+//! The running half: a body for each subtask, and the edges between bodies.
 //!
-//! A *body* holds the function with its ends of the topics; a *ring* is one edge, with a
-//! slot for each job in flight; an *effect* is what a completion does beyond the DAG.
-//! Nothing in here knows how a DAG is built or verified, and nothing allocates once the
-//! commit has made it.
+//! A *body* holds a function with its ends of the topics. A *ring* is one edge, with a slot for
+//! each job in flight. An *effect* is an action of a completion beyond the DAG. Nothing in here
+//! knows how a DAG is built or verified, and nothing allocates after the commit.
 
 pub(crate) mod answers;
 #[allow(unsafe_code, reason = "the cells of slots, and the waker of turns")]

@@ -1,7 +1,7 @@
-//! Plans, which a commit hands to the platform: the verified model and the bodies.
+//! Plans, handed by a commit to the platform: the verified model and the bodies.
 //!
-//! The platform's scheduler decides *which* instance runs *where* and *when*;
-//! it then calls [`SubtaskCode::run`] there. A body never decides anything.
+//! The platform's scheduler decides *which* instance runs *where* and *when*, and then calls
+//! [`SubtaskCode::run`] there. A body never decides anything.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -28,8 +28,8 @@ use super::turn::TurnState;
 ///
 /// # Examples
 ///
-/// A platform receives it in [`Platform::launch`](crate::platform::Platform::launch) and
-/// finds a subtask's body at its ids:
+/// A platform receives it in [`Platform::launch`](crate::platform::Platform::launch) and finds a
+/// subtask's body by its ids:
 ///
 /// ```
 /// use fass::platform::{Plan, SubtaskCode};
@@ -43,40 +43,40 @@ use super::turn::TurnState;
 pub struct Plan {
     /// The verified model, for the scheduler.
     pub task_set: Arc<TaskSet>,
-    /// The plan's number, never 0, different from that of every other plan of the
-    /// program. Signals know their plan by it
-    /// ([`Platform::raise`](crate::platform::Platform::raise)).
+    /// The plan's number, never 0 and different from that of every other plan of the program.
+    /// Signals identify their plan by it ([`Platform::raise`](crate::platform::Platform::raise)).
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<SubtaskCode>>,
-    /// The response times that the commit has proven ([`Commit::answers`](crate::commit::Commit::answers)).
+    /// The response-time bounds proven by the commit
+    /// ([`Commit::answers`](crate::commit::Commit::answers)).
     pub proven: ProvenBounds,
-    /// The answers of the commit, for those who keep the run.
+    /// The answers of the commit, for platforms keeping a record of the run.
     pub(crate) answers: Box<dyn CommitWords>,
-    /// By DAG, the one that gets a signal when a fault ends it
-    /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
-    /// scheduler.
+    /// For each DAG, the DAG released by a signal when a fault ends the first DAG
+    /// ([`Dag::on_fault`](crate::Dag::on_fault)). It happens right after the fault, in the same
+    /// step of the scheduler.
     pub after_fault: Vec<Option<DagId>>,
-    /// The lifecycle that serves requests other than signals, if a function may make one or a DAG
-    /// begins
-    /// paused. A platform that takes no such requests refuses the plan.
+    /// The server of requests other than signals, if a function may make one or a DAG begins
+    /// paused. A platform without support for such requests refuses the plan.
     pub lifecycle: Option<Box<dyn Lifecycle>>,
-    /// The samples of latest values ([`Commit::staleness`](crate::commit::Commit::staleness)): what
-    /// passes between DAGs, for platforms that show it.
+    /// The samples of latest values ([`Commit::staleness`](crate::commit::Commit::staleness)), for
+    /// platforms displaying the values passed between DAGs.
     pub staleness: Arc<Vec<Staleness>>,
-    /// The ways of recorded values, by channel.
+    /// The paths of recorded values, indexed by channel.
     pub(crate) lines: Vec<LineOf>,
-    /// The states that a replay begins with, and what to say of one that cannot be that.
+    /// The states restored before a replay, each with its bytes and the complaint if it cannot take
+    /// them.
     pub(crate) begins: Vec<(Arc<KeptState>, Vec<u8>, String)>,
 }
 
-/// The answers of a commit, put in words where somebody wants them.
+/// The answers of a commit, put into words on demand.
 pub(crate) trait CommitWords: Send + Sync {
-    /// Says by DAG which test has proven a bound, or why there is none.
+    /// Says for each DAG which test has proven a bound, or why none has.
     fn in_words(&self) -> Vec<String>;
 }
 
-/// An image has no room for all that answers consist of.
+/// Only the name: an image has no room for the text of whole answers.
 impl fmt::Debug for dyn CommitWords {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("CommitWords")
@@ -84,12 +84,14 @@ impl fmt::Debug for dyn CommitWords {
 }
 
 impl Plan {
-    /// Gives the states what a replay begins with. A platform that replays calls it in its launch,
-    /// where it holds no lock: reading a value, and dropping the one before it, is the app's code.
+    /// Sets each state to the recorded value with which a replay begins.
+    ///
+    /// A replaying platform calls this in its launch, where it holds no lock: reading a value and
+    /// dropping the previous one run the app's code.
     ///
     /// # Errors
     ///
-    /// In words: a state cannot be what is recorded.
+    /// Returns a message if a state cannot take the recorded value.
     pub fn restore(&mut self) -> Result<(), String> {
         for (kept, value, complaint) in self.begins.drain(..) {
             if !call_app(|| kept.state.restore(&value)) {
@@ -99,8 +101,8 @@ impl Plan {
         Ok(())
     }
 
-    /// Has recorded states written down twice in so many jobs at least, for a platform that keeps
-    /// no more than what enters these.
+    /// Has recorded states written down at least twice in each span of `jobs` jobs, for a platform
+    /// keeping only the values that enter the latest jobs.
     ///
     /// See [`LatestJobs`](crate::edge::LatestJobs).
     pub fn keep_states_of(&self, jobs: u32) {
@@ -109,10 +111,10 @@ impl Plan {
     }
 }
 
-/// The executable part of a subtask: its function with its ends of the topics.
+/// The executable part of a subtask: the function with the subtask's ends of the topics.
 ///
-/// A body may move between threads or processors from one call to the next;
-/// `&mut self` makes each call's effects visible to the next one.
+/// A body may move between threads or processors from call to call; `&mut self` makes each call's
+/// effects visible to the next call.
 ///
 /// # Examples
 ///
@@ -130,7 +132,7 @@ impl Plan {
 /// ```
 pub struct SubtaskCode {
     subtask: Box<dyn PolledSubtask>,
-    /// The job that it runs, or has panicked in; [`NO_JOB`] else.
+    /// The job in execution, or in which it panicked; otherwise [`NO_JOB`].
     job: u64,
     /// Effects of its completions beyond the DAG.
     effects: Effects,
@@ -138,8 +140,8 @@ pub struct SubtaskCode {
     has_effects: bool,
 }
 
-/// Effects of completions. Mostly there is none, or one, for which a loop would take longer than its
-/// effect does. To compare a tag of its own is short.
+/// The effects of completions. Most subtasks have none or one, and a loop would take longer than
+/// the effect. Comparing an explicit tag is short.
 #[derive(Default)]
 #[repr(u8)]
 enum Effects {
@@ -147,7 +149,7 @@ enum Effects {
     None,
     One(Box<dyn Effect>),
     Several(Vec<Box<dyn Effect>>),
-    /// Those of a subtask that waits, which happen when its instance has finished.
+    /// The effects of a waiting subtask, due when its instance has finished.
     OfTurns(Arc<TurnState>, Vec<Box<dyn Effect>>),
 }
 
@@ -161,46 +163,48 @@ impl Effects {
     }
 }
 
-/// Stands where a job's number does, for none: no run gets so far.
+/// Stands for "no job": no run gets that far.
 const NO_JOB: u64 = u64::MAX;
 
-/// A subtask, as its body drives it.
+/// A subtask, as driven by the subtask's body.
 pub(crate) trait PolledSubtask: Send {
-    /// Grants a job, and takes that turn to its end.
+    /// Grants a job, and takes its turn to the end.
     fn take_turn(&mut self, job: u64);
 
-    /// Gives up what has arrived for a job that the subtask will not run.
+    /// Gives up the inputs of a job that the subtask will not run.
     fn discard(&mut self, job: u64);
 
-    /// Returns the function that would go on where a fault ends this one.
+    /// Returns the function to continue with, should a fault end the present function.
     fn replacement(&self) -> Option<ReplacementCode> {
         None
     }
 
-    /// Gives the function up, and the states that it used: the next turn is another one's.
+    /// Gives up the function, and the states used by the function: another function takes the next
+    /// turn.
     fn replace(&mut self) {}
 
-    /// Returns the state of its turns, if it may wait.
+    /// Returns the state of the subtask's turns, if the subtask may wait.
     fn turn(&self) -> Option<&Arc<TurnState>> {
         None
     }
 
-    /// Gives back what it has, after a fault: all but what the app's function owns, of which no
-    /// destructor can be called.
+    /// Frees its memory after a fault, except what the app's function owns: no destructor can be
+    /// called.
     fn forget(self: Box<Self>);
 }
 
-/// A subtask whose jobs are looked at before their turns.
+/// A subtask whose jobs are inspected before their first turn.
 struct JobPreview<F> {
     subtask: Box<dyn PolledSubtask>,
     look: F,
-    /// The job that was given up last.
+    /// The job given up last.
     passed: u64,
 }
 
 impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
-        // Once for each job, in the first turn of its instance.
+        // Once for each job, in the first turn of its instance: the look decides about the whole
+        // job, and a job given up at its first turn must be passed over at its later turns, too.
         let goes_on = self.turn().is_some_and(|turn| turn.is_of(job));
         if self.passed != job && (goes_on || (self.look)(job)) {
             return self.subtask.take_turn(job);
@@ -230,15 +234,15 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     }
 }
 
-/// Takes a turn of a job whose function is not called.
+/// Takes a turn of a job without calling the function.
 fn pass(subtask: &mut dyn PolledSubtask, job: u64) {
     if subtask.turn().is_none_or(|turn| turn.pass(job)) {
         subtask.discard(job);
     }
 }
 
-/// The functions to replace one that a fault ends. They can be asked for at any time,
-/// also while the body runs.
+/// The functions to replace one ended by a fault. They can be asked for at any time, also while the
+/// body runs.
 ///
 /// ```
 /// use fass::platform::SubtaskCode;
@@ -251,7 +255,7 @@ fn pass(subtask: &mut dyn PolledSubtask, job: u64) {
 #[derive(Clone)]
 pub struct ReplacementCode(pub(crate) Arc<dyn Alternate + Send + Sync>);
 
-/// One is there while it may be made, and no values are just being handed over.
+/// A replacement is there while it may be made, unless values are just being handed over.
 impl Alternate for ReplacementCode {
     fn is_there(&self) -> bool {
         self.0.is_there()
@@ -273,7 +277,7 @@ impl SubtaskCode {
         }
     }
 
-    /// Adds what each completion does beyond the DAG.
+    /// Adds effects to each completion, beyond the DAG.
     pub(crate) fn add_effects(&mut self, effects: impl IntoIterator<Item = Box<dyn Effect>>) {
         for mut effect in effects {
             self.has_effects = true;
@@ -293,44 +297,44 @@ impl SubtaskCode {
         }
     }
 
-    /// Returns the state of its turns, if it may wait.
+    /// Returns the state of the subtask's turns, if the subtask may wait.
     fn turn(&self) -> Option<&Arc<TurnState>> {
         self.subtask.turn()
     }
 
-    /// Reports whether its instances may wait.
+    /// Reports whether instances of the subtask may wait.
     pub fn may_wait(&self) -> bool {
         self.turn().is_some()
     }
 
-    /// Reports whether the instance of a job has begun and not finished: it has a further turn.
+    /// Reports whether the job's instance has begun and not finished: it has a further turn.
     pub fn goes_on(&self, job: u64) -> bool {
         self.turn().is_some_and(|turn| turn.is_of(job))
     }
 
-    /// Takes note, before the next turn, of how the wait has ended in which its instance was.
+    /// Notes, before the next turn, how the instance's wait has ended.
     pub fn wake(&mut self, has_timed_out: bool) {
         if let Some(turn) = self.turn() {
             turn.wake(has_timed_out);
         }
     }
 
-    /// Runs the subtask's part of job `job` to its end, or to its next wait.
+    /// Runs the subtask's part of job `job` to the end, or to the next wait.
     ///
-    /// Returns after the function has returned and its outputs are in their
-    /// slots, or when [`complete`](Self::complete) will ask for a wait. Polls the subtask's future exactly once. Does not allocate (the
-    /// function itself may).
+    /// Returns once the function has returned and its outputs are in their slots, or when
+    /// [`complete`](Self::complete) will ask for a wait. Polls the subtask's future exactly once.
+    /// Does not allocate (the function itself may).
     ///
-    /// The caller calls [`complete`](Self::complete) afterwards, reports the
-    /// completion to the scheduler, and starts the successors only then.
+    /// The caller then calls [`complete`](Self::complete), reports the completion to the scheduler,
+    /// and starts the successors only afterwards.
     ///
     /// # Panics
     ///
     /// - If the function panics. The body cannot be run again.
     /// - If the body panicked before.
     /// - If an input of `job` is missing, because a predecessor is not complete.
-    /// - If an output finds no free slot, because a cancelled instance's inputs
-    ///   were not [discarded](Self::discard).
+    /// - If an output finds no free slot, because the inputs of a cancelled instance were not
+    ///   [discarded](Self::discard).
     pub fn run(&mut self, job: u64) {
         assert!(
             self.job == NO_JOB,
@@ -342,15 +346,14 @@ impl SubtaskCode {
         self.job = NO_JOB;
     }
 
-    /// Publishes the effects that the last [`run`](Self::run) prepared outside the DAG:
-    /// its latest values show, and `ask` is called with each signal and each other request. Or, of an
-    /// instance that has not finished, returns for how long it waits.
+    /// Publishes the effects prepared outside the DAG by the last [`run`](Self::run): shows latest
+    /// values, and calls `ask` with each signal and each other request. For an unfinished instance,
+    /// returns how long it waits instead.
     ///
-    /// The caller does so once the instance is complete for it, at `completed_ns` on
-    /// the clock of [`crate::now_ns`], and not for an instance that failed. It passes
-    /// the requests to the scheduler with the completion (`sched_dag::lifecycle` has what for).
-    /// Does not wait, allocate or
-    /// run code of the app; a body that has no such effects returns at once.
+    /// The platform calls this once it regards the instance as complete, at `completed_ns` on the
+    /// clock of [`crate::now_ns`], but not for a failed instance. It passes the requests to the
+    /// scheduler with the completion (`sched_dag::lifecycle` explains their use). Does not wait,
+    /// allocate or run code of the app; without such effects it returns at once.
     #[inline]
     pub fn complete(
         &mut self,
@@ -365,18 +368,20 @@ impl SubtaskCode {
         None
     }
 
-    /// Apart, so that the way of one effect saves no registers for a loop.
+    /// Ends any other turn. Apart, so the path of one effect saves no registers for a loop.
     #[inline(never)]
     fn end_turn(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
         if let Effects::OfTurns(turn, all) = &mut self.effects
             && let Some((limit, limit_ns)) = turn.take_wait()
         {
-            // All are asked, as each has something to post when a wait begins.
+            // All effects are asked, without a stop at the first: each may have something to post
+            // when a wait begins.
             let mut is_there = false;
             for effect in all {
                 is_there |= effect.wait((completed_ns, limit_ns), ask);
             }
-            // It is a wait all the same: the instance gives its core up.
+            // A wait even if the awaited value is there: the instance gives its core up in any
+            // case.
             return Some(if is_there { WaitLimit::For(0) } else { limit });
         }
         let all = self.effects.all().iter_mut();
@@ -384,14 +389,15 @@ impl SubtaskCode {
         None
     }
 
-    /// Gives the platform what an instance had sampled, if that is recorded, although it
-    /// failed; else nobody could compute its fault again.
+    /// Gives the platform the samples taken by a failed instance, if they are recorded: without
+    /// them, nobody could reproduce the fault.
     pub fn failed(&mut self, failed_ns: u64) {
         let all = self.effects.all().iter_mut();
         all.for_each(|effect| effect.fail(failed_ns));
     }
 
-    /// Has each job looked at before its turn: it is given up where `look` returns false.
+    /// Calls `look` for each job before its first turn, and gives the job up if `look` returns
+    /// false.
     pub(crate) fn before(mut self, look: impl FnMut(u64) -> bool + Send + 'static) -> Self {
         let subtask = self.subtask;
         self.subtask = Box::new(JobPreview {
@@ -402,14 +408,14 @@ impl SubtaskCode {
         self
     }
 
-    /// Has something done at each completion, after what the subtask itself prepared. As an
-    /// effect it must be short: it keeps the platform from deciding anything meanwhile.
+    /// Calls `act` at each completion, after the effects of the subtask itself. Like every effect
+    /// it must be short: the platform cannot decide anything meanwhile.
     pub fn on_completion(&mut self, act: Box<dyn FnMut() + Send>) {
         let effect: Box<dyn Effect> = Box::new(act);
         self.add_effects([effect]);
     }
 
-    /// Keeps its signals from going anywhere.
+    /// Discards its signals from now on.
     pub(crate) fn mute(&mut self) {
         self.effects
             .all()
@@ -417,8 +423,8 @@ impl SubtaskCode {
             .for_each(|effect| effect.mute());
     }
 
-    /// Returns the word that a question of the latest turn has changed, if threads may sleep on it:
-    /// once, for a platform that wakes them.
+    /// Returns the word changed by a question of the latest turn, if threads may sleep on it: once,
+    /// for a platform to wake them.
     ///
     /// See [`DeviceDriver::bell`](crate::shared::DeviceDriver::bell).
     #[must_use]
@@ -429,32 +435,30 @@ impl SubtaskCode {
             .find_map(|effect| effect.bell())
     }
 
-    /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
-    /// platform to which a clock is dear need not read it for the others.
+    /// Reports whether [`complete`](Self::complete) ever has anything to do: if not, a platform
+    /// with an expensive clock need not read it.
     pub fn has_effects(&self) -> bool {
         self.has_effects
     }
 
-    /// Takes a turn of job `job` without its function, in the place of [`run`](Self::run): the last
-    /// one gives up its inputs, and those before it end in the stated waits, of no time.
+    /// Takes a turn of job `job` without its function, in place of [`run`](Self::run). The last
+    /// turn gives up the inputs; each earlier one ends in the stated wait, of no time.
     pub fn pass_over(&mut self, job: u64) {
         pass(&mut *self.subtask, job);
     }
 
-    /// Gives up the inputs of job `job` that have arrived, instead of running it, and what it waits
-    /// for.
+    /// Gives up the arrived inputs of job `job`, and its wait, instead of running the job.
     ///
-    /// To be called for an instance that will not run, once no predecessor of
-    /// it runs any more: a value that arrives later would stay in its slot.
-    /// Calling it again, or for a job of which nothing arrived, does no harm.
+    /// To be called for an instance that will not run, once none of its predecessors runs any more:
+    /// a value arriving later would stay in its slot. Calling it again, or for a job without
+    /// arrived inputs, does no harm.
     ///
-    /// Takes a bounded time, little stack, and runs no code of the app, so that it
-    /// may be called by a scheduler in mid-step: a value is not dropped here, but
-    /// by the predecessor that next needs its slot, in [`run`](Self::run), or with
-    /// the bodies.
+    /// Takes a bounded time and little stack, and runs no code of the app, so a scheduler may call
+    /// it in mid-step: a value is not dropped here, but by the predecessor that next needs its
+    /// slot, in [`run`](Self::run), or with the bodies.
     pub fn discard(&mut self, job: u64) {
         self.subtask.discard(job);
-        // It was cancelled while it waited.
+        // The instance was cancelled while waiting, so a device may still hold its question.
         if self.goes_on(job) {
             self.effects
                 .all()
@@ -470,20 +474,20 @@ impl SubtaskCode {
         self.subtask.replacement()
     }
 
-    /// Makes it go on with another function, where a fault has ended the present one: that is
-    /// given up without a destructor, and the states that it used are reset. The next
-    /// [`run`](Self::run) makes the other function, if it has to be made.
+    /// Continues with another function after a fault has ended the present one. The present
+    /// function is given up without a destructor, and its states are reset. The next
+    /// [`run`](Self::run) makes the new function, if necessary.
     ///
-    /// To be called once for a fault, before anything else of the DAG starts that was not started
-    /// then, and if the [`ReplacementCode`] is there. Takes a bounded time and runs no code of the
+    /// To be called once for each fault, if the [`ReplacementCode`] is there, and before the DAG
+    /// starts anything not yet started at the fault. Takes a bounded time and runs no code of the
     /// app.
     pub fn replace(&mut self) {
         self.subtask.replace();
         self.job = NO_JOB;
     }
 
-    /// Gives back the memory of a body that a fault has ended in mid-function, without
-    /// unwinding: all but what the app's function owns.
+    /// Frees the memory of a body ended by a fault in mid-function, without unwinding: all but what
+    /// the app's function owns.
     pub fn forget(self) {
         self.subtask.forget();
     }
@@ -497,8 +501,8 @@ impl core::fmt::Debug for SubtaskCode {
     }
 }
 
-/// The runner of one subtask's instances, one after another (R2): the
-/// [body](engine::SubtaskBody) in a platform's `Engine`.
+/// The runner of a subtask's instances, strictly in sequence (R2): the [body](engine::SubtaskBody)
+/// in a platform's `Engine`.
 ///
 /// ```
 /// use fass::platform::{Plan, SubtaskRunner};
@@ -512,18 +516,18 @@ impl core::fmt::Debug for SubtaskCode {
 /// ```
 #[derive(Debug)]
 pub struct SubtaskRunner {
-    /// Its function, with its ends of the topics.
+    /// The subtask's function, with its ends of the topics.
     pub body: SubtaskCode,
     /// The subtask.
     pub vertex: Vertex,
-    /// The instance that it runs, or ran last.
+    /// The instance in execution, or the last one.
     pub instance: Instance,
-    /// The part of the subject of events that is the same for all.
+    /// The part of an event's subject shared by all instances.
     ids: u64,
 }
 
 impl SubtaskRunner {
-    /// Makes one of each body of a plan, in the order of the vertices.
+    /// Makes a runner for each body of a plan, in the order of the vertices.
     pub fn all(task_set: &TaskSet, bodies: Vec<Vec<SubtaskCode>>) -> impl Iterator<Item = Self> {
         let of_dags = (0..).map(DagId).zip(bodies);
         of_dags.flat_map(move |(dag, of_dag)| {

@@ -1,12 +1,12 @@
-//! The turns of a subtask that waits: what each asks for, and whether it may.
+//! The turns of a waiting subtask: the wait each asks for, and whether it may.
 //!
-//! A *turn* is what an instance executes from its start, or the end of a wait, to its finish, or
-//! the next wait. How it ends is told by one poll of the instance's future. That is ready: then the
-//! instance has finished, and its outputs go out. Or it is pending: then one future of ours has
+//! A *turn* is the execution of an instance from the start, or the end of a wait, to the finish, or
+//! the next wait. One poll of the instance's future tells how it ends. A ready future means: the
+//! instance has finished, and its outputs go out. A pending one means: a future of this crate has
 //! begun one wait in it. The completion of such a turn returns that wait, and causes nothing else.
 //!
-//! The waits of a subtask are stated: their number, and the limit of each. An instance that waits
-//! otherwise panics with a [`WaitFault`].
+//! A subtask states the number of waits and the limit of each. An instance with any other waits
+//! panics with a [`WaitFault`].
 
 use alloc::boxed::Box;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
@@ -16,8 +16,8 @@ use sched_dag::lifecycle::WaitLimit;
 use sched_dag::{Wait, worded};
 
 worded! {
-    /// A fault of an instance that does not wait as its subtask states. Its text is the message of
-    /// the instance's panic.
+    /// A fault of an instance whose waits differ from the waits stated by the subtask. Its text is
+    /// the message of the instance's panic.
     ///
     /// ```
     /// use core::time::Duration;
@@ -39,33 +39,33 @@ worded! {
     /// assert_eq!(*message, WaitFault::TooLong { number: 0, asked, limit }.to_string());
     /// ```
     pub enum WaitFault {
-        /// The function begins a wait beyond those that its subtask states.
+        /// The function begins more waits than the subtask states.
         TooMany { stated: usize } = "wait_too_many",
             "a wait too many: the function begins one more than the {} that its subtask \
              states; state it by `wait`, or leave it out", stated;
-        /// The function has returned after fewer waits than its subtask states.
+        /// The function has returned after fewer waits than the subtask states.
         LeftOut { taken: u32, stated: usize } = "wait_left_out",
             "a wait left out: the function has returned after {} of the {} waits that \
              its subtask states; take each, one of no time if there is nothing to wait for, or \
              state fewer", taken, stated;
-        /// A wait, of that number from 0 on, asks for more than its limit.
+        /// The wait with this number, counted from 0, asks for more than the limit.
         TooLong { number: u32, asked: Duration, limit: Duration } = "wait_too_long",
             "a wait too long: wait {} asks for {:?}, and its limit is {:?}; ask \
              for less, or state a longer limit", number, asked, limit;
-        /// The future begins a second wait in one turn.
+        /// The future begins a second wait in the same turn.
         TwoAtOnce = "two_waits_at_once",
             "two waits at once: the function begins a wait before the last one has ended; await \
              one after the other";
-        /// The future has returned in the turn in which it has begun a wait.
+        /// The future has returned in the turn in which a wait has begun.
         NotAwaited = "wait_not_awaited",
             "a wait not awaited: the function has returned and dropped a wait that it has begun; \
              await it to its end";
-        /// The future is pending, and no wait of ours is the reason.
+        /// The future is pending for a reason other than a wait of this crate.
         Foreign = "foreign_wait",
             "a foreign wait: the function awaits what is none of its subtask's waits, and nothing \
              would end that; await `sleep`, `until`, a device's answer or a wire";
-        /// A wait of ours is polled by something else than the future of its subtask, in another
-        /// job than the one that began it, or after its end.
+        /// A wait of this crate is polled outside the future of its subtask, in another job than it
+        /// began in, or after its end.
         Outside = "wait_outside",
             "a wait outside: it is polled by something else than the instance that it is for, or \
              after its end; await it once, in the function of the async subtask that has it";
@@ -79,12 +79,12 @@ impl WaitFault {
     }
 }
 
-/// The end that a wait of ours asks for.
+/// The requested end of a wait.
 #[derive(Clone, Copy)]
 pub(crate) enum WaitEnd {
     /// The stated limit.
     Limit,
-    /// So many nanoseconds after it has begun.
+    /// So many nanoseconds after its begin.
     After(u64),
     /// So many, or the stated limit if that is less.
     AtMost(u64),
@@ -94,29 +94,29 @@ pub(crate) enum WaitEnd {
 
 /// The turn asks for no wait.
 const NONE: u8 = 0;
-/// It asks for one of so many nanoseconds.
+/// It asks for a wait of so many nanoseconds.
 const AFTER: u8 = 1;
-/// It asks for one until so many nanoseconds after the release.
+/// It asks for a wait until so many nanoseconds after the release.
 const SINCE_RELEASE: u8 = 2;
 
-/// No job.
+/// Stands for "no job".
 const NO_JOB: u64 = u64::MAX;
 
-/// The waits of a subtask, and how far its instance has come in them. Its users take turns, by the
-/// word of the scheduler: the instance while it executes, its completion, the end of its wait. So
-/// nothing in here needs an order.
+/// The waits of a subtask, and its instance's progress in them. The users take turns, ordered by
+/// the scheduler: the executing instance, its completion, the end of the wait. So no access here
+/// needs a memory order.
 pub(crate) struct TurnState {
     /// The stated limits.
     limits_ns: Box<[u64]>,
     /// The job of the instance that has started and not returned.
     job: AtomicU64,
-    /// How many waits it has begun.
+    /// The number of waits begun by the instance.
     begun: AtomicU32,
     /// [`NONE`], [`AFTER`] or [`SINCE_RELEASE`], and how many nanoseconds.
     asks: AtomicU8,
     asked_ns: AtomicU64,
     has_timed_out: AtomicBool,
-    /// So much after the release it is at least.
+    /// The least time since the release.
     reached_ns: AtomicU64,
 }
 
@@ -133,7 +133,7 @@ impl TurnState {
         }
     }
 
-    /// Returns what tells it from those of other subtasks.
+    /// Returns its address, which differs from those of other subtasks.
     pub(crate) fn address(&self) -> usize {
         core::ptr::from_ref(self).addr()
     }
@@ -144,14 +144,15 @@ impl TurnState {
     }
 
     pub(crate) fn start(&self, job: u64) {
-        // An instance before it may have been cancelled, or have failed, at any of its waits.
+        // The previous instance may have been cancelled, or have failed, at any of its waits, and
+        // so may have left any state here.
         self.job.store(job, Ordering::Relaxed);
         self.begun.store(0, Ordering::Relaxed);
         self.asks.store(NONE, Ordering::Relaxed);
         self.reached_ns.store(0, Ordering::Relaxed);
     }
 
-    /// Returns the job and the number of waits that it has begun.
+    /// Returns the job and the number of waits it has begun.
     pub(crate) fn latest(&self) -> (u64, u32) {
         let (job, begun) = (&self.job, &self.begun);
         (job.load(Ordering::Relaxed), begun.load(Ordering::Relaxed))
@@ -174,8 +175,8 @@ impl TurnState {
             WaitFault::TwoAtOnce.raise()
         }
         let reached_ns = self.reached_ns.load(Ordering::Relaxed);
-        // An instant of the job is judged by what is certain, not by the present time: so it is a
-        // fault in each run, or in none.
+        // An instant of the job is checked against the time that has certainly passed, not against
+        // the present time: so the wait is a fault in every run, or in none.
         let (asks, asked_ns, most_ns) = match end {
             WaitEnd::Limit => (AFTER, limit_ns, limit_ns),
             WaitEnd::After(ns) => (AFTER, ns, ns),
@@ -200,7 +201,7 @@ impl TurnState {
         }
     }
 
-    /// Ends a turn whose future is pending.
+    /// Checks that a turn with a pending future has begun a wait.
     pub(crate) fn expect_wait(&self) {
         if !self.is_asking() {
             WaitFault::Foreign.raise()
@@ -212,7 +213,8 @@ impl TurnState {
         if self.is_asking() {
             WaitFault::NotAwaited.raise()
         }
-        // Fewer would be harmless to the bound, but a replay and the law count on each.
+        // Fewer waits would not harm the response-time bound, but a replay and the law count on
+        // each stated wait.
         let (taken, stated) = (self.begun.load(Ordering::Relaxed), self.limits_ns.len());
         if (taken as usize) < stated {
             WaitFault::LeftOut { taken, stated }.raise()
@@ -220,10 +222,10 @@ impl TurnState {
         self.job.store(NO_JOB, Ordering::Relaxed);
     }
 
-    /// Takes a turn of a job whose function is not called, and reports whether it is the last one:
-    /// each stated wait is taken, for no time.
+    /// Takes a turn of a job without calling the function, and reports whether it is the last. Each
+    /// stated wait is taken, for no time.
     pub(crate) fn pass(&self, job: u64) -> bool {
-        // The job's first turn is told by the job alone, as in a turn that calls the function.
+        // The job number alone tells the job's first turn, as in a turn that calls the function.
         if !self.is_of(job) {
             self.start(job);
         }
@@ -235,8 +237,8 @@ impl TurnState {
         is_last
     }
 
-    /// Takes the wait that the turn has ended in, if the instance has not finished, and how long that
-    /// is at the most.
+    /// Takes the wait in which the turn has ended, if the instance has not finished, with its
+    /// longest duration in ns.
     pub(super) fn take_wait(&self) -> Option<(WaitLimit, u64)> {
         let ns = self.asked_ns.load(Ordering::Relaxed);
         let asks = self.asks.load(Ordering::Relaxed);
@@ -244,17 +246,17 @@ impl TurnState {
         match asks {
             NONE => None,
             AFTER => Some((WaitLimit::For(ns), ns)),
-            // The release is not later than the end of the turn.
+            // The release is not later than the end of the turn, so `ns` bounds the wait.
             _ => Some((WaitLimit::SinceRelease(ns), ns)),
         }
     }
 
-    /// Reports whether the latest wait has ended by its limit.
+    /// Reports whether the latest wait has ended by the limit.
     pub(crate) fn has_timed_out(&self) -> bool {
         self.has_timed_out.load(Ordering::Relaxed)
     }
 
-    /// Learns how the wait has ended, before the next turn.
+    /// Notes how the wait has ended, before the next turn.
     pub(crate) fn wake(&self, has_timed_out: bool) {
         self.has_timed_out.store(has_timed_out, Ordering::Relaxed);
     }

@@ -1,8 +1,9 @@
-//! A subtask that waits: each instance is a future, polled once a [turn](super::turn).
+//! The body of a waiting subtask: each instance is a future, polled once in each
+//! [turn](super::turn).
 //!
-//! The function is called in the first turn; what it returns is the instance's future, which is all
-//! that it keeps while it waits. That has one place, made at the commit. It is polled with a waker
-//! by which a future of ours finds the turn, to begin its wait.
+//! The function is called in the first turn and returns the instance's future. An instance keeps
+//! nothing else while it waits. The future has one place, made at the commit. It is polled with a
+//! waker through which futures of this crate find the turn, to begin their waits.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -18,7 +19,7 @@ use super::topic::{DagWiring, Publisher, Subscriber, Token};
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 use super::turn::{TurnState, WaitEnd, WaitFault};
 
-/// A wait of a future of ours, which the first poll begins.
+/// A wait, begun by the first poll.
 pub(crate) struct WaitStep {
     end: WaitEnd,
     /// The address of the turns, the job, and the number of waits with this one.
@@ -40,36 +41,36 @@ impl WaitStep {
         self.begun.map(|(_, job, count)| (job, count - 1))
     }
 
-    /// Lets it end otherwise.
+    /// Changes the requested end of the wait.
     pub(crate) fn end(&mut self, end: WaitEnd) {
         self.end = end;
     }
 
-    /// Returns the job and the number that it will have, if it has not begun.
+    /// Returns the job and the number it will have, if the wait has not begun.
     pub(crate) fn next_id(&self, context: &Context<'_>) -> Option<(u64, u32)> {
         let turn = turn_of(context.waker()).filter(|_| self.begun.is_none());
         turn.map(TurnState::latest)
     }
 
-    /// Begins it, or returns whether it has ended by its limit.
+    /// Begins the wait, or returns whether it has ended by its limit.
     pub(crate) fn poll(&mut self, context: &Context<'_>) -> Poll<bool> {
         let Some(turn) = turn_of(context.waker()) else {
             WaitFault::Outside.raise()
         };
         let address = turn.address();
         let Some((begun_in, job, count)) = self.begun else {
-            // The first poll is in the turn that ends with this wait.
+            // The turn of the first poll is the turn ended by this wait.
             turn.begin(self.end);
             let (job, count) = turn.latest();
             self.begun = Some((address, job, count));
             return Poll::Pending;
         };
         let (present, latest) = turn.latest();
-        // Of another instance nothing is known here.
+        // This state knows nothing of waits begun in another instance.
         if self.is_over || (begun_in, job) != (address, present) {
             WaitFault::Outside.raise()
         }
-        // An answer is for the latest wait only.
+        // An answer is for the latest wait only; an older wait counts as timed out.
         let is_latest = count == latest;
         if is_latest && turn.is_asking() {
             return Poll::Pending;
@@ -87,9 +88,10 @@ impl Future for WaitStep {
     }
 }
 
-/// Waits for that much time, in the function of an async subtask; no longer than the wait's limit.
+/// Waits for `duration`, in the function of an async subtask; never longer than the wait's limit.
 ///
-/// A sleep of no time is a wait, too: the instance gives its core up, and competes for one again.
+/// A sleep of zero length is a wait, too: the instance gives up the core, and competes for a core
+/// again.
 ///
 /// ```
 /// use core::time::Duration;
@@ -112,7 +114,7 @@ impl Future for WaitStep {
 ///
 /// # Panics
 ///
-/// With a [`WaitFault`], in the turn in which it begins, if the wait is not as stated.
+/// With a [`WaitFault`], in the turn that begins the wait, if the wait is not as stated.
 pub async fn sleep(duration: Duration) {
     WaitStep::new(WaitEnd::After(nanoseconds(duration))).await;
 }
@@ -120,8 +122,8 @@ pub async fn sleep(duration: Duration) {
 /// Waits, in the function of an async subtask, until that much time has passed since the release of
 /// its job; for no time if it has.
 ///
-/// The limit of the wait has to be that long, less what an earlier `until` of the instance has
-/// waited for; when the job started does not matter.
+/// The limit of the wait must be that long, less the time covered by an earlier `until` of the
+/// instance; when the job started does not matter.
 ///
 /// ```
 /// use core::time::Duration;
@@ -143,21 +145,21 @@ pub async fn sleep(duration: Duration) {
 ///
 /// # Panics
 ///
-/// With a [`WaitFault`], in the turn in which it begins, if the wait is not as stated.
+/// With a [`WaitFault`], in the turn that begins the wait, if the wait is not as stated.
 pub async fn until(since_release: Duration) {
     WaitStep::new(WaitEnd::SinceRelease(nanoseconds(since_release))).await;
 }
 
-/// Returns a duration as a number, the last one if it is beyond that.
+/// Converts a duration to nanoseconds, saturating at `u64::MAX`.
 pub(crate) fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// The ends of a subtask's edges.
 trait SubtaskEnds: Send {
-    /// The argument of its function.
+    /// The argument of the subtask's function.
     type Args;
-    /// The result.
+    /// The result of the function's future.
     type Ret;
 
     fn receive(&mut self, job: u64) -> Self::Args;
@@ -167,7 +169,7 @@ trait SubtaskEnds: Send {
     fn discard(&mut self, job: u64);
 }
 
-/// Those of a typed subtask.
+/// The ends of a typed subtask.
 struct TypedEnds<Subs, Pubs>(Subs, Pubs);
 
 impl<Subs: MulRecv + Send, Pubs: MulSend + Send> SubtaskEnds for TypedEnds<Subs, Pubs> {
@@ -176,7 +178,7 @@ impl<Subs: MulRecv + Send, Pubs: MulSend + Send> SubtaskEnds for TypedEnds<Subs,
 
     fn receive(&mut self, job: u64) -> Subs::Items {
         self.0.grant(job);
-        // Its inputs are there, or it would not be eligible, so one poll is enough.
+        // The inputs are there, or the instance would not be eligible; so a single poll is enough.
         match pin!(self.0.recv_all()).poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(args) => args,
             Poll::Pending => unreachable!("a job that is granted is there"),
@@ -195,7 +197,7 @@ impl<Subs: MulRecv + Send, Pubs: MulSend + Send> SubtaskEnds for TypedEnds<Subs,
     }
 }
 
-/// Those of an untyped one.
+/// The ends of an untyped subtask.
 struct UntypedEnds(Vec<Subscriber<Token>>, Publisher<Token>);
 
 impl SubtaskEnds for UntypedEnds {
@@ -233,7 +235,7 @@ where
     })
 }
 
-/// Defers making the body of an untyped one.
+/// Defers making the body of an untyped async function.
 pub(crate) fn defer_untyped<F, Fut>(f: F) -> MakeBody
 where
     F: FnMut(u64) -> Fut + Send + 'static,
@@ -259,11 +261,11 @@ where
     }))
 }
 
-/// The body of a subtask whose function is async.
+/// The body of a subtask with an async function.
 struct WaitingBody<F, Fut, E> {
     f: F,
     ends: E,
-    /// The place of the instance's future, which stays where it is.
+    /// The place of the instance's future, which never moves.
     future: Pin<Box<Option<Fut>>>,
     turn: Arc<TurnState>,
 }
@@ -282,7 +284,8 @@ where
             turn,
         } = self;
         if !turn.is_of(job) {
-            // That of an instance that was cancelled while it waited. Here, as it is the app's code.
+            // A future left here belongs to an instance cancelled during a wait. Dropped here, in
+            // an instance, as its destructor is code of the app.
             future.set(None);
             let args = ends.receive(job);
             turn.start(job);
@@ -295,7 +298,8 @@ where
             Poll::Pending => turn.expect_wait(),
             Poll::Ready(results) => {
                 turn.finish();
-                // Before the outputs go out: its destructor is the function's, and may panic.
+                // Before the outputs go out: the future's destructor is code of the app, and may
+                // panic.
                 future.set(None);
                 ends.send(job, results);
             }
@@ -312,7 +316,7 @@ where
 
     fn forget(self: Box<Self>) {
         core::mem::forget(self.f);
-        // With its place: nothing else may be put where a future is that was not dropped.
+        // With its place: a future that was not dropped is pinned, so its memory may not be reused.
         core::mem::forget(self.future);
     }
 }

@@ -1,60 +1,55 @@
-//! The cells in which the crate's `unsafe` lives; that of records, and the waker of turns, are in
-//! files of their own.
+//! The cells holding the crate's `unsafe` code. The cell of records, the places and the waker of
+//! turns have files of their own.
 //!
 //! # The slot ring
 //!
-//! For our purposes an *edge* is a topic as one of its readers sees it. Each
-//! edge is a ring of J *slots*, J being the number of jobs that the DAG may
-//! have in flight, up to the next power of two; so a job always finds a free slot. A
-//! ring has exactly one
-//! [`Writer`] and one [`Reader`]. Neither can be cloned, and everything they do
-//! takes `&mut self`; so at any time at most one thread acts for each side.
+//! Here an *edge* is a topic as one of its readers sees it. Each edge is a ring of J *slots*, J
+//! being the number of jobs the DAG may have in flight, up to the next power of two; so a job
+//! always finds a free slot. A ring has exactly one [`Writer`] and one [`Reader`]. Neither can be
+//! cloned, and all their methods take `&mut self`; so at any time at most one thread acts for each
+//! side.
 //!
-//! Which slot a job gets carries no meaning; what identifies a value is its job
-//! number. One slot is *near*: it is all there is where one job is in flight, and taken
-//! first where several may be. Both ends go round the others in the order of jobs, so that
-//! each looks at the right slot at once; after a job was cancelled they may look at all of
-//! them. (A slot could be chosen by `k mod J` only if jobs in flight were
-//! consecutive. They are not where an overrun skips releases: with J = 2, jobs
-//! 1 and 3 can be in flight together.)
+//! The slot of a job carries no meaning; the job number identifies a value. One slot is *near*: the
+//! only slot if one job may be in flight, and otherwise the first to be tried. Both ends go round
+//! the others in the order of jobs, so each finds the right slot at once; after a cancelled job
+//! they may look at all of them. (Choosing a slot by `k mod J` would require consecutive jobs in
+//! flight. An overrun skipping releases breaks the sequence: with J = 2, jobs 1 and 3 can be in
+//! flight together.)
 //!
-//! A slot holds a value and one atomic word, its *turn*: 0 while the slot is
-//! empty, `2k + 1` (modulo 2^64) while it holds the value of job k, and 2 while it holds
-//! one that was given up. (Job k + 2^63 has the turn of job k, but no run gets there in
-//! 292 years.) One soundness argument, cited below by its name, covers the ring:
+//! A slot holds a value and an atomic word, the *turn*: 0 while the slot is empty, `2k + 1` (modulo
+//! 2^64) while the slot holds the value of job k, and 2 while it holds a value given up. (Job k +
+//! 2^63 has the turn of job k, but no run gets there in 292 years.) One soundness argument, cited
+//! below by name, covers the ring:
 //!
-//! > **Turn invariant.** While a slot's turn is even, only the ring's writer may
-//! > touch the slot's value; while it is odd, only the ring's reader. The value is
-//! > uninitialised if the turn is 0, and initialised otherwise.
-//! > Only the side whose turn it is changes the turn: the writer from 0 to
-//! > `2k + 1` once the value is written, the reader back to 0 once the value is
-//! > moved out, or to 2 to leave it to the writer, which makes that 0 before it drops the
-//! > value. A change of sides is a `Release` store and the other side's look at
-//! > it an `Acquire` load, so all that one side did to the value
-//! > happens before all that the other does.
+//! > **Turn invariant.** While a slot's turn is even, only the ring's writer may touch the slot's
+//! > value; while the turn is odd, only the ring's reader. The value is uninitialised if the turn
+//! > is 0, and initialised otherwise. Only the side in possession of the slot changes the turn. The
+//! > writer changes 0 to `2k + 1` once the value is written. The reader changes it back to 0 once
+//! > the value is moved out, or to 2 to leave the value to the writer, which sets it to 0 before
+//! > dropping the value. A change of sides is a `Release` store, and the other side looks at it by
+//! > an `Acquire` load. So all accesses of one side to the value happen before all of the other.
 //!
-//! The reader *gives up* the value of a cancelled job, which takes a few instructions,
-//! and the writer drops it in its place once it needs the slot. Dropping is the app's
-//! code: it may panic, take long or never end. A job is cancelled by the scheduler in
-//! mid-step, while the writer runs as a subtask of that DAG: preempted and contained.
+//! The reader *gives up* the value of a cancelled job in a few instructions, and the writer drops
+//! the value in place when the slot is next needed. Dropping is the app's code and may panic, take
+//! long or never end. The scheduler cancels a job in mid-step, where app code must not run; the
+//! writer runs as a subtask of the DAG, preempted and contained.
 //!
-//! Because there is one thread a side, a load and a store suffice: nothing here
-//! is a locked read-modify-write. The invariant does not lean on the scheduler:
-//! a platform that runs instances in a wrong order gets its value refused
-//! ([`Writer::put`]) or finds none ([`Reader::take`]), but never a data race.
+//! With one thread on each side, a load and a store suffice: the ring contains no locked
+//! read-modify-write. The invariant does not depend on the scheduler. On a platform running
+//! instances in a wrong order, [`Writer::put`] refuses the value or [`Reader::take`] finds none,
+//! but a data race never occurs.
 //!
 //! # The shared value
 //!
-//! A [`SharedCell`] value is changed by one user or looked at by several, never both. A
-//! user *claims* it for that time. Nobody ever waits: the schedule is such that
-//! every claim succeeds, and one that does not is refused.
+//! The value of a [`SharedCell`] is changed by a single user or read by several users, never both.
+//! A user *claims* the value for the time of the access. Nobody ever waits: in a correct schedule
+//! every claim succeeds, and any other claim is refused.
 //!
-//! > **Claim invariant.** The word `claims` counts the users that look at the value, or
-//! > is `CHANGING` while one may change it. Nobody touches the value without a
-//! > claim. A claim is made by an `Acquire` exchange that moves `claims` from 0 to
-//! > `CHANGING`, or from any smaller count to the next; it is given back by a
-//! > `Release` change. So all that one holder did happens before all that the next
-//! > conflicting one does.
+//! > **Claim invariant.** The word `claims` counts the users reading the value, or is `CHANGING`
+//! > while a user may change the value. Nobody touches the value without a claim. A claim is made
+//! > by an `Acquire` exchange moving `claims` from 0 to `CHANGING`, or from any smaller count to
+//! > the next; it is given back by a `Release` change. So all accesses by one holder happen before
+//! > all by the next conflicting holder.
 
 pub(crate) mod outbox;
 pub(crate) mod places;
@@ -68,19 +63,20 @@ use core::ops::{Deref, DerefMut};
 use core::ptr;
 use core::sync::atomic::{AtomicPtr, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
-/// The turn of a slot that holds no value.
+/// The turn of an empty slot.
 const EMPTY_SLOT: u64 = 0;
 
 /// The turn of a slot whose value was given up.
 const GIVEN_UP: u64 = 2;
 
-/// Returns the turn of a slot that holds the value of a job.
+/// Returns the turn of a slot holding the value of `job`.
 #[inline]
 const fn turn_of(job: u64) -> u64 {
     job << 1 | 1
 }
 
-/// Makes the ring of one edge with `slots` slots at least; besides the near one a power of two.
+/// Makes the ring of an edge with at least `slots` slots: the near slot, and a power of two of
+/// others.
 ///
 /// # Panics
 ///
@@ -102,24 +98,24 @@ pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
     (writer, Reader { ring, next: 0 })
 }
 
-/// The writing end of an edge. There is one, and it cannot be cloned.
+/// The writing end of an edge. There is only one, and no clone.
 pub(crate) struct Writer<T> {
     ring: Arc<Ring<T>>,
-    /// The other slot to look at first, counted on and on.
+    /// The other slot to try first, counted up without end.
     next: usize,
 }
 
-/// The reading end of an edge. There is one, and it cannot be cloned.
+/// The reading end of an edge. There is only one, and no clone.
 pub(crate) struct Reader<T> {
     ring: Arc<Ring<T>>,
-    /// The other slot to look at first, counted on and on.
+    /// The other slot to try first, counted up without end.
     next: usize,
 }
 
 impl<T> Writer<T> {
-    /// Puts the value of `job` into a free slot, or gives the value back if all
-    /// are taken. Drops the value in a slot that was given up, if it takes that.
-    // Always: whether it becomes a call is chance else, and a call costs each reader 20 instructions.
+    /// Puts the value of `job` into a free slot, or returns the value if all slots are taken. Drops
+    /// a given-up value before reusing the slot.
+    // Always: otherwise inlining depends on chance, and a call costs each reader 20 instructions.
     #[inline(always)]
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
         let slot = match self.ring.near(EMPTY_SLOT) {
@@ -137,17 +133,17 @@ impl<T> Writer<T> {
         Ok(())
     }
 
-    /// Finds an empty slot, or makes one so that was given up.
+    /// Finds an empty slot, or empties a slot whose value was given up.
     #[cold]
     fn make_room(&mut self) -> Option<&Slot<T>> {
         let slot = (self.ring).search(&mut self.next, |turn| turn & 1 == 0)?;
         if slot.turn.load(Ordering::Relaxed) == GIVEN_UP {
-            // First, so that the value is not dropped again should its `drop` panic.
+            // The store comes first: should `drop` panic, the value is not dropped again.
             slot.turn.store(EMPTY_SLOT, Ordering::Relaxed);
             let place = slot.value.get().cast::<T>();
-            // SAFETY: by the turn invariant the value of a slot that was given up is
-            // initialised and the writer's alone, and `&mut self` makes us the only
-            // thread that acts as the writer. The turn says already that it is gone.
+            // SAFETY: by the turn invariant the value of a slot that was given up is initialised
+            // and the writer's alone, and `&mut self` makes us the only thread that acts as the
+            // writer. The turn is 0 already, so nobody drops the value a second time.
             unsafe { place.drop_in_place() };
         }
         Some(slot)
@@ -155,25 +151,25 @@ impl<T> Writer<T> {
 }
 
 impl<T> Reader<T> {
-    /// Moves the value of `job` out of its slot, or returns `None` if no slot
-    /// holds that very job's value.
+    /// Moves the value of `job` out of the slot, or returns `None` if no slot holds the value of
+    /// exactly this job.
     #[inline]
     pub(crate) fn take(&mut self, job: u64) -> Option<T> {
         let slot = self.slot_of(job)?;
         let place = slot.value.get().cast::<T>();
-        // SAFETY: by the turn invariant a slot with a turn other than 0 is
-        // initialised and the reader's alone, and `&mut self` makes us the only
-        // thread that acts as the reader. The store below ends our turn, so the
-        // value is not read twice.
+        // SAFETY: by the turn invariant the value of a slot with an odd turn is initialised and the
+        // reader's alone, and `&mut self` makes us the only thread that acts as the reader. The
+        // store below ends our turn, so the value is not read twice.
         let value = unsafe { place.read() };
         slot.turn.store(EMPTY_SLOT, Ordering::Release);
         Some(value)
     }
 
-    /// Leaves the value of `job`, if some slot holds it, to the writer.
+    /// Leaves the value of `job`, if present in a slot, to the writer.
     pub(crate) fn give_up(&mut self, job: u64) {
         if let Some(slot) = self.slot_of(job) {
-            // Relaxed suffices: this end has not touched the value, which the writer drops.
+            // Relaxed suffices: this end has not touched the value, so the writer's drop needs no
+            // order with a read here.
             slot.turn.store(GIVEN_UP, Ordering::Relaxed);
         }
     }
@@ -188,33 +184,32 @@ impl<T> Reader<T> {
     }
 }
 
-/// The slots of one edge, which its two ends share.
+/// The slots of an edge, shared by the two ends.
 struct Ring<T> {
     near: Slot<T>,
     others: Box<[Slot<T>]>,
 }
 
-/// A place for one value.
+/// A place for a single value.
 struct Slot<T> {
     turn: AtomicU64,
     value: UnsafeCell<MaybeUninit<T>>,
 }
 
-// SAFETY: the value is reached through the two ends only, which follow the turn
-// invariant; a value is thereby handed from one thread to another but never
-// shared, which is why `T: Send` is enough.
+// SAFETY: the value is reached through the two ends only, and both follow the turn invariant. A
+// value is thereby handed from one thread to another but never shared, so `T: Send` is enough.
 unsafe impl<T: Send> Sync for Slot<T> {}
 
 impl<T> Ring<T> {
-    /// Returns the near slot if it has the given turn, as it nearly always does. Its look
-    /// at the turn is an `Acquire`.
+    /// Returns the near slot if the slot has the given turn, as is nearly always the case. Loads
+    /// the turn by `Acquire`.
     #[inline]
     fn near(&self, turn: u64) -> Option<&Slot<T>> {
         (self.near.turn.load(Ordering::Acquire) == turn).then_some(&self.near)
     }
 
-    /// Finds a slot whose turn is meant, by such a look, from other slot `next` on, and
-    /// moves `next` behind it.
+    /// Finds a slot whose turn satisfies `is_meant`, from other slot `next` on, and moves `next`
+    /// past it. Loads each turn by `Acquire`.
     #[cold]
     fn search(&self, next: &mut usize, is_meant: impl Fn(u64) -> bool) -> Option<&Slot<T>> {
         for _ in 0..self.others.len() {
@@ -240,31 +235,31 @@ impl<T> Slot<T> {
 impl<T> Drop for Slot<T> {
     fn drop(&mut self) {
         if *self.turn.get_mut() != EMPTY_SLOT {
-            // SAFETY: by the turn invariant a slot with a turn other than 0 is
+            // SAFETY: by the turn invariant the value of a slot with a turn other than 0 is
             // initialised; `&mut self` shows that both ends are gone.
             unsafe { self.value.get_mut().assume_init_drop() };
         }
     }
 }
 
-/// The claims of a value that is being changed; also more than can ever look.
+/// The claims of a value being changed; also greater than any count of readers.
 const CHANGING: u32 = u32::MAX;
 
-/// A value that one may change or several look at.
+/// A value that a single user may change or several users may read.
 pub(crate) struct SharedCell<T> {
     claims: AtomicU32,
     value: UnsafeCell<ManuallyDrop<T>>,
 }
 
-// SAFETY: by the claim invariant threads have either one `&mut T` or several `&T`
-// between them. `T: Send` because the value is changed, and moved out of and into
-// its place, by one thread after another; `T: Sync` because several look at it.
+// SAFETY: by the claim invariant threads have either one `&mut T` or several `&T` between them. `T:
+// Send` because one thread after another changes the value, and moves the value out of and into the
+// cell; `T: Sync` because several threads read the value at once.
 unsafe impl<T: Send + Sync> Sync for SharedCell<T> {}
 
 /// The claim of a user that may change the value.
 pub struct WriteClaim<'a, T>(&'a SharedCell<T>);
 
-/// The claim of a user that looks at the value.
+/// The claim of a user reading the value.
 pub struct ReadClaim<'a, T>(&'a SharedCell<T>);
 
 impl<T> SharedCell<T> {
@@ -283,7 +278,7 @@ impl<T> SharedCell<T> {
         claim.ok().map(|_| WriteClaim(self))
     }
 
-    /// Claims the value for a look, unless somebody may change it.
+    /// Claims the value for reading, unless somebody may change the value.
     pub(crate) fn look(&self) -> Option<ReadClaim<'_, T>> {
         let one_more = |claims| (claims < CHANGING - 1).then(|| claims + 1);
         let claim = self
@@ -295,9 +290,10 @@ impl<T> SharedCell<T> {
 
 impl<T> Drop for SharedCell<T> {
     fn drop(&mut self) {
-        // One that a fault has left half changed stays as it is.
+        // A value left half changed by a fault is not dropped: its destructor might see a broken
+        // value.
         if *self.claims.get_mut() != CHANGING {
-            // SAFETY: `&mut self` shows that no claim is in use, and it is done once.
+            // SAFETY: `&mut self` shows that no claim is in use, and `drop` runs only once.
             unsafe { ManuallyDrop::drop(self.value.get_mut()) };
         }
     }
@@ -307,16 +303,16 @@ impl<T> Deref for WriteClaim<'_, T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        // SAFETY: by the claim invariant this claim is the only one, and `&self`
-        // keeps it from giving out `&mut T` meanwhile.
+        // SAFETY: by the claim invariant this claim is the only claim, and `&self` keeps it from
+        // giving out `&mut T` meanwhile.
         unsafe { &*self.0.value.get() }
     }
 }
 
 impl<T> DerefMut for WriteClaim<'_, T> {
     fn deref_mut(&mut self) -> &mut T {
-        // SAFETY: by the claim invariant this claim is the only one, and `&mut self`
-        // keeps it from giving out another reference meanwhile.
+        // SAFETY: by the claim invariant this claim is the only claim, and `&mut self` keeps it
+        // from giving out another reference meanwhile.
         unsafe { &mut *self.0.value.get() }
     }
 }
@@ -331,11 +327,11 @@ impl<T> Deref for ReadClaim<'_, T> {
     }
 }
 
-/// A value that one at a time may change, and nobody looks at.
+/// A value that a single user at a time may change, and nobody else reads.
 pub(crate) struct ExclusiveCell<T>(SharedCell<T>);
 
-// SAFETY: by the claim invariant threads have one `&mut T` between them, as no claim is made for a
-// look. `T: Send` because one thread after another has it.
+// SAFETY: by the claim invariant threads have one `&mut T` between them, as a claim for reading is
+// never made. `T: Send` because one thread after another has the reference.
 unsafe impl<T: Send> Sync for ExclusiveCell<T> {}
 
 impl<T> ExclusiveCell<T> {
@@ -348,11 +344,11 @@ impl<T> ExclusiveCell<T> {
         self.0.change()
     }
 
-    /// Forgets a claim that a fault has left, when it has ended the instance that had it.
+    /// Removes a claim left behind by an instance that a fault has ended.
     ///
     /// # Safety
     ///
-    /// No claim is in use, nor will one be that was made before.
+    /// No claim is in use, and no claim made before will be used again.
     pub(crate) unsafe fn forget_claim(&self) {
         self.0.claims.store(0, Ordering::Release);
     }
@@ -374,7 +370,10 @@ const EMPTY: u8 = 0;
 const WRITING: u8 = 1;
 const SET: u8 = 2;
 
-/// A value that is set at most once and then read by everybody.
+/// A value set at most once and then read by everybody.
+///
+/// > **Set-once invariant.** Only the thread moving `state` from `EMPTY` to `WRITING` writes the
+/// > value, and then stores `SET` by `Release`. All others load `SET` by `Acquire` first.
 ///
 /// ```
 /// static PLACE: fass::platform::SetOnce<u32> = fass::platform::SetOnce::new();
@@ -388,8 +387,8 @@ pub struct SetOnce<T> {
     value: UnsafeCell<MaybeUninit<T>>,
 }
 
-// SAFETY: by the set-once invariant the value is written by one thread before
-// any thread reads it. `T: Send` as the owner drops it, `T: Sync` as all look at it.
+// SAFETY: by the set-once invariant one thread writes the value before any thread reads the value.
+// `T: Send` as the owner drops the value, `T: Sync` as all threads read the value.
 unsafe impl<T: Send + Sync> Sync for SetOnce<T> {}
 
 impl<T> SetOnce<T> {
@@ -402,7 +401,8 @@ impl<T> SetOnce<T> {
         }
     }
 
-    /// Sets the value, and reports whether this call was the one that did.
+    /// Sets the value, unless the value is set already. Reports whether this call has set the
+    /// value.
     pub fn set(&self, value: T) -> bool {
         let claim =
             self.state
@@ -418,7 +418,7 @@ impl<T> SetOnce<T> {
         true
     }
 
-    /// Returns the value, or `None` while none is set.
+    /// Returns the value, or `None` before the value is set.
     #[inline]
     pub fn get(&self) -> Option<&T> {
         if self.state.load(Ordering::Acquire) != SET {
@@ -434,13 +434,14 @@ impl<T> SetOnce<T> {
 impl<T> Drop for SetOnce<T> {
     fn drop(&mut self) {
         if *self.state.get_mut() == SET {
-            // SAFETY: by the set-once invariant it is initialised, and `&mut self` is alone.
+            // SAFETY: by the set-once invariant the value is initialised, and `&mut self` is the
+            // only access.
             unsafe { self.value.get_mut().assume_init_drop() };
         }
     }
 }
 
-/// Which of several values is current. Reading it is a load.
+/// A pointer to the current one of several static values. Reading the pointer is a single load.
 ///
 /// > **Current invariant.** The pointer always comes from a `&'static T`.
 pub(crate) struct CurrentIndex<T: 'static>(AtomicPtr<T>);
@@ -458,7 +459,8 @@ impl<T: Sync> CurrentIndex<T> {
     #[inline]
     pub(crate) fn get(&self) -> &'static T {
         let current = self.0.load(Ordering::Acquire);
-        // SAFETY: by the current invariant it is valid, and only looked at, for ever.
+        // SAFETY: by the current invariant the pointer is valid for ever, and the value is never
+        // changed.
         unsafe { &*current }
     }
 }
