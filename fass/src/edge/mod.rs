@@ -1,17 +1,19 @@
 //! The edge of a run on a machine: values are written into a buffer, or taken from a recording.
 //!
-//! A *tape* takes what happens, from the core that completes, and makes places for values, into
-//! which instances write them: it allocates nothing and waits for nothing. The *drain* makes the
-//! file of it, whenever a core has time. A *replay* lends recorded values, and compares those that
-//! are computed. An *echo* keeps the latest value of a topic for people to look at. If none of
-//! these is asked for, the inputs of the last jobs may be kept, for the case that one fails.
+//! A *tape* takes events from the core executing a completion, and provides places into which
+//! instances write their values; it allocates nothing and waits for nothing. The *drain* turns the
+//! tape into a file whenever a core has time. A *replay* lends recorded values, and compares
+//! computed values with them. An *echo* keeps the latest value of a topic for people to look at.
+//! Without any of these, the edge may keep the inputs of the last jobs, in case an instance fails.
 //!
-//! A platform reaches all this by what [`Platform::open_channels`](crate::platform::Platform::open_channels)
-//! gives it, so that an image in which no topic is recorded has none of this code.
+//! A platform reaches all this through the parameters of
+//! [`Platform::open_channels`](crate::platform::Platform::open_channels), so an image without a
+//! recorded topic contains none of this code.
 //!
-//! The [`Edge`] of a platform's runs knows what is wished of it, and has what carries that out. A
-//! platform has one, behind a lock of its own. Most of what it does under that lock is done
-//! under the scheduler's lock, too; the drain is lent to whoever sends, so sending holds neither.
+//! The [`Edge`] of a platform's runs knows the wishes of the command line, and owns the parts
+//! carrying them out. A platform has one edge, behind a lock of its own. Most work under that lock
+//! is done under the scheduler's lock, too. The drain is lent to the sender, so sending holds
+//! neither lock.
 
 mod echo;
 mod excerpt;
@@ -44,43 +46,43 @@ pub use crate::run::line::RecordedValue;
 /// See [`Crossing`].
 #[derive(Clone, Copy, Debug)]
 pub enum EdgeMode {
-    /// Record it.
+    /// Record the run.
     Record {
-        /// The app that is recorded, by its name.
+        /// The name of the recorded app.
         app: &'static str,
-        /// The room for what is not drained yet.
+        /// The room for records not drained yet, in bytes.
         bytes: usize,
     },
     /// Replay these bytes.
     Replay {
         /// A recording.
         bytes: &'static [u8],
-        /// The job of a DAG to begin with, or before it, if that is not the first one.
+        /// The job of a DAG to be computed, if not the first. The replay begins with it or before.
         from: Option<(&'static str, u64)>,
     },
-    /// Keep the inputs of the last jobs, and give them away if one fails.
+    /// Keep the inputs of the last jobs, and hand them out if one fails.
     Latest {
-        /// The app that is recorded, by its name.
+        /// The name of the recorded app.
         app: &'static str,
-        /// How many jobs of each DAG.
+        /// The number of jobs kept of each DAG.
         jobs: u32,
     },
 }
 
-/// Functions of the platform that a replay needs.
+/// Functions of the platform needed by a replay.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReplayHost {
-    /// Takes a signal from outside.
+    /// Raises a signal from outside, by the number of the plan and the DAG.
     pub(crate) raise: fn(u64, DagId),
     pub(crate) now_ns: fn() -> u64,
 }
 
-/// Begins to do what is wished, and, if people can look, what they see.
+/// A function making the crossing for the wished mode, and an echo if people can look.
 pub type Begin =
     fn(Option<EdgeMode>, bool) -> (Option<Box<dyn Crossing>>, Option<Box<dyn Echoing>>);
 
-/// Calls of a platform that records or replays; times are of the run. A call that does
-/// not concern a replay, or a tape, does nothing there.
+/// The calls by which a platform records or replays. Times are of the run. A call without meaning
+/// for a replay, or for a tape, does nothing there.
 ///
 /// ```
 /// use fass::edge::{Begin, Crossing, EdgeMode};
@@ -91,44 +93,45 @@ pub type Begin =
 /// }
 /// ```
 pub trait Crossing: Send {
-    /// Takes the recorded topics of a DAG, and the hash of its names and edges. Reports whether
-    /// the launch will take the values from where they are written, so that only those come to
-    /// [`record`](Self::record) that have no room.
+    /// Takes the recorded topics of a DAG, and the hash of its names and edges. Reports whether the
+    /// launch will read the values in the places where they are written. Then only values without
+    /// room come to [`record`](Self::record).
     fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool;
 
-    /// Takes the plan, before anything of it has run. Takes all memory that will be needed.
+    /// Takes the plan before anything of it has run, and allocates all memory needed later.
     ///
     /// # Errors
     ///
-    /// In words: there is no memory, or the replay does not fit.
+    /// Returns a message if there is no memory, or the replay does not fit.
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String>;
 
-    /// Takes a value, at the completion of its writer: `at_ns` on the time of the run.
+    /// Takes a value at its writer's completion, `at_ns` on the time of the run.
     fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64);
 
-    /// Takes what has become of a job, or of an instance: an event of those of [`HEARS`].
+    /// Takes an event of a job or an instance, of the kinds in [`HEARS`].
     fn happened(&mut self, notice: &DriverNotice);
 
-    /// Takes note that an instance has failed, and what it had sampled: `at_ns` on the time of
-    /// the run, `clock_ns` on that of [`crate::now_ns`].
+    /// Notes that an instance has failed, and takes its samples: `at_ns` on the time of the run,
+    /// `clock_ns` on that of [`crate::now_ns`].
     fn failed(&mut self, _instance: Instance, _at_ns: u64, _clock_ns: u64) {}
 
-    /// Returns the time for an instance that asks for it, `clock_ns` on the clock of
-    /// [`crate::now_ns`] and `at_ns` on the time of the run.
+    /// Returns the time for an instance asking for it, `clock_ns` on the clock of [`crate::now_ns`]
+    /// and `at_ns` on the time of the run.
     fn tell_time(&mut self, _instance: Instance, clock_ns: u64, _at_ns: u64) -> u64 {
         clock_ns
     }
 
-    /// Returns the recorded value of a channel and a job, if there is one.
+    /// Returns the recorded value of a channel and a job, if any.
     fn find(&self, _channel: u16, _job: u64) -> Option<&'static [u8]> {
         None
     }
 
-    /// Returns the work of core 0; the first time only. Of the last jobs there is a file when
-    /// one has failed.
+    /// Returns the drain for core 0, the first time only. When keeping the last jobs, there is a
+    /// drain only after a fault.
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
-    /// Returns the findings of a replay; if the run is over, also a value that it has not computed.
+    /// Returns the findings of a replay. If the run is over, they include a value the run has not
+    /// computed.
     fn outcome(&self, _is_over: bool) -> Option<ReplayOutcome> {
         None
     }
@@ -138,41 +141,41 @@ pub trait Crossing: Send {
 ///
 /// See [`Crossing`].
 pub trait Echoing: Send {
-    /// Takes the recorded topics of a DAG of the plan to come.
+    /// Takes the recorded topics of a DAG of the next plan.
     fn open(&mut self, channels: &[Channel]);
 
-    /// Takes note that the plan is there.
+    /// Notes the launch of the plan.
     fn launch(&mut self);
 
-    /// Takes a value, at the completion of its writer.
+    /// Takes a value at its writer's completion.
     fn record(&mut self, value: &RecordedValue<'_>);
 
-    /// Keeps the latest value of this topic from now on, or nothing. Reports whether the topic is
+    /// Keeps the latest value of this topic from now on, or of none. Reports whether the topic is
     /// recorded.
     fn watch(&mut self, topic: Option<&str>) -> bool;
 
-    /// Takes the latest value out, if there is one since the last call. Allocates nothing.
+    /// Takes the latest value out, if one has come since the last call. Allocates nothing.
     fn take(&mut self, into: &mut [u8]) -> Option<WatchedValue>;
 }
 
-/// A value of a topic that is watched.
+/// A value of the watched topic.
 ///
 /// See [`Echoing`].
 #[derive(Clone, Debug)]
 pub struct WatchedValue {
-    /// The job that it is of.
+    /// The job of the value.
     pub job: u64,
-    /// How many values came since the one that was taken before, and were not.
+    /// The number of values since the previous taken one that nobody took.
     pub left_out: u64,
-    /// How many bytes it has; `None`: more than there was room for.
+    /// The value's length in bytes; `None`: longer than the room for it.
     length: Option<usize>,
     schema: Arc<Schema>,
-    /// The function that makes its text, which only an image with a recorded topic has.
+    /// The function writing the value as text. Only an image with a recorded topic contains one.
     write: fn(&Schema, &[u8], &mut fmt::Formatter<'_>) -> fmt::Result,
 }
 
 impl WatchedValue {
-    /// Returns the value in the buffer that it was taken into, as text. Nothing is allocated.
+    /// Returns the value as text, from the buffer it was taken into. Allocates nothing.
     ///
     /// See [`Echoing`].
     pub fn shown<'s>(&'s self, buffer: &'s [u8]) -> impl fmt::Display + 's {
@@ -184,38 +187,38 @@ impl WatchedValue {
     }
 }
 
-/// The file that what is recorded goes into.
+/// The file for recorded entries.
 pub type Record = Stream<dyn Sink + Send>;
 
-/// The part that core 0 does when it has nothing else to do: it makes a file of what is recorded,
-/// and
-/// allocates nothing but for the header; or it raises the signals of a replay.
+/// The work of core 0 in its spare time: writing the recording into a file, with no allocation
+/// except for the header, or raising the signals of a replay.
 ///
 /// See [`Crossing`].
 pub trait Drain: Send {
     /// Sends the header.
     fn send_header(&mut self, to: &mut Record);
 
-    /// Takes when the time of the run begins, on the clock of [`crate::now_ns`].
+    /// Takes the begin of the run's time, on the clock of [`crate::now_ns`].
     fn begin_run(&mut self, _epoch_ns: u64) {}
 
     /// Sends the next entry, if the file can take it now; `false`: nothing was sent.
     fn step(&mut self, to: Option<&mut Record>) -> bool;
 
-    /// Sends what is lost, when the run is over and nothing is left; `None`: there is no file.
+    /// Reports the lost values to the file, when the run is over and nothing is left to send;
+    /// `None`: there is no file.
     fn send_losses(&mut self, to: &mut Record) -> Option<RecordingState>;
 }
 
-/// How complete a recording is.
+/// The completeness of a recording.
 ///
 /// See [`Drain`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordingState {
-    /// The entries.
+    /// The number of entries.
     pub entries: u64,
-    /// Those of values for which there was no room.
+    /// The number of entries for values without room.
     pub lost: u64,
-    /// Whether it says nothing of what happened after its last entry.
+    /// Whether the recording says nothing of the time after its last entry.
     pub is_cut: bool,
 }
 
@@ -229,7 +232,7 @@ impl RecordingState {
     }
 }
 
-/// Begins to do what is wished.
+/// Makes the crossing for the wished mode.
 pub(crate) fn new_crossing(wish: EdgeMode, host: ReplayHost) -> Box<dyn Crossing> {
     match wish {
         EdgeMode::Record { app, bytes, .. } => Box::new(tape::RunRecorder::new(app, bytes)),
@@ -238,7 +241,7 @@ pub(crate) fn new_crossing(wish: EdgeMode, host: ReplayHost) -> Box<dyn Crossing
     }
 }
 
-/// Begins to show values.
+/// Makes the echo.
 pub(crate) fn begin_echo() -> Box<dyn Echoing> {
     Box::new(echo::TopicEcho::new())
 }
@@ -246,13 +249,14 @@ pub(crate) fn begin_echo() -> Box<dyn Echoing> {
 /// Adds the recorded topics of a DAG to a header.
 pub fn open(header: &mut Header, dag: DagId, graph: u64, channels: &[Channel]) {
     let dags = header.dags.len().max(dag.index() + 1);
-    // DAGs that record nothing have an empty header: numbers are those of the plan.
+    // DAGs without recorded topics have an empty header, as a DAG's number in the plan is its place
+    // here.
     header.dags.resize(dags, DagHeader::default());
     header.dags[dag.index()].graph = graph;
     header.channels.extend_from_slice(channels);
 }
 
-/// Adds the names to a header: of what is recorded, and of its DAGs.
+/// Adds the names of the recorded app and its DAGs to a header.
 pub fn name(header: &mut Header, app: &str, task_set: &TaskSet) {
     header.app = app.into();
     let dags = task_set.dags();
@@ -262,7 +266,7 @@ pub fn name(header: &mut Header, app: &str, task_set: &TaskSet) {
     }
 }
 
-/// The events that a platform tells a [`Crossing`] of.
+/// The kinds of events that a platform passes to a [`Crossing`].
 pub const HEARS: &[EventKind] = &[
     EventKind::Due,
     EventKind::Skipped,
@@ -270,7 +274,7 @@ pub const HEARS: &[EventKind] = &[
     EventKind::Restarted,
 ];
 
-/// Returns the kind of entry that records an event, if one does.
+/// Returns the kind of entry recording an event, if any.
 #[must_use]
 pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
     match what {
@@ -279,12 +283,12 @@ pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
         EventKind::Cancelled => Some(recording::EntryKind::Cut),
         EventKind::Restarted => Some(recording::EntryKind::Restart),
         EventKind::Ended => Some(recording::EntryKind::Fault),
-        // All else follows from these when the functions are called again.
+        // All other events follow from these when the functions are called again.
         _ => None,
     }
 }
 
-/// The sender of a recording, if there is one.
+/// The sender of a recording, if any.
 pub type Outgoing = Option<Box<dyn Drain>>;
 
 /// The edge of a platform's runs.
@@ -299,30 +303,30 @@ pub type Outgoing = Option<Box<dyn Drain>>;
 /// ```
 #[derive(Default)]
 pub struct Edge {
-    /// The mode that the command line states.
+    /// The mode stated by the command line.
     wish: Option<EdgeMode>,
-    /// Whether people can look at what crosses.
+    /// Whether people can look at values.
     shows: bool,
     crossing: Option<Box<dyn Crossing>>,
     echo: Option<Box<dyn Echoing>>,
-    /// Whether a plan has been launched with it.
+    /// Whether a plan has been launched with a wish.
     is_on: bool,
-    /// Whether the time that functions are told is recorded or replayed.
+    /// Whether the time told to functions is recorded or replayed.
     tells: bool,
-    /// When the run's time begins, on the clock.
+    /// The begin of the run's time, on the clock.
     epoch_ns: u64,
     /// The sender of the next run's recording.
     outgoing: Outgoing,
     /// Whether the jobs before a fault have been sent.
     has_sent_latest: bool,
-    /// Why the recording, or the app, does not go with the wish.
+    /// Why the wish does not go with the recording or the app.
     refusal: Option<String>,
-    /// How a replay differed from its recording, if it did.
+    /// The difference of a replay from its recording, if any.
     complaint: Option<String>,
 }
 
 impl Edge {
-    /// Begins without a wish.
+    /// Makes an edge without a wish.
     pub const fn new() -> Self {
         Self {
             wish: None,
@@ -339,22 +343,22 @@ impl Edge {
         }
     }
 
-    /// Takes what the command line says, once.
+    /// Sets the mode stated by the command line, once.
     pub fn set_wish(&mut self, wish: EdgeMode) {
         self.wish = Some(wish);
     }
 
-    /// Lets people look at what crosses.
+    /// Lets people look at values.
     pub fn let_look(&mut self) {
         self.shows = true;
     }
 
-    /// Reports whether there is a wish.
+    /// Reports whether there is any wish.
     pub const fn is_wished(&self) -> bool {
         self.wish.is_some() || self.shows
     }
 
-    /// Reports whether there are results among what crosses.
+    /// Reports whether results of subtasks are wanted at the edge, besides inputs.
     pub const fn has_results(&self) -> bool {
         self.shows || !matches!(self.wish, Some(EdgeMode::Latest { .. }))
     }
@@ -364,18 +368,18 @@ impl Edge {
         matches!(self.wish, Some(EdgeMode::Replay { .. }))
     }
 
-    /// Reports whether a plan has been launched with a wish, so that events are of interest.
+    /// Reports whether a plan has been launched with a wish, so events are of interest.
     pub(crate) const fn is_on(&self) -> bool {
         self.is_on
     }
 
-    /// Reports whether the time that functions are told is recorded or replayed.
+    /// Reports whether the time told to functions is recorded or replayed.
     pub(crate) const fn tells(&self) -> bool {
         self.tells
     }
 
-    /// Takes the recorded topics of a DAG, and reports whether their values are read where they
-    /// are written.
+    /// Takes the recorded topics of a DAG. Reports whether their values are read in the places
+    /// where they are written.
     pub fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
         if self.is_wished() && self.crossing.is_none() && self.echo.is_none() {
             (self.crossing, self.echo) = begin(self.wish, self.shows);
@@ -385,12 +389,12 @@ impl Edge {
         }
         let crossing = self.crossing.as_mut();
         let is_read = crossing.is_some_and(|crossing| crossing.open(dag, graph, channels));
-        // Any topic may be the one that is watched, so each value has to come by here.
+        // Any topic may become the watched one, so with an echo each value has to come by here.
         is_read && self.echo.is_none()
     }
 
-    /// Sets recording or replay of a plan up, if it was asked for, and begins a recording in the
-    /// file, if there is one.
+    /// Sets up the recording or replay of a plan, if wished, and begins the recording in the file,
+    /// if there is one.
     pub(crate) fn launch(
         &mut self,
         plan: &mut Plan,
@@ -408,7 +412,7 @@ impl Edge {
         let is_second = is_asked_for && self.is_on;
         let launched = match &mut self.crossing {
             None if !replays => return Ok(()),
-            // Of the other commits all is kept but values.
+            // Of a later commit, everything is kept except its values.
             Some(_) if is_second && !replays => return Ok(()),
             None => Err("`replay`: no topic of the app is recorded; name topics by `Dag::record`".into()),
             Some(_) if is_second => Err(
@@ -424,7 +428,7 @@ impl Edge {
             }
         }
         if let (Some(drain), Some(to)) = (&mut self.outgoing, to) {
-            // Not during the run: it takes long where a byte does.
+            // Here and not during the run: the header takes long on a slow device.
             drain.send_header(to);
         }
         self.is_on = true;
@@ -432,12 +436,12 @@ impl Edge {
         Ok(())
     }
 
-    /// Converts a time on the clock to the run's.
+    /// Converts a time on the clock to the run's time.
     const fn of_run(&self, clock_ns: u64) -> u64 {
         clock_ns.saturating_sub(self.epoch_ns)
     }
 
-    /// Returns the time and records it, or returns the recorded one.
+    /// Returns the present time and records it, or in a replay returns the recorded time.
     pub(crate) fn tell_time(&mut self, instance: Option<Instance>, clock_ns: u64) -> u64 {
         let at_ns = self.of_run(clock_ns);
         match (&mut self.crossing, instance) {
@@ -446,7 +450,8 @@ impl Edge {
         }
     }
 
-    /// Takes what sends the recording of the run that begins, whose time begins then.
+    /// Takes the sender for the run beginning now, with the clock's time as the begin of the run's
+    /// time.
     pub fn begin_run(&mut self, epoch_ns: u64) -> Outgoing {
         self.epoch_ns = epoch_ns;
         let mut outgoing = self.outgoing.take();
@@ -456,8 +461,8 @@ impl Edge {
         outgoing
     }
 
-    /// Ends a run. Returns the findings of a replay; if the run `is_over`, also a value that it has
-    /// not computed.
+    /// Ends a run. Returns the findings of a replay; if the run `is_over`, they include a value it
+    /// has not computed.
     pub fn end_run(&mut self, is_over: bool) -> Option<ReplayOutcome> {
         if !self.is_replay() {
             return None;
@@ -467,7 +472,8 @@ impl Edge {
         Some(outcome)
     }
 
-    /// Takes what sends the jobs before a fault, if there was one; once, for there is one file.
+    /// Takes the sender of the jobs before a fault, if there was one: once, as there is only one
+    /// file.
     pub fn before_fault(&mut self) -> Outgoing {
         let drain = self.crossing.as_mut()?.drain()?;
         let is_first = !core::mem::replace(&mut self.has_sent_latest, true);
@@ -498,24 +504,24 @@ impl Edge {
         }
     }
 
-    /// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there
-    /// is such a topic.
+    /// Keeps the latest value of a recorded topic from now on, or of none. Reports whether such a
+    /// topic exists.
     pub fn watch(&mut self, topic: Option<&str>) -> bool {
         (self.echo.as_mut()).is_some_and(|echo| echo.watch(topic))
     }
 
-    /// Takes that value out, if there is one.
+    /// Takes the watched value out, if there is one.
     pub fn take_seen(&mut self, into: &mut [u8]) -> Option<WatchedValue> {
         self.echo.as_mut()?.take(into)
     }
 
-    /// Returns a recorded value, which outlasts the edge's lock: what reads it is the app's.
+    /// Returns a recorded value, which outlasts the edge's lock: the app's code reads it.
     pub fn find(&self, channel: u16, job: u64) -> Option<&'static [u8]> {
         self.crossing.as_ref()?.find(channel, job)
     }
 
-    /// Returns why the wish could not be met, and how a replay differs from its recording, if that
-    /// is so.
+    /// Returns why the wish could not be met, and how a replay differs from its recording, where
+    /// either applies.
     #[must_use]
     pub fn objections(&self) -> [Option<String>; 2] {
         [self.refusal.clone(), self.complaint.clone()]

@@ -1,9 +1,9 @@
-//! Whether a recording is one of a plan, and which channel is which; with which job of each DAG the
-//! replay begins, and what states it finds there.
+//! The fit of a recording to a plan: the matching of channels, the first job of each DAG in the
+//! replay, and the states known at that job.
 //!
-//! A recording need not have a run's first jobs, or the person wants a later one. Then
-//! functions lack all that they remember of the jobs before, unless the DAG's states are recorded:
-//! the replay begins with a job of which each of them is.
+//! A recording may lack the first jobs of a run, or the user wants a later job. Then functions lack
+//! all memory of earlier jobs, unless the DAG's states are recorded: the replay begins with a job
+//! for which each of them is.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -17,11 +17,11 @@ use super::{Replay, SkippedInstances, guard, is_compared};
 use crate::run::plan::Plan;
 
 impl Replay {
-    /// Finds the channels of the plan.
+    /// Finds the channels of the plan in the recording.
     ///
     /// # Errors
     ///
-    /// In words: the recording is of other DAGs or types, or lacks what a source has sent.
+    /// Returns a message if the recording is of other DAGs or types, or lacks values of a source.
     pub fn fit(&mut self, own: &Header, task_set: &TaskSet) -> Result<(), String> {
         for (number, recorded) in self.header.dags.iter().enumerate() {
             let remedy = "commit the DAGs that were recorded, in their order";
@@ -31,14 +31,14 @@ impl Replay {
                     recorded.name
                 ));
             };
-            // In their order, as recordings know DAGs by number.
+            // Compared by place, as recordings know DAGs by number.
             if recorded.name != dag.name {
                 return Err(format!(
                     "the recording's dag {number} is `{}`, and here it is `{}`; {remedy}",
                     recorded.name, dag.name
                 ));
             }
-            // A DAG that records nothing has none.
+            // A DAG without recorded topics has no hash.
             if recorded.graph != 0 && dag.graph != 0 && recorded.graph != dag.graph {
                 return Err(format!(
                     "the recording is of another graph of dag `{}`; record it again",
@@ -53,7 +53,8 @@ impl Replay {
             let (topic, schema) = (&channel.topic, &channel.schema);
             let others = (0..).zip(&self.header.channels);
             let mut others = others.filter(|(_, other)| is_same(other, channel));
-            // A subtask may sample topics of one name of several DAGs.
+            // A subtask may sample topics of the same name from several DAGs, so the n-th here is
+            // the n-th there.
             let before = own.channels.iter().take(self.channels.len());
             let before = before.filter(|before| is_same(before, channel)).count();
             match others.nth(before) {
@@ -77,7 +78,7 @@ impl Replay {
                 found => self.channels.push(found.map(|(number, _)| number)),
             }
         }
-        // After all comparisons: what follows trusts the header.
+        // After all comparisons: the following steps trust the header.
         self.find_inputs(task_set);
         self.find_begins(task_set)?;
         self.check_releases(task_set)?;
@@ -89,8 +90,8 @@ impl Replay {
         Ok(())
     }
 
-    /// Finds the DAGs whose inputs are recorded, and the jobs that have some: values that
-    /// sources returned, or else what they have sampled.
+    /// Finds the DAGs with recorded inputs, and their jobs with any: values returned by sources,
+    /// or, without such values, samples taken by sources.
     fn find_inputs(&mut self, task_set: &TaskSet) {
         let is_source = |channel: &Channel| {
             let dag = task_set.dags().get(usize::from(channel.dag));
@@ -107,7 +108,7 @@ impl Replay {
             let has_sources = || with(Role::Source).any(|source| source.dag == channel.dag);
             match channel.role {
                 Role::Source => true,
-                // A DAG whose sources only sample is released with what they found.
+                // A DAG whose sources only sample takes their samples as its inputs.
                 Role::Sample => is_source(channel) && !has_sources(),
                 Role::Result | Role::State | Role::Answer => false,
             }
@@ -127,15 +128,17 @@ impl Replay {
         let mut jobs: Vec<(u16, u64)> = of_inputs
             .map(|((place, job), _)| (dag_of(*place), *job))
             .collect();
-        // Sorted for the lookups of the run, which halve the list.
+        // Sorted for the binary searches of the run.
         jobs.sort_unstable();
         if self.is_cut {
-            // Of its last jobs there may be a value of one source, and none of another one.
+            // A cut recording may have a value of one source for its last jobs, and none of
+            // another.
             let all = |dag: u16| dags.iter().filter(|other| **other == dag).count();
             let of_jobs = jobs.chunk_by(|one, other| one == other);
             let whole = of_jobs.filter(|of_job| of_job.len() == all(of_job[0].0));
             jobs = whole.map(|of_job| of_job[0]).collect();
-            // What is passed over is not computed.
+            // The replay does not compute jobs it passes over, so their values must not count as
+            // missing.
             self.values.retain(|((place, job), _)| {
                 let dag = dag_of(*place);
                 dags.binary_search(&dag).is_err() || jobs.binary_search(&(dag, *job)).is_ok()
@@ -147,7 +150,7 @@ impl Replay {
         self.passed = Arc::new(SkippedInstances { dags, jobs, cuts });
     }
 
-    /// Makes sure that time releases the jobs when it has released them.
+    /// Makes sure that time releases each job at its recorded time.
     fn check_releases(&self, task_set: &TaskSet) -> Result<(), String> {
         for ((place, job), value) in &self.values {
             let dag = self.header.channels[usize::from(*place)].dag;
@@ -170,7 +173,7 @@ impl Replay {
         Ok(())
     }
 
-    /// Makes sure that no recorded source would be called, and that none of its values is lost.
+    /// Makes sure that the replay calls no recorded source, and that no value of a source is lost.
     fn check_sources(&self, own: &Header) -> Result<(), String> {
         let mut sources = (self.header.channels.iter()).filter(|other| other.role == Role::Source);
         let is_here = |source: &Channel| own.channels.iter().any(|own| is_same(own, source));
@@ -192,16 +195,16 @@ impl Replay {
     }
 }
 
-/// Reports whether two channels have the same values, of two runs.
+/// Reports whether two channels, of two runs, carry the same values.
 fn is_same(one: &Channel, other: &Channel) -> bool {
     let same_subtask = one.role != Role::Sample || one.subtask == other.subtask;
     same_subtask && (one.dag, one.role, &one.topic) == (other.dag, other.role, &other.topic)
 }
 
-/// The most jobs of a DAG that a replay goes through: everything of them is kept.
+/// The greatest number of jobs of a DAG in a replay: all data of them is kept.
 const MOST_JOBS: u64 = 10_000_000;
 
-/// Reads the words by which a job is named, DAG/JOB.
+/// Reads the name of a job, in the form DAG/JOB.
 ///
 /// ```
 /// assert_eq!(fass::edge::job_of("gait/17"), Some(("gait", 17)));
@@ -212,12 +215,12 @@ pub fn job_of(words: &str) -> Option<(&str, u64)> {
 }
 
 impl Replay {
-    /// Has it begin as late as may be, so that this job is computed of what was recorded.
+    /// Makes the replay begin as late as possible while computing this job from recorded values.
     pub fn begin_before(&mut self, dag: &str, job: u64) {
         self.from = Some((dag.into(), job));
     }
 
-    /// Finds the job that each DAG begins with, and forgets those before.
+    /// Finds the first job of each DAG, and forgets the jobs before.
     fn find_begins(&mut self, task_set: &TaskSet) -> Result<(), String> {
         self.begins = vec![0; task_set.dags().len()];
         let ids = (0_u16..).take(self.begins.len());
@@ -230,7 +233,7 @@ impl Replay {
             let of = of.ok_or_else(|| {
                 format!("the recording has no inputs of a dag `{name}` to begin with")
             })?;
-            // The latest job up to the wanted one before which all states are known.
+            // The latest job up to the wanted one at whose beginning all states are known.
             let begin = self.latest(of, |other| other <= job);
             let at_ns = self.release_ns(task_set, of, begin);
             for dag in ids.clone() {
@@ -239,8 +242,8 @@ impl Replay {
                 }
                 self.begins[usize::from(dag)] = match dag == of {
                     true => begin,
-                    // The other DAGs begin where they were at that time, so that what they sample
-                    // of each other fits.
+                    // The other DAGs begin with the job they were at then, so their samples of each
+                    // other fit.
                     false => self.latest(dag, |job| self.release_ns(task_set, dag, job) <= at_ns),
                 };
             }
@@ -259,7 +262,7 @@ impl Replay {
         &self.own.dags[usize::from(dag)].name
     }
 
-    /// Returns the jobs of a DAG whose inputs are recorded.
+    /// Returns the jobs of a DAG with recorded inputs.
     fn jobs_with_inputs(&self, dag: u16) -> impl DoubleEndedIterator<Item = u64> + Clone {
         let jobs = &self.passed.jobs;
         let [first, end] = [dag.into(), u32::from(dag) + 1]
@@ -267,8 +270,8 @@ impl Replay {
         jobs[first..end].iter().map(|(_, job)| *job)
     }
 
-    /// Reports whether all states of a DAG are recorded in a job, and there is one. That a
-    /// subtask has fallen back before is no state.
+    /// Reports whether a DAG has states and all of them are recorded in a job. No recorded state
+    /// covers an earlier restart or fallback of a subtask.
     fn has_states(&self, dag: u16, job: u64) -> bool {
         let events = self.events.iter();
         let mut restarts =
@@ -279,7 +282,7 @@ impl Replay {
             && restarts.all(|event| event.job >= job)
     }
 
-    /// Reports whether no state of a DAG lacks in a job.
+    /// Reports whether no state of a DAG is lacking in a job.
     fn is_whole(&self, dag: u16, job: u64) -> bool {
         let mut channels = self.channels_of_states(dag);
         channels.all(|channel| self.find(channel, job).is_some())
@@ -295,7 +298,7 @@ impl Replay {
     fn earliest(&self, task_set: &TaskSet, dag: u16) -> u64 {
         let mut jobs = self.jobs_with_inputs(dag);
         let mut events = self.events.iter();
-        // The first jobs may have been skipped or cut.
+        // Job 0 may have been skipped or cut, and thus have no inputs.
         if events.any(|event| (event.dag, event.job) == (dag, 0)) {
             return 0;
         }
@@ -307,7 +310,7 @@ impl Replay {
         }
     }
 
-    /// Returns the latest one of those jobs.
+    /// Returns the latest job with inputs and all states for which `is_early` holds.
     fn latest(&self, dag: u16, is_early: impl Fn(u64) -> bool) -> u64 {
         let mut jobs = self.jobs_with_inputs(dag).rev();
         let found = jobs.find(|job| is_early(*job) && self.is_whole(dag, *job));
@@ -323,7 +326,7 @@ impl Replay {
         signal_ns.unwrap_or_else(|| model.grid_ns(job))
     }
 
-    /// Makes sure that a replay can go through all jobs up to the last one.
+    /// Makes sure that a replay can go through all jobs up to the last.
     fn check_jobs(&self, task_set: &TaskSet) -> Result<(), String> {
         let of_values = self.values.iter().map(|((place, job), _)| {
             let channel = &self.header.channels[usize::from(*place)];
@@ -334,7 +337,7 @@ impl Replay {
         let begin = |dag: u16| self.begins[usize::from(dag)];
         let is_too_late = |(dag, job): &(u16, u64)| {
             let release_ns = task_set.dag(id(*dag)).grid_ns(*job);
-            // A damaged file may name a job that a replay would reach in years.
+            // A damaged file may name a job that a replay would take years to reach.
             job.saturating_sub(begin(*dag)) >= MOST_JOBS || release_ns > u64::MAX / 2
         };
         match of_values.chain(of_signals).find(is_too_late) {
@@ -348,8 +351,9 @@ impl Replay {
         }
     }
 
-    /// Forgets what comes before, and has a signal for each job from there on: those of which none
-    /// is recorded were as far apart as the DAG says, so there is time for them.
+    /// Forgets everything before the first jobs, and provides a signal for each job from there on.
+    /// Jobs without a recorded signal are placed at the distance stated by the DAG, so there is
+    /// time for them.
     fn forget_before(&mut self, task_set: &TaskSet) {
         let (begins, channels) = (&self.begins, &self.header.channels);
         let is_kept = |dag: u16, job: u64| job >= begins[usize::from(dag)];
@@ -362,7 +366,7 @@ impl Replay {
             .retain(|fault| fault.instance.job >= begins[fault.instance.dag.index()]);
         let jobs = &mut Arc::make_mut(&mut self.passed).jobs;
         jobs.retain(|(dag, job)| is_kept(*dag, *job));
-        // Nothing but signals releases a sporadic DAG, and nothing else takes any.
+        // Only signals release a sporadic DAG, and no other DAG takes any.
         self.signals
             .retain(|dag, _| task_set.dag(*dag).is_sporadic());
         for (dag, signals) in &mut self.signals {
@@ -377,13 +381,14 @@ impl Replay {
         }
     }
 
-    /// Makes what is replayed release the jobs that are recorded, and lose none on the way. The plan
-    /// has the states that it begins with ([`Plan::restore`]).
+    /// Makes the replayed DAGs release the recorded jobs, and lose none on the way. Adds the states
+    /// at the beginning to the plan ([`Plan::restore`]).
     pub fn prepare(&self, plan: &mut Plan) {
         self.restore(plan);
         let task_set = Arc::make_mut(&mut plan.task_set);
         for dag in (0..).map(DagId).take(task_set.dags().len()) {
-            // No other signals come: without a last job, it would end no run, or keep none going.
+            // No other signals come. Without a last job, a sporadic DAG would never end the run, or
+            // would not keep it going.
             let begin = self.begins[dag.index()];
             let of_signals = || {
                 let signals = self.signals.get(&dag);
@@ -403,21 +408,21 @@ impl Replay {
         }
     }
 
-    /// Returns the job behind a DAG's last one, if its inputs are recorded.
+    /// Returns the job after a DAG's last, if its inputs are recorded.
     fn end_of(&self, dag: DagId) -> Option<u64> {
         let dag = u16::try_from(dag.0).ok().filter(|_| self.is_of(dag))?;
-        // The list is sorted, so the last one found is the last job with inputs.
+        // The list is sorted, so the first from the end is the last job with inputs.
         let of_dag = self.passed.jobs.iter().rev().find(|(of, _)| *of == dag);
         Some(of_dag.map_or(1, |(_, last)| last.saturating_add(1)))
     }
 
-    /// Makes the bodies of a plan pass over what is not called.
+    /// Makes the bodies of a plan pass over the skipped instances.
     pub(crate) fn guard(&self, plan: &mut Plan) {
         guard(plan, &self.passed);
     }
 
-    /// Notes what the states were when the replay begins, and has them looked at in each job: they
-    /// are compared wherever they are recorded.
+    /// Notes the recorded states at the beginning of the replay, and has states kept in each job:
+    /// they are compared in every job with a recorded state.
     fn restore(&self, plan: &mut Plan) {
         for (channel, of) in (0..).zip(&plan.lines) {
             let begin = self.begins[of.dag.index()];

@@ -1,16 +1,15 @@
-//! Replays: values that come from a recording, and findings: values that differ, and faults that
-//! do not
-//! come again.
+//! Replays: values taken from a recording. Findings of a replay: differing values, and faults not
+//! occurring again.
 //!
-//! A function that fails because of its inputs fails again. In a replay it lacks its
-//! memory of jobs that are not recorded, so a fault that follows from that does not come again; nor
-//! does one of a source that is not called, or of a budget.
+//! A function failing because of its inputs fails again. In a replay, functions lack their memory
+//! of unrecorded jobs, so a fault caused by that memory does not occur again. Nor does a fault of a
+//! source, which is not called, or of a budget.
 //!
-//! # A replay as a machine carries it out
+//! # Replays on a machine
 //!
-//! Only recorded signals release anything, each not before its time, nor before the one before it
-//! has led to a release: so none is dropped where functions take longer than they took. They are
-//! raised by what core 0 does when it has nothing else to do.
+//! Only recorded signals release sporadic DAGs: each neither before its time, nor before the
+//! previous signal has led to a release. So no signal is dropped where functions take longer than
+//! in the recorded run. Core 0 raises the signals in its spare time.
 
 mod fit;
 
@@ -33,51 +32,51 @@ use super::{Crossing, Drain, Record, RecordingState, ReplayHost, name, open};
 use crate::run::line::{LineOf, RecordedValue};
 use crate::run::plan::{Plan, SubtaskCode};
 
-/// A recording that takes the place of what enters.
+/// A recording in the place of a run's inputs.
 #[derive(Debug, Default)]
 pub struct Replay {
     bytes: Cow<'static, [u8]>,
     header: Header,
-    /// Where the values lie, by channel and job.
+    /// The places of the values, by channel and job.
     values: Vec<((u16, u64), Range<usize>)>,
-    /// Whether it says nothing of what came after its last entry.
+    /// Whether the recording says nothing of the time after its last entry.
     is_cut: bool,
     passed: Arc<SkippedInstances>,
-    /// Times that instances were told when they asked.
+    /// The times told to instances when they asked.
     clock: BTreeMap<(u16, u16, u64), ToldTimes>,
-    /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
-    /// them keep their numbers.
+    /// The releases of sporadic DAGs, including those of skipped jobs: so later jobs keep their
+    /// numbers.
     signals: BTreeMap<DagId, VecDeque<u64>>,
-    /// The first job of each DAG that a signal is recorded of.
+    /// The first job of each DAG with a recorded signal.
     first_signals: BTreeMap<DagId, u64>,
-    /// Entries without a value.
+    /// The entries without a value.
     events: Vec<Entry<'static>>,
-    /// The instances that have failed in the recorded run, and in this one not yet.
+    /// The recorded faults that have not occurred again so far.
     faults: Vec<RecordedFault>,
-    /// The first value of a source that is lost: its channel and job.
+    /// The first lost value of a source: its channel and job.
     lost: Option<(u16, u64)>,
-    /// The job that shall be computed, if the person names one.
+    /// The job to be computed, if the user names one.
     from: Option<(String, u64)>,
-    /// For each DAG of the plan the job that it begins with.
+    /// The first job of the replay, for each DAG of the plan.
     begins: Vec<u64>,
     /// See [`ReplayOutcome`].
     lacking: Option<(String, u64)>,
     /// The header of the plan.
     own: Header,
-    /// For each channel of the plan that of the recording, if it has one.
+    /// The recording's channel for each channel of the plan, if there is one.
     channels: Vec<Option<u16>>,
-    /// How many recorded values this run can be compared with.
+    /// The number of recorded values that this run can be compared with.
     to_compare: u64,
     compared: u64,
-    /// For each value whether it was.
+    /// For each value, whether it has been compared.
     is_compared: Vec<bool>,
     /// The channel of the plan, the job, and the place of the recorded value.
     divergence: Option<(u16, u64, Range<usize>)>,
-    /// The value that is not the recorded one.
+    /// The computed value that differs from the recorded one.
     computed: Vec<u8>,
 }
 
-/// The times that an instance was told, and how many of them it has been told again.
+/// The times told to an instance, and how many of them have been told again.
 #[derive(Debug, Default)]
 struct ToldTimes {
     times: Vec<u64>,
@@ -87,34 +86,35 @@ struct ToldTimes {
 /// The findings of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ReplayOutcome {
-    /// How many values were compared.
+    /// The number of values compared.
     pub compared: u64,
-    /// How many recorded ones the replay has not computed.
+    /// The number of recorded values that the replay has not computed.
     pub uncompared: u64,
-    /// The first value that is not the recorded one.
+    /// The first value that differs from the recorded one.
     pub divergence: Option<Divergence>,
-    /// The first DAG that begins with a later job than 0, and that job, unless all of its states
-    /// are recorded there: what its functions remember of jobs before is lacking.
+    /// The first DAG beginning with a job after job 0, and that job, unless all of the DAG's states
+    /// are recorded there: its functions lack their memory of earlier jobs.
     pub lacking: Option<(String, u64)>,
 }
 
-/// The first value of a replay that is not the recorded one, or, if all that were computed are,
-/// the first recorded one that was not computed, or else a recorded fault that has not come again.
+/// The first difference of a replay from its recording: a computed value other than the recorded
+/// one; else a recorded value that was not computed; else a recorded fault that has not occurred
+/// again.
 ///
 /// See [`ReplayOutcome`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
     /// The name of the DAG.
     pub dag: String,
-    /// The topic or the state; of a fault, the subtask.
+    /// The topic or the state; for a fault, the subtask.
     pub topic: String,
-    /// Whether it is a state.
+    /// Whether `topic` names a state.
     pub is_state: bool,
     /// The job.
     pub job: u64,
-    /// The recorded value, as JSON; none for a fault.
+    /// The recorded value, as JSON; `None` for a fault.
     pub recorded: Option<String>,
-    /// The value of this run, as JSON; none if the run is over and has computed none.
+    /// The value of this run, as JSON; `None` if the run is over without computing it.
     pub computed: Option<String>,
 }
 
@@ -151,7 +151,8 @@ impl Replay {
     ///
     /// # Errors
     ///
-    /// It is no whole and unaltered one, or there is no memory for the places of its values.
+    /// If the bytes are no whole and unaltered recording, or memory is lacking for the places of
+    /// its values.
     #[allow(clippy::too_many_lines, reason = "one arm for each kind of entry")]
     pub fn read(bytes: impl Into<Cow<'static, [u8]>>) -> Result<Self, Malformed> {
         let bytes = bytes.into();
@@ -161,18 +162,18 @@ impl Replay {
             offset: bytes.len(),
             expected: "fewer entries, for whose places there is memory",
         };
-        // Counted in a first pass, so that a damaged or huge file is refused before its values are
+        // Counted in a first pass, so a damaged or huge file is refused before its values are
         // placed.
         let is_value = |entry: &Entry<'_>| entry.what == EntryKind::Value;
         let count = recording.entries().filter(is_value).count();
         let mut replay = Self {
             header: recording.header().clone(),
             is_cut: recording.is_cut(),
-            // A value of a usual size allocates nothing.
+            // Room in advance: then a value of a usual size allocates nothing.
             computed: Vec::with_capacity(4096),
             ..Self::default()
         };
-        // The count comes from a file: memory for it is asked for, and may be refused.
+        // The count comes from a file, so the request for memory must be able to fail.
         (replay.values.try_reserve_exact(count)).map_err(no_memory)?;
         (replay.is_compared.try_reserve_exact(count)).map_err(no_memory)?;
         let mut cuts = Vec::new();
@@ -202,25 +203,26 @@ impl Replay {
                 EntryKind::Cut => cuts.push((dag, place, job)),
                 EntryKind::Fault => replay.faults.push(RecordedFault::new(dag, place, job)),
                 EntryKind::Signal | EntryKind::Skip => {
-                    // A skipped job was due by a signal as much as a released one.
+                    // A skipped job was due by a signal just like a released one.
                     replay.first_signals.entry(id).or_insert(job);
                     let of_dag = replay.signals.entry(id).or_default();
                     of_dag.push_back(entry.release_ns);
                 }
                 EntryKind::Clock => {
-                    // The machine writes each answer by itself.
+                    // The machine writes each answer as an entry of its own.
                     let told = replay.clock.entry((dag, place, job)).or_default();
-                    // In the order of the file, which is that of the questions.
+                    // In the order of the file, which is the order of the questions.
                     told.times.extend(Vec::<u64>::from_bytes(value)?);
                 }
                 EntryKind::Lost if role(place) == Role::Source => {
-                    // A source whose value is lost cannot be replayed; the first such job is named.
+                    // A source with a lost value cannot be replayed; the error names the first such
+                    // job.
                     replay.lost.get_or_insert((place, job));
                 }
                 EntryKind::Restart | EntryKind::Lost => {}
             }
         }
-        // By channel and job, as a run looks them up by halving.
+        // Sorted by channel and job for binary searches during the run.
         replay.values.sort_unstable_by_key(|(of, _)| *of);
         cuts.sort_unstable();
         let passed = SkippedInstances {
@@ -239,22 +241,22 @@ impl Replay {
         u16::try_from(dag.0).is_ok_and(|dag| self.passed.is_of(dag))
     }
 
-    /// Takes the next one of the times that an instance was told, in the order in which it asked.
+    /// Takes the next time told to an instance, in the order of its questions.
     pub fn next_told_ns(&mut self, instance: Instance) -> Option<u64> {
         let (dag, subtask) = narrow(instance)?;
         let told = self.clock.get_mut(&(dag, subtask, instance.job))?;
         let time_ns = told.times.get(told.taken).copied();
-        // Also beyond the last: an instance that asks more often than it did gets no time twice.
+        // Also beyond the last time: an instance asking more often than before gets no time twice.
         told.taken += 1;
         time_ns
     }
 
-    /// Returns the recorded events of the DAGs: all entries but values.
+    /// Returns the recorded events of the DAGs: all entries except values.
     pub fn events(&self) -> impl Iterator<Item = Entry<'_>> {
         (self.events.iter().copied()).filter(|entry| self.passed.is_of(entry.dag))
     }
 
-    /// Takes the next signal of a sporadic DAG, or release of a job that was skipped.
+    /// Takes the next signal of a sporadic DAG, or the next release of a skipped job.
     pub fn next_signal_ns(&mut self, dag: DagId) -> Option<u64> {
         self.signals.get_mut(&dag)?.pop_front()
     }
@@ -264,20 +266,20 @@ impl Replay {
         self.bytes.get(self.place(channel, job)?)
     }
 
-    /// Returns where that is in the recording.
+    /// Returns the value's place in the recording.
     fn place(&self, channel: u16, job: u64) -> Option<Range<usize>> {
         let (_, place) = &self.values[self.find(channel, job)?];
         Some(place.clone())
     }
 
-    /// Returns the number of a recorded value.
+    /// Returns the index of a recorded value.
     fn find(&self, channel: u16, job: u64) -> Option<usize> {
         let channel = *self.channels.get(usize::from(channel))?;
         let of = (channel?, job);
         (self.values.binary_search_by_key(&of, |(of, _)| *of)).ok()
     }
 
-    /// Reports whether an instance is one whose function is not called.
+    /// Reports whether the replay does not call the function of an instance.
     pub fn passes_over(&self, instance: Instance) -> bool {
         self.passed.has(instance)
     }
@@ -285,7 +287,7 @@ impl Replay {
     /// Compares a value of the run with the recorded one.
     pub fn compare(&mut self, value: &RecordedValue<'_>) {
         if !is_compared(self.own.channels[usize::from(value.channel)].role) {
-            // It is where the value is from.
+            // The replay has lent this value itself, so a comparison would prove nothing.
             return;
         }
         let Some(found) = self.find(value.channel, value.job) else {
@@ -297,14 +299,14 @@ impl Replay {
         }
         let place = self.values[found].1.clone();
         let bytes = value.bytes.unwrap_or_default();
-        // Only the first divergence is kept: those that follow from it would hide it.
+        // Only the first divergence is kept: later ones may only follow from it, and would hide it.
         if self.bytes[place.clone()] != *bytes && self.divergence.is_none() {
             self.computed.extend_from_slice(bytes);
             self.divergence = Some((value.channel, value.job, place));
         }
     }
 
-    /// Returns the findings so far; if the run is over, also a value that it has not computed.
+    /// Returns the findings so far; if the run is over, they include a value it has not computed.
     #[must_use]
     pub fn outcome(&self, is_over: bool) -> ReplayOutcome {
         let differs = self.divergence.as_ref().map(|(channel, job, place)| {
@@ -327,7 +329,7 @@ impl Replay {
         let missing = all.filter_map(|(((place, job), range), is_compared)| {
             let mut of_run = self.channels.iter().zip(&self.own.channels);
             let (_, channel) = of_run.find(|(recorded, _)| **recorded == Some(*place))?;
-            // States and samples may rightly be missing: a job that was cut has none.
+            // States and samples may rightly be missing: a cut job has none.
             let is_missing = channel.role == Role::Result && !is_compared;
             is_missing.then_some((*job, channel, range))
         });
@@ -335,7 +337,7 @@ impl Replay {
         Some(self.describe(channel, job, range, None))
     }
 
-    /// Describes a value that differs.
+    /// Describes a differing value.
     fn describe(
         &self,
         channel: &Channel,
@@ -355,15 +357,15 @@ impl Replay {
         }
     }
 
-    /// Cuts all that waits for an instance in its job.
+    /// Cuts all instances waiting for a failed instance in its job.
     pub fn cut_behind(&mut self, instance: Instance, task_set: &TaskSet) {
-        // The recorded fault has come again, so it is no longer missed.
+        // The recorded fault has occurred again, so it is no longer missing.
         self.meet_fault(instance);
         let Instance { dag, subtask, job } = instance;
         let mut behind = task_set.dag(dag).successors(subtask).to_vec();
         while let Some(subtask) = behind.pop() {
             let instance = Instance { dag, subtask, job };
-            // Each instance once: two paths to it must not walk on from it twice.
+            // Visits each instance once, although two paths may lead to it.
             if Arc::make_mut(&mut self.passed).cut(instance) {
                 behind.extend(task_set.dag(dag).successors(subtask));
             }
@@ -371,19 +373,19 @@ impl Replay {
     }
 }
 
-/// Reports whether values are compared, rather than taken.
+/// Reports whether values of this role are compared, rather than lent.
 const fn is_compared(role: Role) -> bool {
     matches!(role, Role::Result | Role::State)
 }
 
-/// The instances whose functions are not called.
+/// The instances whose functions the replay does not call.
 #[derive(Clone, Debug, Default)]
 struct SkippedInstances {
-    /// The DAGs whose inputs are recorded, in order.
+    /// The DAGs with recorded inputs, in order.
     dags: Vec<u16>,
-    /// The jobs of these that have some, in order.
+    /// The jobs of these DAGs with recorded inputs, in order.
     jobs: Vec<(u16, u64)>,
-    /// The instances that were cut, in order.
+    /// The cut instances, in order.
     cuts: Vec<(u16, u16, u64)>,
 }
 
@@ -393,37 +395,37 @@ impl SkippedInstances {
         self.dags.binary_search(&dag).is_ok()
     }
 
-    /// Adds an instance that is cut; `false`: it was before.
+    /// Adds a cut instance; `false`: it was cut before.
     fn cut(&mut self, instance: Instance) -> bool {
         let Some((dag, subtask)) = narrow(instance) else {
             return false;
         };
         let cut = (dag, subtask, instance.job);
-        // The list stays sorted, so that each lookup on the hot path halves it.
+        // The list stays sorted for the binary search on the hot path.
         let place = self.cuts.binary_search(&cut);
         place.map_err(|place| self.cuts.insert(place, cut)).is_err()
     }
 
-    /// Reports whether an instance is one of them.
+    /// Reports whether an instance is skipped.
     fn has(&self, instance: Instance) -> bool {
         let Some((dag, subtask)) = narrow(instance) else {
             return false;
         };
         let job = instance.job;
         self.is_of(dag)
-            // Of a job that is not recorded at all no function is called: its inputs are unknown.
+            // The inputs of an unrecorded job are unknown, so none of its functions is called.
             && (self.jobs.binary_search(&(dag, job)).is_err()
                 || self.cuts.binary_search(&(dag, subtask, job)).is_ok())
     }
 }
 
-/// Returns the numbers of a DAG and of a subtask, as recordings have them.
+/// Returns the numbers of a DAG and a subtask in the format of recordings.
 pub(super) fn narrow(instance: Instance) -> Option<(u16, u16)> {
     let dag = u16::try_from(instance.dag.0).ok()?;
     Some((dag, u16::try_from(instance.subtask.0).ok()?))
 }
 
-/// Makes all bodies of a plan pass over these.
+/// Makes all bodies of a plan pass over the skipped instances.
 fn guard(plan: &mut Plan, passed: &Arc<SkippedInstances>) {
     for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
         let of_subtasks = (0..).map(SubtaskId).zip(mem::take(bodies));
@@ -439,7 +441,7 @@ fn guard(plan: &mut Plan, passed: &Arc<SkippedInstances>) {
 #[derive(Debug)]
 struct RecordedFault {
     instance: Instance,
-    /// The name of the subtask, once it is known.
+    /// The name of the subtask, once known.
     subtask: String,
 }
 
@@ -454,7 +456,7 @@ impl RecordedFault {
 }
 
 impl Replay {
-    /// Finds the names of those that have failed. The DAGs are those of the recording.
+    /// Finds the names of the failed subtasks. The plan's DAGs must be those of the recording.
     fn name_faults(&mut self, task_set: &TaskSet) {
         for RecordedFault { instance, subtask } in &mut self.faults {
             let subtasks = task_set.dag(instance.dag).subtasks();
@@ -463,13 +465,13 @@ impl Replay {
         }
     }
 
-    /// Takes note that an instance of this run has failed.
+    /// Notes that an instance of this run has failed.
     pub(crate) fn meet_fault(&mut self, instance: Instance) {
         self.faults.retain(|fault| fault.instance != instance);
     }
 
-    /// Returns the first recorded fault, of any job or of one, that has not come again. Where the
-    /// recording is of a whole run, only those count whose function is called.
+    /// Returns the first recorded fault that has not occurred again: of any job, or of the given
+    /// one. In a replay of a whole run, only faults of called functions count.
     #[must_use]
     pub fn unmet_fault(&self, of: Option<(DagId, u64)>) -> Option<Divergence> {
         let is_unmet = |RecordedFault { instance, .. }: &&RecordedFault| {
@@ -489,16 +491,16 @@ impl Replay {
     }
 }
 
-/// A replay of what the loader has left in memory.
+/// A replay of a recording left in memory by the loader.
 pub(in crate::edge) struct OfMachine {
     bytes: &'static [u8],
     from: Option<(&'static str, u64)>,
     host: ReplayHost,
     own: Header,
     lines: Vec<LineOf>,
-    /// From the launch on.
+    /// `Some` from the launch on.
     replay: Option<(Replay, SignalTimes)>,
-    /// Until core 0 has it.
+    /// `Some` until core 0 takes it.
     replayer: Option<Box<dyn Drain>>,
 }
 
@@ -586,13 +588,14 @@ impl Crossing for OfMachine {
     }
 }
 
-/// The number of a plan whose signals are a replay's: no signal of the app knows it.
+/// The plan number of a replay, unknown to all signals of the app: only the replay can raise its
+/// signals.
 const REPLAYED: u64 = u64::MAX;
 
-/// Stands where a time does, for: no signal is to come, or not yet.
+/// Stands for "no signal to come, or not yet" in the place of a time.
 const NONE: u64 = u64::MAX;
 
-/// The next signal of each sporadic DAG.
+/// The time of each sporadic DAG's next signal.
 #[derive(Clone, Debug)]
 struct SignalTimes(Arc<[(DagId, AtomicU64)]>);
 
@@ -611,25 +614,26 @@ impl SignalTimes {
         Self(next.collect())
     }
 
-    /// Goes on to the next signal of a DAG: the one before has led to a release.
+    /// Advances to the next signal of a DAG, after the previous one has led to a release.
     fn follow(&self, dag: DagId, next_ns: Option<u64>) {
         if let Some((_, at_ns)) = self.0.iter().find(|(of, _)| *of == dag) {
             at_ns.store(next_ns.unwrap_or(NONE), Ordering::Release);
         }
     }
 
-    /// Takes those that are due.
+    /// Takes the due signals.
     fn due(&self, now_ns: u64) -> impl Iterator<Item = DagId> {
         let is_due = move |(_, at_ns): &&(DagId, AtomicU64)| {
             let due_ns = at_ns.load(Ordering::Acquire);
-            // Before the signal, which may have led to a release when `raise` returns.
+            // Stored before the signal is raised: when `raise` returns, the signal may have led to
+            // a release already, and `follow` may have set the next time.
             let place = (due_ns <= now_ns).then(|| at_ns.store(NONE, Ordering::Release));
             place.is_some()
         };
         self.0.iter().filter(is_due).map(|(dag, _)| *dag)
     }
 
-    /// Returns the replayer that raises them, if there are any.
+    /// Returns the replayer for these signals, if there are any.
     fn raiser(&self, host: ReplayHost) -> Option<Box<dyn Drain>> {
         let raiser = SignalReplayer {
             signals: self.clone(),
