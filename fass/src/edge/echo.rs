@@ -1,9 +1,8 @@
-//! The echo of a recorded topic: its latest value, for a person, while the run goes on.
+//! The echo of a recorded topic: shows people its latest value while the run goes on.
 //!
-//! Of the topic that is watched, a completion copies the value into one room, and the next one
-//! takes its
-//! place: a person reads slower than a DAG writes. The console takes it out, and
-//! makes its text in its own time.
+//! At each completion, the value of the watched topic is copied into a single room, where it
+//! replaces the value before: a person reads slower than a DAG writes. The console takes the value
+//! out, and makes its text in its own time.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -17,14 +16,14 @@ use recording::{Channel, Schema, Shown};
 use super::{Echoing, WatchedValue};
 use crate::run::line::RecordedValue;
 
-/// The longest value that is shown, in bytes.
+/// The greatest length of a shown value, in bytes.
 const ROOM: usize = 512;
 
 /// Keeps the latest value of a topic.
 pub(super) struct TopicEcho {
-    /// By channel: the topic and its type; none of what is sampled.
+    /// The topic and its type, by channel; `None` for samples.
     topics: Vec<Option<(String, Arc<Schema>)>>,
-    /// Whether the topics are those of a plan that is launched.
+    /// Whether the topics belong to a launched plan.
     is_launched: bool,
     watched: Option<u16>,
     room: Box<[u8]>,
@@ -68,10 +67,10 @@ impl Echoing for TopicEcho {
 
     fn record(&mut self, value: &RecordedValue<'_>) {
         if self.watched == Some(value.channel) {
-            // The value before was not looked at in time.
+            // Nobody took the value before in time.
             self.left_out += u64::from(self.kept.is_some());
             let length = value.bytes.and_then(|bytes| {
-                // A value that does not fit is told by its job alone.
+                // A value that does not fit is reported by its job alone.
                 let room = self.room.get_mut(..bytes.len())?;
                 room.copy_from_slice(bytes);
                 Some(bytes.len())

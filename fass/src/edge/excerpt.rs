@@ -1,7 +1,7 @@
-//! The beginning of a text, in memory that is there already.
+//! The beginning of a text, in memory allocated in advance.
 //!
-//! The text of a panic is the app's: it may be megabytes, and there may be no memory
-//! left. A report shows as much of it as fits here, and counts the rest.
+//! The text of a panic is the app's: it may have megabytes, and there may be no memory left. A
+//! report shows as much of it as fits here, and counts the rest.
 
 use core::fmt::{self, Display, Write};
 
@@ -10,7 +10,7 @@ use core::fmt::{self, Display, Write};
 pub struct Excerpt<const N: usize> {
     bytes: [u8; N],
     length: usize,
-    /// How many bytes of the text are left out.
+    /// The number of bytes left out.
     left_out: u64,
 }
 
@@ -30,13 +30,14 @@ impl<const N: usize> Excerpt<N> {
 
 impl<const N: usize> Write for Excerpt<N> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        // After a gap nothing is kept.
+        // After a gap nothing is kept, as the text shown must be a beginning.
         let room = if self.left_out > 0 {
             0
         } else {
             N - self.length
         };
-        // The boundary is one, so nothing else comes; a panic's code would be large.
+        // The place is a character boundary, so the split succeeds; code for a panic would be
+        // large.
         let cut = text.split_at_checked(text.floor_char_boundary(room));
         let (kept, left_out) = cut.unwrap_or_default();
         self.bytes[self.length..self.length + kept.len()].copy_from_slice(kept.as_bytes());
@@ -48,7 +49,7 @@ impl<const N: usize> Write for Excerpt<N> {
 
 impl<const N: usize> Display for Excerpt<N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Whole characters were copied, so this is all of them.
+        // Whole characters were copied, so the conversion succeeds.
         f.write_str(core::str::from_utf8(&self.bytes[..self.length]).unwrap_or_default())?;
         match self.left_out {
             0 => Ok(()),

@@ -1,7 +1,7 @@
-//! The record of a boot: the values that are recorded, and with them its commits, the events of
-//! its runs, and what they took.
+//! The record of a boot: recorded values, together with the commits, the events of the runs, and
+//! their measured times.
 //!
-//! A platform keeps one, behind a lock of its own that no instance waits for: what takes bytes
+//! A platform keeps one, behind a lock of its own. No instance waits for that lock, since the sink
 //! may be slow. Events are copied out of a journal under the cluster's lock, and sent outside of
 //! it.
 
@@ -24,13 +24,13 @@ use sched_dag::{
 use super::{Outgoing, Record, RecordingState};
 use crate::run::plan::Plan;
 
-/// How many events are copied at once.
+/// The number of events copied at once.
 const AT_ONCE: usize = 64;
 
-/// Room for so many clusters is made at the start, so that no commit changes what is allocated.
+/// The number of clusters with room made at the start, so no commit changes the allocated memory.
 const MOST_CLUSTERS: usize = 64;
 
-/// The record of a boot, and what takes its bytes.
+/// The record of a boot, and the sink of its bytes.
 ///
 /// ```
 /// use fass::edge::BootRecord;
@@ -42,7 +42,7 @@ const MOST_CLUSTERS: usize = 64;
 pub struct BootRecord<S> {
     stream: Stream<S>,
     is_cut: bool,
-    /// By cluster, how many events of this run were looked at.
+    /// By cluster, the number of events of this run already looked at.
     taken: Vec<u64>,
 }
 
@@ -61,30 +61,29 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
         &mut self.stream
     }
 
-    /// Lends what takes the bytes.
+    /// Lends the sink.
     pub const fn sink(&mut self) -> &mut S {
         self.stream.sink()
     }
 
-    /// Adds what is committed.
+    /// Adds the committed plan.
     pub fn commit(&mut self, plan: &Plan, options: &SchedulerOptions, overheads: Overheads) {
         self.stream.commit(&committed(plan, options, overheads));
         self.expect(plan.task_set.clusters().count());
     }
 
-    /// Expects events of so many clusters, from the first one on.
+    /// Expects events of so many clusters, from the first event on.
     fn expect(&mut self, clusters: usize) {
         self.taken.clear();
         self.taken.resize(clusters, 0);
     }
 
-    /// Adds the events that clusters' journals have taken since; `look` lends the journal of a
-    /// cluster. Reports whether there were any.
+    /// Adds the new events of the clusters' journals; `look` lends the journal of a cluster.
+    /// Reports whether there were any.
     pub fn take_events(&mut self, mut look: impl FnMut(usize, &mut dyn FnMut(&Journal))) -> bool {
         let mut are_there = false;
         for (cluster, taken) in (0_u16..).zip(&mut self.taken) {
-            // Copied out by a few at a time, so that the scheduler's lock is held for a bounded
-            // time only.
+            // A few at a time, so the scheduler's lock is held for a bounded time only.
             let (mut words, mut count, mut before) = ([[0; 3]; AT_ONCE], 0, *taken);
             look(cluster.into(), &mut |journal| {
                 (before, count) = journal.copy_from(*taken, &mut words);
@@ -99,21 +98,22 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
         are_there
     }
 
-    /// Adds the events of a run whose clusters' journals were not looked at, and what the run
-    /// took.
+    /// Adds the events of a run whose journals were not looked at meanwhile, and the times measured
+    /// in the run.
     pub fn end_run(&mut self, run: &Run) {
-        // Functions are told the clock's time: so a reader finds that of the run.
+        // Functions are told the clock's time; with the epoch a reader can convert it to the run's
+        // time.
         if let epoch_ns @ 1.. = run.epoch_ns() {
             let line = format!("{{\"kind\":\"epoch\",\"ns\":{epoch_ns}}}\n");
             self.stream.text(&line);
         }
-        // Where nothing was committed, there is only what was kept before a fault.
+        // Without a commit, there is only the history kept before a fault.
         if self.taken.is_empty() {
             return;
         }
         let journal = run.journal();
         let clusters = self.taken.len();
-        // Nothing was taken while it ran: a finished run has one journal for all clusters.
+        // Nothing was taken while the run went on: a finished run has one journal for all clusters.
         if self.taken.iter().all(|taken| *taken == 0) {
             self.expect(1);
             while self.take_events(|_, take| take(journal)) {}
@@ -123,18 +123,18 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
         self.expect(clusters);
     }
 
-    /// Adds the rest of what is recorded. Returns how complete it is, if it is recorded.
+    /// Adds the remaining entries of a recording, if there is one, and returns how complete it is.
     pub fn end_recording(&mut self, mut outgoing: Outgoing) -> Option<RecordingState> {
         let drain = outgoing.as_mut()?;
-        // The run is over, so this comes to an end.
+        // The run is over, so this loop ends.
         while drain.step(Some(&mut self.stream)) {}
         let drained = drain.send_losses(&mut self.stream)?;
-        // One run that is cut makes the whole file one.
+        // A single cut run makes the whole file a cut one.
         self.is_cut |= drained.is_cut;
         Some(drained)
     }
 
-    /// Ends the record, and returns what has taken it.
+    /// Ends the record, and returns its sink.
     pub fn finish(self) -> S {
         match self.is_cut {
             true => self.stream.cut(),
@@ -177,7 +177,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
     }
 }
 
-/// Returns all subtasks with the numbers of their DAGs and their own.
+/// Returns all subtasks, each with the numbers of its DAG and its own.
 fn subtasks(task_set: &TaskSet) -> impl Iterator<Item = (u32, u32, &Subtask)> {
     let dags = (0..).zip(task_set.dags());
     dags.flat_map(|(dag, of_dag)| {

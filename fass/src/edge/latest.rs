@@ -1,15 +1,14 @@
 //! The last jobs before a fault, kept where nothing else is recorded or replayed.
 //!
-//! Only inputs are kept, in memory that is taken at the launch ([`LatestJobs`]). Nothing is sent
-//! unless an instance fails; then a drain makes a recording of them, when the run is over. It is
-//! one that is cut, for some of its jobs may lack an input.
+//! Only inputs are kept, in memory allocated at the launch ([`LatestJobs`]). Nothing is sent unless
+//! an instance fails; then a drain makes a recording of the inputs when the run is over. This
+//! recording is marked as cut, since some of its jobs may lack an input.
 //!
-//! This is what a crash leaves behind. A recording of a whole run needs memory or a way out for
-//! all of it. To compute a fault again,
-//! the inputs of the last jobs mostly suffice: what sources returned and what subtasks sampled,
-//! of topics that are recorded, and what they found in recorded states. Each such channel has a
-//! place for each of so many jobs, made at the commit; a value takes the place of the one so many
-//! jobs before.
+//! This is the evidence of a crash. A recording of a whole run needs memory or a way out for all
+//! its values. To compute a fault again, the inputs of the last jobs mostly suffice: values
+//! returned by sources and samples taken by subtasks, both of recorded topics, and recorded states.
+//! Each such channel has a place for each of the kept jobs, made at the commit; a value replaces
+//! the value of as many jobs before.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -32,17 +31,17 @@ pub(super) struct RecentJobs {
     jobs: u32,
     /// The header of the next plan.
     header: Header,
-    /// From the launch on, if there is memory.
+    /// `Some` from the launch on, if there is memory.
     kept: Option<PlanHistory>,
 }
 
-/// The history that is kept of a plan.
+/// The history kept of a plan.
 struct PlanHistory {
     header: Header,
     latest: LatestJobs,
     releases: ReleaseTimes,
     lines: Vec<LineOf>,
-    /// The first instance of each DAG that has failed, and when.
+    /// The first failed instance of each DAG, and the time of its fault.
     faults: Vec<(Instance, u64)>,
 }
 
@@ -50,7 +49,7 @@ impl RecentJobs {
     pub(super) fn new(app: &'static str, jobs: u32) -> Self {
         Self {
             app,
-            // No more than signals are remembered of.
+            // Not more jobs than remembered signals.
             jobs: jobs.min(SIGNALS),
             header: Header::default(),
             kept: None,
@@ -69,7 +68,7 @@ impl Crossing for RecentJobs {
         name(&mut header, self.app, &plan.task_set);
         // A replay begins at one of these jobs, so the states before each have to be known.
         plan.keep_states_of(self.jobs);
-        // Without memory the app runs as if nothing was kept, for nobody has asked for it.
+        // Without memory the app runs as if nothing were kept, for nobody has asked for it.
         let latest = LatestJobs::new(&header.channels, self.jobs);
         self.kept = latest.map(|latest| PlanHistory {
             header,
@@ -92,7 +91,7 @@ impl Crossing for RecentJobs {
 
     fn happened(&mut self, notice: &DriverNotice) {
         let (dag, job) = (notice.event.dag.index(), notice.event.job);
-        // A skipped job counts, or those after it would be others in a replay.
+        // A skipped job counts, too: otherwise later jobs would have other numbers in a replay.
         if let journal::EventKind::Due | journal::EventKind::Skipped = notice.event.what
             && let Some(kept) = &mut self.kept
             && let Some(release_ns) = notice.at_ns
@@ -114,7 +113,7 @@ impl Crossing for RecentJobs {
                 .iter()
                 .all(|(other, _)| other.dag != instance.dag)
             {
-                // One fault for each DAG: it is the first that has to be computed again.
+                // One fault for each DAG: only the first has to be computed again.
                 kept.faults.push((instance, at_ns));
             }
         }
@@ -146,7 +145,7 @@ impl Drain for OfLatest {
         let dags = (0_u16..).zip(releases.task_set.dags());
         for (dag, _) in dags.filter(|(_, model)| model.is_sporadic()) {
             for job in latest.jobs(dag.into()) {
-                // A job without a noted signal never was due.
+                // A job without a noted signal was never due.
                 if let Some(release_ns) = releases.of(dag.into(), job) {
                     write(EntryKind::Signal, [dag, 0], job, release_ns, &[]);
                 }
@@ -166,7 +165,7 @@ impl Drain for OfLatest {
         }
     }
 
-    /// All has been sent at the beginning.
+    /// Does nothing, as everything is sent with the header.
     fn step(&mut self, _to: Option<&mut Record>) -> bool {
         false
     }
@@ -176,8 +175,8 @@ impl Drain for OfLatest {
     }
 }
 
-/// The inputs of each DAG's last jobs, or, once one has failed, of those up to it. It allocates
-/// nothing but when it is made.
+/// The inputs of each DAG's last jobs, or, after a fault, of the jobs up to the failed one.
+/// Allocates only when made.
 ///
 /// ```
 /// use fass::edge::{LatestJobs, RecordedValue};
@@ -205,9 +204,9 @@ impl Drain for OfLatest {
 #[derive(Clone, Debug)]
 pub struct LatestJobs {
     jobs: u32,
-    /// One for each channel; empty for one that is no input.
+    /// The history of each channel; empty for a channel without inputs.
     places: Vec<ChannelHistory>,
-    /// For each DAG, the jobs before the next one.
+    /// For each DAG, the job after the latest job seen.
     ends: Vec<u64>,
     /// For each DAG, the last job of interest.
     last: Vec<u64>,
@@ -217,10 +216,10 @@ pub struct LatestJobs {
 #[derive(Clone, Debug)]
 struct ChannelHistory {
     dag: usize,
-    /// The room of a value.
+    /// The room for a value, in bytes.
     room: usize,
     bytes: Vec<u8>,
-    /// By place: the job, when it was complete, and its length, if it fitted.
+    /// By place: the job, the time of its completion in ns, and the value's length, if it fitted.
     values: Vec<Option<(u64, u64, Option<usize>)>>,
 }
 
@@ -253,7 +252,7 @@ impl LatestJobs {
         })
     }
 
-    /// Takes a value, if it is an input.
+    /// Stores a value, if it is an input.
     pub fn store(&mut self, value: &RecordedValue<'_>) {
         let Some(places) = self.places.get_mut(usize::from(value.channel)) else {
             return;
@@ -274,32 +273,32 @@ impl LatestJobs {
         places.values[place] = Some((value.job, value.completed_ns, fitting));
     }
 
-    /// Holds what is kept of a DAG, one job of which has failed: later jobs take no place of
-    /// those before. Jobs that are held already stay.
+    /// Holds the kept jobs of a DAG after a job has failed: later jobs no longer replace them. A
+    /// second call for the DAG has no effect.
     pub fn hold(&mut self, dag: usize, job: u64) {
         if let Some(last @ &mut u64::MAX) = self.last.get_mut(dag) {
             *last = job;
         }
     }
 
-    /// Reports whether an input of a job would be kept: it is not behind one that has failed.
+    /// Reports whether an input of a job would be kept: the job is not after a failed one.
     pub fn is_of_interest(&self, dag: usize, job: u64) -> bool {
         self.last.get(dag).is_some_and(|last| job <= *last)
     }
 
-    /// Returns the last jobs of a DAG.
+    /// Returns the range of a DAG's last jobs.
     pub fn jobs(&self, dag: usize) -> Range<u64> {
         let end = self.ends.get(dag).copied().unwrap_or(0);
         end.saturating_sub(self.jobs.into())..end
     }
 
-    /// Reports whether a job is among the last ones of its DAG.
+    /// Reports whether a job is among the last of its DAG.
     pub fn has(&self, dag: usize, job: u64) -> bool {
         let end = self.ends.get(dag).copied().unwrap_or(0);
         job.saturating_add(self.jobs.into()) >= end
     }
 
-    /// Returns the kept values, channel by channel, and of each job by job.
+    /// Returns the kept values, ordered by channel and then by job.
     pub fn values(&self) -> impl Iterator<Item = RecordedValue<'_>> {
         (0_u16..).zip(&self.places).flat_map(|(channel, places)| {
             self.jobs(places.dag).filter_map(move |job| {
@@ -318,7 +317,7 @@ impl LatestJobs {
     }
 }
 
-/// Returns so many of a value; `None`: there is no memory.
+/// Returns a vector of `count` copies of a value; `None`: there is no memory.
 fn filled<T: Clone>(value: T, count: usize) -> Option<Vec<T>> {
     let mut all = Vec::new();
     all.try_reserve_exact(count).ok()?;

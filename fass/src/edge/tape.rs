@@ -1,12 +1,12 @@
-//! The recorder: events at the edge, on their way into a file.
+//! The recorder: entries on their way from the edge into a file.
 //!
-//! Each channel has a place for its values, into which its subtask writes them; here comes only
-//! what else happens, and which values had no room there. If even these are too many, the tape
-//! ends there, and the recording says that it is cut.
+//! Each channel has a place for its values, into which its subtask writes them. The tape takes only
+//! other events, and the jobs whose values had no room. If even these are too many, the tape ends,
+//! and the recording says that it is cut.
 //!
-//! The drain makes the file. It takes the earliest of the values and events that wait, so the file
-//! has them nearly in the order of their times, and each channel's in its own. Before a channel's
-//! next value it tells of those that are lost, which completions have noted, one at a time.
+//! The drain makes the file. It takes the earliest of the waiting values and events, so the file is
+//! nearly in the order of time, and each channel's values are in order. Completions note lost
+//! values, one at a time; the drain reports them before the channel's next value.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -32,7 +32,8 @@ pub(super) struct RunRecorder {
     events: Option<Outbox>,
     drain: Option<Box<dyn Drain>>,
     lines: Vec<LineOf>,
-    /// By channel: where a value is put that is given, for somebody in front of the tape looks.
+    /// The outboxes for values given instead of read, by channel: used if somebody watches values
+    /// in front of the tape.
     given: Vec<Option<Outbox>>,
     lost: LossCounts,
 }
@@ -54,12 +55,12 @@ impl RunRecorder {
         }
     }
 
-    /// Makes all places, each with the same part of the memory; `None`: there is too little.
+    /// Makes all places, each with the same share of the memory; `None`: there is too little.
     fn provide(&mut self, plan: &mut Plan) -> Option<()> {
         let channels = &self.header.channels;
-        // One part for each channel, and one for events.
+        // One share for each channel, and one for events.
         let words = self.bytes / 8 / (channels.len() + 1);
-        // Room for 64 events at least, however little memory is given: a run has more events than
+        // Room for at least 64 events, however little memory is given: a run has more events than
         // values.
         let (events, reader) = outbox(words.max(64 * words_of(EVENT_BYTES)))?;
         self.lines = mem::take(&mut plan.lines);
@@ -84,21 +85,22 @@ impl RunRecorder {
     fn put(&mut self, what: EntryKind, of: Instance, release_ns: Option<u64>, at_ns: u64) {
         let mut bytes = [0; EVENT_BYTES];
         let mut out = Encoder::new(&mut bytes);
-        // The commit has refused larger numbers of what is recorded.
+        // The commit has refused to record DAGs or subtasks with larger numbers.
         let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
         (what, dag, subtask, release_ns).encode(&mut out);
         let length = out.finish().unwrap_or(EVENT_BYTES);
         if let Some(events) = &self.events
             && !events.put(of.job, at_ns, &bytes[..length])
         {
-            // A lost event cannot be told as a lost value is: a replay would miss a signal. So the
-            // recording ends here.
+            // A lost event cannot be reported like a lost value, as a replay would miss a signal.
+            // So the recording ends here.
             self.lost.finish(at_ns);
         }
     }
 }
 
-/// Takes a value that is not where the drain reads it: it is given, and is put there, or is lost.
+/// Takes a value missing from the places read by the drain. A given value is put there; any other
+/// is lost.
 fn store(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, at_ns: u64) {
     let outbox = given
         .get(usize::from(value.channel))
@@ -106,7 +108,7 @@ fn store(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>,
     let is_put = (value.bytes.zip(outbox))
         .is_some_and(|(bytes, outbox)| outbox.put(value.job, value.completed_ns, bytes));
     if !is_put {
-        // A lost value is told by its job, and the recording goes on.
+        // A lost value is reported by its job, and the recording goes on.
         lost.note(value, at_ns);
     }
 }
@@ -144,7 +146,7 @@ impl Crossing for RunRecorder {
 
     fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
         for of in self.lines.iter().filter(|of| of.is_found_by(instance)) {
-            // What the instance found before its fault is needed to compute the fault again.
+            // The samples from before the fault are needed to compute the fault again.
             (of.line).publish_or_give(clock_ns, |sample| {
                 store(&self.given, &self.lost, sample, at_ns);
             });
@@ -155,7 +157,7 @@ impl Crossing for RunRecorder {
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let number = u16::try_from(instance.dag.0);
         let mut channels = self.header.channels.iter();
-        // Only of DAGs that are recorded: the time told to others is no input of the replay.
+        // Only for recorded DAGs: the time told to others is no input of the replay.
         if channels.any(|channel| Ok(channel.dag) == number) {
             self.put(EntryKind::Clock, instance, None, at_ns);
         }
@@ -167,17 +169,16 @@ impl Crossing for RunRecorder {
     }
 }
 
-/// An event in its record: what it is, of which DAG and subtask, and when the job was due, where
-/// that is known.
+/// An event in its record: the kind, the DAG and the subtask, and the job's due time, where known.
 type Event = (EntryKind, u16, u16, Option<u64>);
 
-/// The most bytes of an event.
+/// The greatest length of an event, in bytes.
 const EVENT_BYTES: usize = 14;
 
-/// The bytes of a list of one time.
+/// The length of a list of one time, in bytes.
 const TOLD: usize = 4 + 8;
 
-/// Writes down what an instance was told that asked for the time, as a list of one.
+/// Writes the time told to an instance, as a list of one time.
 fn write_told(clock_ns: u64, bytes: &mut [u8; TOLD]) -> &[u8] {
     (1_u32, clock_ns).encode(&mut Encoder::new(bytes));
     bytes
@@ -186,23 +187,23 @@ fn write_told(clock_ns: u64, bytes: &mut [u8; TOLD]) -> &[u8] {
 /// Makes the file.
 struct OfTape {
     events: OutboxReader,
-    /// By channel.
+    /// The values, by channel.
     records: Vec<OutboxReader>,
     lost: LossCounts,
     header: Header,
     releases: ReleaseTimes,
-    /// When the run's time begins, on the clock, on which values were complete.
+    /// The begin of the run's time, on the clock. Values are stamped on the clock.
     epoch_ns: u64,
 }
 
-/// When jobs are due.
+/// The due times of jobs.
 pub(super) struct ReleaseTimes {
     pub(super) task_set: Arc<TaskSet>,
-    /// By DAG, if it is sporadic, the signals in flight: job and release, a place for each.
+    /// For each sporadic DAG, the signals in flight: job and release, each in a place.
     signals: Vec<Vec<(u64, u64)>>,
 }
 
-/// How many signals of a DAG are remembered.
+/// The number of signals remembered for a DAG.
 pub(super) const SIGNALS: u32 = 64;
 
 impl ReleaseTimes {
@@ -223,7 +224,7 @@ impl ReleaseTimes {
             None => Some(self.task_set.dags()[dag].grid_ns(job)),
             Some(place) => {
                 let (of, release_ns) = signals[place];
-                // The place may hold an older signal, if this one was never noted.
+                // The place may hold an older signal, if the signal of this job was never noted.
                 (of == job).then_some(release_ns)
             }
         }
@@ -237,7 +238,8 @@ impl ReleaseTimes {
         }
     }
 
-    /// Returns what happened to a job at a time, which takes the place of an unknown release.
+    /// Returns the entry of an event at a time, which also serves as the release if that is
+    /// unknown.
     pub(super) fn entry<'v>(
         &self,
         what: EntryKind,
@@ -264,7 +266,7 @@ pub(super) fn place_of(job: u64, places: usize) -> Option<usize> {
 }
 
 impl OfTape {
-    /// Finds what is earliest of all that waits: a channel, or `None` for an event, and its time.
+    /// Finds the earliest of all waiting entries: its time, and its channel or `None` for an event.
     fn earliest(&mut self) -> Option<(u64, Option<u16>)> {
         let event = self.events.next().map(|event| (event.at_ns, None));
         let epoch_ns = self.epoch_ns;
@@ -275,21 +277,21 @@ impl OfTape {
                 let at_ns = records.next()?.at_ns.saturating_sub(epoch_ns);
                 Some((at_ns, Some(channel)))
             });
-        // At one time an event is first, such as the signal that released a job.
+        // At equal times the event comes first, such as the signal that released the job.
         event
             .into_iter()
             .chain(values)
             .min_by_key(|(at_ns, _)| *at_ns)
     }
 
-    /// Tells of the values of a channel that are lost, before the next one, or at the end.
+    /// Reports lost values of a channel, before its next value or at the end.
     fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, to: &mut Record) {
         let dag = self.header.channels[usize::from(channel)].dag;
         let before = next.map(|(job, _)| job);
-        // Before the value that comes next, so that the file is in the order of jobs.
+        // Before the next value, to keep the file in the order of jobs.
         while let Some((first, last)) = self.lost.values[usize::from(channel)].next_run(before) {
             for job in first..=last {
-                // What is told at the end only has no time of its own.
+                // A loss reported only at the end has no time of its own.
                 let release_ns = || self.releases.of(dag.into(), job).unwrap_or(0);
                 let at_ns = next.map_or_else(release_ns, |(_, at_ns)| at_ns);
                 let of = [dag, channel];
@@ -319,7 +321,7 @@ impl OfTape {
         let Some(PublishedRecord { job, at_ns, bytes }) = self.events.next() else {
             return;
         };
-        // Read out before the place is given back.
+        // Copied out before the place is given back.
         let event = Event::from_bytes(bytes);
         self.events.forget();
         let Ok((what, dag, place, known_ns)) = event else {
@@ -331,7 +333,7 @@ impl OfTape {
             _ => &[],
         };
         let entry = self.releases.entry(what, [dag, place], job, at_ns, value);
-        // A signal's release stands in no grid; the event itself has it.
+        // A signal's release is on no grid, so the event itself carries the time.
         let release_ns = known_ns.unwrap_or(entry.release_ns);
         if what == EntryKind::Signal {
             self.releases.note(dag.into(), job, release_ns);
@@ -342,7 +344,7 @@ impl OfTape {
         });
     }
 
-    /// Reports whether the recording has ended before that time, for something had no room.
+    /// Reports whether the recording has ended before this time for lack of room.
     fn has_ended(&self, at_ns: u64) -> bool {
         self.lost.rest_ns.load(Ordering::Acquire) < at_ns
     }
@@ -362,7 +364,7 @@ impl Drain for OfTape {
             return false;
         };
         match self.earliest() {
-            // What is left is younger than the gap, and would make a file with a hole.
+            // All entries left are younger than the gap, and would make a file with a hole.
             Some((at_ns, _)) if self.has_ended(at_ns) => return false,
             Some((at_ns, Some(channel))) => self.write_value(channel, at_ns, to),
             Some((_, None)) => self.write_event(to),
@@ -382,14 +384,14 @@ impl Drain for OfTape {
     }
 }
 
-/// The most runs of jobs that are noted.
+/// The greatest number of runs of lost jobs noted at a time.
 const MOST_RUNS: usize = 32;
 
-/// Runs of lost jobs.
+/// Runs of consecutive lost jobs.
 struct LostJobs {
-    /// The first and the last job of each.
+    /// The first and the last job of each run.
     runs: [[AtomicU64; 2]; MOST_RUNS],
-    /// How many have been written, and read, in all.
+    /// The numbers of runs ever written, and ever read.
     written: AtomicUsize,
     read: AtomicUsize,
 }
@@ -403,14 +405,14 @@ impl LostJobs {
         }
     }
 
-    /// Notes a job, which is after those before; `false`: they are too many.
+    /// Notes a lost job, later than all before; `false`: there are too many runs.
     fn note(&self, job: u64) -> bool {
         let written = self.written.load(Ordering::Relaxed);
-        // Pairs with the release store of `take`: the place of a run that was read may be written
-        // again.
+        // Pairs with the release store in `next_run`: the place of a run already read may be
+        // written again.
         let read = self.read.load(Ordering::Acquire);
-        // The run before goes on. Nobody reads it yet, for that takes a value of a later job, and
-        // between that and this one there would be a job.
+        // The job continues the last run. Nobody reads that run yet: a read needs a published value
+        // of a later job, which would lie between the run and this job.
         if written > read
             && let [_, last] = &self.runs[(written - 1) % MOST_RUNS]
             && last.load(Ordering::Relaxed) + 1 == job
@@ -429,7 +431,7 @@ impl LostJobs {
         true
     }
 
-    /// Takes the next run if it comes before a job whose value is there, or at the end.
+    /// Takes the next run if it lies before a job with a value, or at the end.
     fn next_run(&self, before: Option<u64>) -> Option<(u64, u64)> {
         let read = self.read.load(Ordering::Relaxed);
         if read == self.written.load(Ordering::Acquire) {
@@ -437,27 +439,27 @@ impl LostJobs {
         }
         let ends = self.runs[read % MOST_RUNS].each_ref();
         let [first, last] = ends.map(|end| end.load(Ordering::Acquire));
-        // The run comes after the value in hand; it is told with a later one.
+        // The run comes after the value at hand, and is reported with a later value.
         if before.is_some_and(|before| first >= before) {
             return None;
         }
-        // After both loads, so that the writer cannot overwrite the run while it is read.
+        // After both loads, so the writer cannot overwrite the run during the read.
         self.read.store(read + 1, Ordering::Release);
         Some((first, last))
     }
 }
 
-/// Counts of what is lost.
+/// Counts of losses.
 #[derive(Clone)]
 struct LossCounts {
-    /// By channel.
+    /// Lost values, by channel.
     values: Arc<[LostJobs]>,
-    /// When something happened that had no room; `u64::MAX`: there was nothing.
+    /// When an event found no room; `u64::MAX`: never.
     rest_ns: Arc<AtomicU64>,
 }
 
 impl LossCounts {
-    /// Notes a value. It happens at completions, under the scheduler's lock.
+    /// Notes a lost value. Called at completions, under the scheduler's lock.
     #[cold]
     fn note(&self, value: &RecordedValue<'_>, at_ns: u64) {
         let jobs = self.values.get(usize::from(value.channel));

@@ -1,15 +1,15 @@
 //! The fourth cell: records on their way from the instances of one subtask to a reader.
 //!
-//! An instance *stages* a record, which nobody sees; its completion *publishes* it. If an
-//! instance is never complete, the next one writes over its record. A record lies in one piece:
-//! three words, and its bytes. Neither side waits for the other.
+//! An instance *stages* a record, invisible to all others; its completion *publishes* the record.
+//! If an instance is never complete, the next one overwrites its record. A record lies in one
+//! piece: three words, and its bytes. Neither side waits for the other.
 //!
 //! > **Record invariant.** The words from `read` on up to `written`, round the end, are the
-//! > reader's; all others are those of the *claim*'s holder. A claim is made by an `Acquire`
-//! > exchange of `state` to `CLAIMED` from anything else, and given back by a `Release` store.
-//! > Only its holder moves `written`, only the reader moves `read`, both by `Release` and on to
-//! > words that were their own; each looks at the other's by `Acquire`. There is one reader, whose
-//! > doings take `&mut self`.
+//! > reader's; all others belong to the holder of the *claim*. A claim is made by an `Acquire`
+//! > exchange of `state` to `CLAIMED` from any other value, and given back by a `Release` store.
+//! > Only the holder moves `written`, only the reader moves `read`, both by `Release` and on to
+//! > words of their own; each loads the other's index by `Acquire`. There is one reader, whose
+//! > methods take `&mut self`.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -19,10 +19,12 @@ use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use recording::Full;
 
-/// The words of a record before its bytes: the job, when it was complete, how many bytes.
+/// The words of a record before its bytes: the job, the time of its completion, the number of
+/// bytes.
 const HEAD: usize = 3;
 
-/// Stands where a record's job does, for: the next one is at the start. No run gets so far.
+/// Stands in the place of a record's job for "the next record is at the start". No run gets that
+/// far.
 const WRAP: u64 = u64::MAX;
 
 /// Nothing is staged.
@@ -31,16 +33,17 @@ const FREE: usize = 0;
 /// Somebody has the claim.
 const CLAIMED: usize = 1;
 
-/// There was no room to stage a record.
+/// A record had no room to be staged.
 const LOST: usize = 2;
 
 struct RecordRing {
     words: Box<[AtomicU64]>,
-    /// One of these, or else where the staged record ends, which is a place behind its head.
+    /// `FREE`, `CLAIMED` or `LOST`, or else the end of the staged record, which lies after its
+    /// head.
     state: AtomicUsize,
-    /// Where the next record is published.
+    /// The place of the next published record.
     written: AtomicUsize,
-    /// Where the reader reads next.
+    /// The place of the reader's next record.
     read: AtomicUsize,
     /// The job whose value has no room.
     lost: AtomicU64,
@@ -49,17 +52,17 @@ struct RecordRing {
 /// The writing end.
 pub(crate) struct Outbox(Arc<RecordRing>);
 
-/// The reading end. There is one, and it cannot be cloned.
+/// The reading end. There is only one, and no clone.
 pub(crate) struct OutboxReader(Arc<RecordRing>);
 
-/// A record that is published.
+/// A published record.
 pub(crate) struct PublishedRecord<'b> {
     pub(crate) job: u64,
     pub(crate) at_ns: u64,
     pub(crate) bytes: &'b [u8],
 }
 
-/// Returns how many words a record takes.
+/// Returns the number of words for a record.
 pub(crate) const fn words_of(bytes: usize) -> usize {
     HEAD + bytes.div_ceil(8)
 }
@@ -80,11 +83,11 @@ pub(crate) fn outbox(count: usize) -> Option<(Outbox, OutboxReader)> {
 }
 
 impl Outbox {
-    /// Stages a record of at most `most` bytes, which `write` puts into the place that it gets,
-    /// and counts. One that was staged and not published is given up.
+    /// Stages a record of at most `most` bytes. `write` puts the bytes into the place it gets, and
+    /// returns their number. A record staged before and not published is given up.
     ///
-    /// Each recorded value comes by here, and this crate is compiled for size: so it is made part
-    /// of what calls it.
+    /// Each recorded value passes through here, and this crate is compiled for size: so the
+    /// function is inlined into its callers.
     #[inline(always)]
     pub(crate) fn stage(
         &self,
@@ -101,14 +104,15 @@ impl Outbox {
             let read = records.read.load(Ordering::Acquire);
             let mut words = records.words.get(place..).unwrap_or_default();
             if place < read {
-                // `place == read` would mean empty, so it is never filled up to the reader.
+                // `place == read` would mean empty, so the words are never filled up to the reader.
                 words = words.get(..read - 1 - place).unwrap_or_default();
             }
             let needed = match words {
                 [of_job, _, length, rest @ ..] => {
                     let bytes = rest.as_ptr().cast_mut().cast::<u8>();
-                    // SAFETY: by the record invariant these words are the claim's holder's, which
-                    // we are; they are atomic, so they may be changed through what was shared.
+                    // SAFETY: by the record invariant these words belong to the claim's holder, who
+                    // is this call. They are atomic, so they may be changed through a shared
+                    // reference.
                     let bytes = unsafe { slice::from_raw_parts_mut(bytes, size_of_val(rest)) };
                     match write(bytes) {
                         Ok(count) if count <= most => {
@@ -119,7 +123,7 @@ impl Outbox {
                         Ok(needed) | Err(Full { needed }) => needed,
                     }
                 }
-                // So much is needed in any case.
+                // Not even the head fits. The bytes needed are unknown, and at least 0.
                 _ => 0,
             };
             if needed > most || !records.go_to_start(place, read, needed) {
@@ -130,8 +134,8 @@ impl Outbox {
         records.state.store(state, Ordering::Release);
     }
 
-    /// Publishes what is staged, as complete at a time; `false`: there is nothing, or it had no
-    /// room.
+    /// Publishes the staged record, with the time of its completion; `false`: there is none, or it
+    /// had no room.
     #[inline(always)]
     pub(crate) fn publish(&self, at_ns: u64) -> bool {
         let records = &*self.0;
@@ -148,7 +152,8 @@ impl Outbox {
         true
     }
 
-    /// Stages these bytes and publishes them, as complete at a time; `false`: they have no room.
+    /// Stages and publishes these bytes, with the time of their completion; `false`: they have no
+    /// room.
     pub(crate) fn put(&self, job: u64, at_ns: u64, bytes: &[u8]) -> bool {
         let needed = bytes.len();
         self.stage(job, needed, |place| {
@@ -159,7 +164,7 @@ impl Outbox {
         self.publish(at_ns)
     }
 
-    /// Shows what is staged in place of publishing it: its job, and its bytes, if they had room.
+    /// Shows the staged record instead of publishing it: its job, and its bytes, if they had room.
     pub(crate) fn show(&self, look: impl FnOnce(u64, Option<&[u8]>)) {
         let records = &*self.0;
         let state = records.state.load(Ordering::Relaxed);
@@ -178,7 +183,7 @@ impl Outbox {
 }
 
 impl RecordRing {
-    /// Makes a claim if that is the state, which is not `CLAIMED`.
+    /// Makes a claim if `from`, never `CLAIMED`, is the present state.
     #[inline(always)]
     fn claim(&self, from: usize) -> bool {
         let claim =
@@ -186,15 +191,15 @@ impl RecordRing {
         claim.is_ok()
     }
 
-    /// Makes a claim where something is staged that is not published, unless somebody has one.
+    /// Makes a claim where a record is staged and not published, unless somebody else has a claim.
     #[cold]
     fn claim_again(&self) -> bool {
         let state = self.state.load(Ordering::Relaxed);
         state != CLAIMED && self.claim(state)
     }
 
-    /// Makes the start the place of the next record, which needs so many bytes; `false`: it has no
-    /// room there. The caller has the claim.
+    /// Makes the start the place of the next record, of `needed` bytes; `false`: there is no room.
+    /// The caller has the claim.
     #[cold]
     fn go_to_start(&self, place: usize, read: usize, needed: usize) -> bool {
         if place < read || words_of(needed) >= read {
@@ -207,16 +212,16 @@ impl RecordRing {
         true
     }
 
-    /// Returns the record at a place. The caller has the claim, or is the reader and has seen
-    /// that it is published.
+    /// Returns the record at a place. The caller has the claim, or is the reader and has seen the
+    /// record's publication.
     fn record(&self, place: usize) -> Option<PublishedRecord<'_>> {
         let [job, at, length, rest @ ..] = self.words.get(place..)? else {
             return None;
         };
         let length = usize::try_from(length.load(Ordering::Relaxed)).ok()?;
         let words = rest.get(..length.div_ceil(8))?;
-        // SAFETY: by the record invariant nobody changes these words as long as the caller holds
-        // them, which both callers do while they look.
+        // SAFETY: by the record invariant nobody changes these words as long as the caller has
+        // them, and both callers keep them for the time of the borrow.
         let bytes = unsafe { slice::from_raw_parts(words.as_ptr().cast::<u8>(), length) };
         Some(PublishedRecord {
             job: job.load(Ordering::Relaxed),

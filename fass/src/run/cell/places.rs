@@ -1,13 +1,13 @@
-//! The fifth cell: places that two sides use in turn, a putter and a taker.
+//! The fifth cell: places used in turn by two sides, a putter and a taker.
 //!
-//! A value stays in its place. The putter changes its own places, and *shows* them to the taker, all
-//! at once; the taker gives each back. So no value is ever moved, and a side has as many places as
-//! before even if a fault ends an instance in the middle.
+//! A value stays in its place. The putter changes its own places, and *shows* them to the taker,
+//! all at once; the taker gives each back. So no value is ever moved, and each side keeps its
+//! number of places even if a fault ends an instance in the middle.
 //!
 //! > **Place invariant.** The places from `read` on up to `written` are the taker's; all others are
 //! > the putter's. Only the putter moves `written`, only the taker moves `read`, both by `Release`
-//! > and over places of their own; each looks at the other's by `Acquire`. There is a single
-//! > putter and a single taker, whose doings take `&mut self`.
+//! > and over places of their own; each loads the other's index by `Acquire`. There is a single
+//! > putter and a single taker, whose methods take `&mut self`.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -15,27 +15,27 @@ use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 struct Places<T> {
-    /// As many as a power of two.
+    /// The number of places is a power of two, so an index wraps by a mask.
     places: Box<[UnsafeCell<T>]>,
-    /// How many have ever been shown, and how many of them given back.
+    /// The number of places ever shown, and of places ever given back.
     written: AtomicUsize,
     read: AtomicUsize,
 }
 
-// SAFETY: by the place invariant a place is a single thread's at a time, and `T: Send` goes from one to
-// another.
+// SAFETY: by the place invariant a single thread has a place at a time, and `T: Send` permits
+// handing a value from one thread to another.
 unsafe impl<T: Send> Sync for Places<T> {}
 
-/// The end for filling places. There is no second, and no clone.
+/// The end for filling places. There is only one, and no clone.
 pub(crate) struct Putter<T>(Arc<Places<T>>);
 
-/// The end for emptying places. There is no second, and no clone.
+/// The end for emptying places. There is only one, and no clone.
 pub(crate) struct Taker<T>(Arc<Places<T>>);
 
-/// Says how many places are the taker's, to anybody.
+/// Tells anybody how many places are the taker's.
 pub(crate) struct PlaceLevel<T>(Arc<Places<T>>);
 
-/// Makes places for so many values at least.
+/// Makes places for at least so many values.
 pub(crate) fn places<T>(
     count: usize,
     value: impl FnMut() -> T,
@@ -59,7 +59,7 @@ impl<T> Places<T> {
 }
 
 impl<T> Putter<T> {
-    /// Returns the place so many behind the shown ones, unless that is the taker's.
+    /// Returns the place so many behind the shown ones, unless the taker has it.
     #[inline]
     pub(crate) fn place(&mut self, ahead: usize) -> Option<&mut T> {
         let places = &*self.0;
@@ -69,8 +69,8 @@ impl<T> Putter<T> {
             return None;
         }
         let place = places.place(written.wrapping_add(ahead)).get();
-        // SAFETY: by the place invariant the place is the putter's, and `&mut self` keeps us
-        // from giving out another reference meanwhile.
+        // SAFETY: by the place invariant the place is the putter's, and `&mut self` keeps us from
+        // giving out another reference meanwhile.
         Some(unsafe { &mut *place })
     }
 
@@ -78,7 +78,7 @@ impl<T> Putter<T> {
     ///
     /// # Panics
     ///
-    /// If they are not the putter's.
+    /// If the places are not the putter's.
     #[inline]
     pub(crate) fn show(&mut self, count: usize) {
         if count > 0 {
@@ -104,8 +104,8 @@ impl<T> Taker<T> {
         if read == mark || read == self.mark() {
             return None;
         }
-        // SAFETY: by the place invariant the place is the taker's, and `&mut self` keeps us
-        // from giving out another reference meanwhile.
+        // SAFETY: by the place invariant the place is the taker's, and `&mut self` keeps us from
+        // giving out another reference meanwhile.
         Some(unsafe { &mut *places.place(read).get() })
     }
 

@@ -1,42 +1,42 @@
-//! The waker by which a future of ours finds the turn in which it is polled.
+//! The waker by which this crate's futures find the turn they are polled in.
 //!
-//! A future of the app is polled with a [`Waker`] of our own. It wakes nobody: the scheduler
-//! decides when a turn is taken. Its data is the state of the turn, and that is how a future of ours
-//! asks for a wait, however deep it lies in futures of others.
+//! The app's future is polled with a special [`Waker`]. It wakes nobody: the scheduler decides when
+//! a turn is taken. The waker's data is the state of the turn. Through it a future of this crate
+//! asks for a wait, however deeply other futures enclose it.
 //!
-//! > **Turn waker invariant.** The data of a waker with [`TURN`] for its functions points to a
-//! > [`TurnState`] that lives at least as long as every reference to the waker. Such a waker is made
-//! > in [`poll_in`] only, where the state is borrowed for longer than the waker lives, and never
-//! > moves; a clone of one, which may live on, is a waker of another kind that does nothing.
+//! > **Turn waker invariant.** The data of a waker with [`TURN`] as its functions points to a
+//! > [`TurnState`] living at least as long as every reference to the waker. Such a waker is made in
+//! > [`poll_in`] only, where the state is borrowed for longer than the waker lives, and never
+//! > moves. A clone, which may live on, is a waker of another kind and does nothing.
 
 use core::ptr;
 use core::task::{Context, RawWaker, RawWakerVTable, Waker};
 
 use crate::run::turn::TurnState;
 
-/// The functions of our wakers, which are known by this address. A `static` has one.
+/// The functions of turn wakers, recognised by this address. Only a `static` has a fixed address.
 static TURN: RawWakerVTable = RawWakerVTable::new(|_| inert(), |_| {}, |_| {}, |_| {});
 
-/// The functions of their clones.
+/// The functions of clones.
 static INERT: RawWakerVTable = RawWakerVTable::new(|_| inert(), |_| {}, |_| {}, |_| {});
 
 fn inert() -> RawWaker {
     RawWaker::new(ptr::null(), &INERT)
 }
 
-/// Polls with a context in which futures of ours find the turn.
+/// Polls with a context in which this crate's futures find the turn.
 pub(crate) fn poll_in<T>(turn: &TurnState, poll: impl FnOnce(&mut Context<'_>) -> T) -> T {
     let data = ptr::from_ref(turn).cast();
-    // SAFETY: the functions neither use nor free what they get, from any thread, and a clone has
+    // SAFETY: the functions neither use nor free their data, from any thread, and a clone has
     // functions of its own. The state outlives the waker, as the turn waker invariant demands.
     let waker = unsafe { Waker::new(data, &TURN) };
     poll(&mut Context::from_waker(&waker))
 }
 
-/// Returns the turn in which a future is polled with this waker, if it is in one.
+/// Returns the turn in which a future is polled with this waker, or `None` outside a turn.
 pub(crate) fn turn_of(waker: &Waker) -> Option<&TurnState> {
     let turn = ptr::eq(waker.vtable(), &TURN).then(|| waker.data().cast::<TurnState>())?;
-    // SAFETY: by the turn waker invariant it points to a state that lives as long as this
+    // SAFETY: by the turn waker invariant the data points to a state living as long as this
     // reference to the waker, and a state is only ever shared.
     Some(unsafe { &*turn })
 }

@@ -1,13 +1,13 @@
 //! Buffers: the memory of packets on their way between a device and an instance.
 //!
-//! A buffer is owned: by a place of a wire's ring, or by a device. A device fills or empties the
-//! buffers that it has, and *swaps* one for a buffer of the wire, so that no byte is copied, and
-//! each side has as many as before.
+//! A buffer has an owner: a place in a wire's ring, or a device. A device fills or empties its
+//! buffers, and *swaps* each for a buffer of the wire. So no byte is copied, and each side keeps
+//! its number of buffers.
 
 use alloc::boxed::Box;
 use core::ops::Range;
 
-/// The memory of one packet, and where in it the packet's bytes are.
+/// The memory of one packet, and the position of the packet's bytes in it.
 ///
 /// ```
 /// use fass::platform::Buffer;
@@ -24,13 +24,14 @@ pub struct Buffer {
 }
 
 impl Buffer {
-    /// The length of the shortest buffer: a frame of Ethernet and what cards put before it.
+    /// The length of the shortest buffer, in bytes: an Ethernet frame, with the header put before
+    /// it by network cards.
     pub const LEAST_BYTES: usize = 2048;
 
-    /// How many bytes before the packet are left to the headers of a device.
+    /// The number of bytes before the packet left to the headers of a device.
     pub const HEADROOM: usize = 64;
 
-    /// Makes a buffer of so many bytes at least, with nothing in it. It allocates.
+    /// Makes an empty buffer of at least so many bytes. Allocates.
     pub fn new(bytes: usize) -> Self {
         Self {
             bytes: alloc::vec![0; bytes.max(Self::LEAST_BYTES)].into(),
@@ -44,16 +45,16 @@ impl Buffer {
         &mut self.bytes
     }
 
-    /// Returns where the packet's bytes are.
+    /// Returns the position of the packet's bytes.
     pub fn range(&self) -> Range<usize> {
         self.range.clone()
     }
 
-    /// Says where the packet's bytes are.
+    /// Sets the position of the packet's bytes.
     ///
     /// # Panics
     ///
-    /// Panics if that is not within the memory.
+    /// Panics if the range is not within the memory.
     pub fn set_range(&mut self, range: Range<usize>) {
         assert!(range.start <= range.end && range.end <= self.bytes.len());
         self.range = range;
@@ -72,7 +73,7 @@ impl Buffer {
 }
 
 impl From<&[u8]> for Buffer {
-    /// Makes a buffer with this packet in it. It allocates.
+    /// Makes a buffer with this packet in it. Allocates.
     fn from(packet: &[u8]) -> Self {
         let mut buffer = Self::new(Self::HEADROOM + packet.len());
         buffer.set_range(Self::HEADROOM..Self::HEADROOM + packet.len());

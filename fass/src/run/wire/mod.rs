@@ -1,24 +1,24 @@
-//! The packets of a wire: places for them on their way in, and on their way out.
+//! The packets of a wire: places for packets on their way in, and on their way out.
 //!
-//! A platform is the other side of each: it says what has arrived, and takes what is to go. All
-//! [buffers](buffer) are made before the commit, and nothing here allocates, waits or loops without
-//! a bound after that.
+//! A platform is the other side of each way: it passes in arrived bytes, and takes packets to send.
+//! All [buffers](buffer) are made before the commit; after that, nothing here allocates, waits or
+//! loops without a bound.
 //!
 //! # The way in
 //!
-//! A device of packets swaps a filled buffer for a buffer of the wire's. From a device of
-//! bytes packets are put together in their place. A packet is shown when it is whole, so the
-//! receiver finds whole packets only. A packet without a place is lost, even if there are places when
-//! its end comes: the packets before stay.
+//! A packet device swaps a filled buffer for a buffer of the wire. Bytes from a byte device are
+//! assembled into packets in place. A packet is shown when it is whole, so the receiver finds only
+//! whole packets. A packet without a place is lost, even if places are free by the time its end
+//! comes: the earlier packets stay.
 //!
 //! The receiver looks at a packet in its place, and notes the look: if a fault ends the instance
 //! there, the place comes back at the next instance's start.
 //!
 //! # The way out
 //!
-//! The packets of an instance go at its completion, all or none. The function puts its
-//! bytes into places ahead; the completion shows them, by a single store however many they are. If
-//! a packet finds no place, or is too long, all of them are lost.
+//! The packets of an instance leave at its completion, all or none. The function puts its bytes
+//! into places ahead; the completion shows them, by a single store however many they are. If a
+//! packet finds no place, or is too long, all of them are lost.
 
 use alloc::sync::Arc;
 use core::net::SocketAddrV4;
@@ -35,13 +35,13 @@ pub(crate) mod buffer;
 #[cfg(test)]
 mod tests;
 
-/// Counts one side's events; several of them are looked at by another.
+/// Counts the events of one side, for the other side to read.
 #[derive(Default)]
 pub(crate) struct EventCounter(AtomicU64);
 
 impl EventCounter {
     fn add(&self, count: usize) {
-        // One side counts, so a load and a store suffice.
+        // Only one side counts, so a load and a store suffice.
         let before = self.0.load(Ordering::Relaxed);
         self.0.store(before + count as u64, Ordering::Relaxed);
     }
@@ -51,25 +51,25 @@ impl EventCounter {
     }
 }
 
-/// Where a packet ends in the bytes that arrive on a [`Wire`](crate::shared::Wire).
+/// The rule for the end of a packet in the bytes arriving on a [`Wire`](crate::shared::Wire).
 ///
-/// This much is known to the code that takes bytes from a device, and so it has no code of
-/// the app's. The meaning of a packet is the app's: its decoder gets each.
+/// The code taking bytes from a device needs to know only this rule, and so runs no code of the
+/// app. The meaning of a packet is the app's: its decoder gets each packet.
 ///
 /// See [`WireOptions`](crate::shared::WireOptions).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Framing {
-    /// With a line feed, which is not in the packet; nor is a carriage return before it. An
+    /// With a line feed. The line feed is not in the packet; nor is a carriage return before it. An
     /// empty line is no packet.
     Lines,
-    /// With this byte, which is not in the packet. Nothing between two of them is no packet.
+    /// With this byte, which is not in the packet. Two of them in a row enclose no packet.
     Until(u8),
     /// After so many bytes.
     Fixed(usize),
-    /// After as many bytes as the two before it say, the more significant one first. One
-    /// wrong length displaces all that follow, so this is for what cannot be disturbed.
+    /// After as many bytes as the two bytes before say, the more significant byte first. A single
+    /// wrong length displaces all later packets, so this is only for undisturbed connections.
     LengthFirst,
-    /// Where the device had no more: a packet is what arrived at once.
+    /// Where the device had no more bytes: a packet is everything that arrived at once.
     Chunks,
 }
 
@@ -77,9 +77,9 @@ pub enum Framing {
 #[derive(Debug, Default)]
 pub(crate) struct PacketInPlace {
     pub(crate) buffer: Buffer,
-    /// When it was whole.
+    /// The time at which the packet was whole.
     pub(crate) time_ns: u64,
-    /// Whom it is from, or to, where the device knows of such.
+    /// The sender or the receiver, if the device distinguishes any.
     pub(crate) peer: Option<SocketAddrV4>,
 }
 
@@ -91,7 +91,7 @@ impl PacketInPlace {
         }
     }
 
-    /// Takes this byte away from the packet's end, if there. Returns the number of bytes taken.
+    /// Removes this byte from the packet's end, if there. Returns the number of bytes removed.
     fn strip(&mut self, last: u8) -> usize {
         let is_there = self.buffer.content().last() == Some(&last);
         let range = self.buffer.range();
@@ -100,7 +100,7 @@ impl PacketInPlace {
         count
     }
 
-    /// Appends bytes to a packet of so many. Reports whether there was room.
+    /// Appends bytes to a packet of `after` bytes. Reports whether there was room.
     fn append(&mut self, after: usize, bytes: &[u8]) -> bool {
         let start = Buffer::HEADROOM;
         let (from, end) = (start + after, start + after + bytes.len());
@@ -119,29 +119,30 @@ pub(crate) struct WireInput {
     longest: usize,
     /// The device's end, and the arriving packet.
     arrivals: ExclusiveCell<(Putter<PacketInPlace>, OpenPacket)>,
-    /// The receiver's end, until the receiver has it.
+    /// The receiver's end, until the receiver takes it.
     taker: ExclusiveCell<Option<PacketTaker>>,
     level: PlaceLevel<PacketInPlace>,
-    /// Packets that came, and their bytes.
+    /// The number of packets received, and of their bytes.
     pub(crate) packets: EventCounter,
     pub(crate) bytes: EventCounter,
-    /// Packets for which there was no room, and their bytes.
+    /// The number of packets without room, and of their bytes.
     pub(crate) lost: EventCounter,
     pub(crate) lost_bytes: EventCounter,
-    /// Packets longer than they may be.
+    /// The number of packets exceeding the longest permitted length.
     pub(crate) too_long: EventCounter,
-    /// Packets that the decoder refused. The receiver counts them.
+    /// The number of packets refused by the decoder, counted by the receiver.
     pub(crate) refused: EventCounter,
 }
 
-/// The packet that is arriving.
+/// The packet arriving now.
 #[derive(Default)]
 struct OpenPacket {
-    /// How many bytes of it have come.
+    /// The number of its bytes that have come.
     seen: usize,
     /// Whether some of them found no room.
     is_lost: bool,
-    /// [`Framing::LengthFirst`]: how many bytes of the length have come, and what they say.
+    /// [`Framing::LengthFirst`]: the number of length bytes received, and the length announced by
+    /// them.
     prefix: u8,
     announced: usize,
 }
@@ -179,9 +180,9 @@ impl WireInput {
         self.taker.change()?.take()
     }
 
-    /// Takes bytes that have arrived. Reports whether a packet is whole now.
+    /// Takes arrived bytes. Reports whether a packet has become whole.
     pub(crate) fn arrive(&self, bytes: &[u8], now_ns: u64) -> bool {
-        // One device has the wire, and so this succeeds.
+        // Only one device has the wire, so the claim succeeds.
         let Some(mut arrivals) = self.arrivals.change() else {
             self.lost_bytes.add(bytes.len());
             return false;
@@ -199,8 +200,8 @@ impl WireInput {
         is_whole
     }
 
-    /// Takes a packet in a buffer, by swapping the buffer for a place's. Reports whether the packet
-    /// is there.
+    /// Takes a packet in a buffer, by swapping the buffer for the buffer of a place. Reports
+    /// whether the packet is there.
     pub(crate) fn swap(
         &self,
         packet: &mut Buffer,
@@ -229,8 +230,8 @@ impl WireInput {
         self.close(putter, open, now_ns)
     }
 
-    /// Divides bytes into those that belong to the packet and those after it, at least one in
-    /// all. Reports whether the packet ends between them.
+    /// Splits bytes into those belonging to the packet and those after it; takes at least one byte.
+    /// Reports whether the packet ends between the two parts.
     fn divide<'b>(&self, open: &mut OpenPacket, bytes: &'b [u8]) -> (&'b [u8], &'b [u8], bool) {
         let end = match self.framing {
             Framing::Chunks => return (bytes, &[], true),
@@ -262,7 +263,7 @@ impl WireInput {
     /// Puts bytes of the packet into its place, if it can still be shown.
     fn put(&self, putter: &mut Putter<PacketInPlace>, open: &mut OpenPacket, part: &[u8]) {
         let seen = open.seen.saturating_add(part.len());
-        // What is too long is counted to its end, and not stored: the next packet must begin at
+        // A packet too long is counted to its end, but not stored: the next packet must begin at
         // the right byte.
         if seen <= self.longest && !part.is_empty() {
             let place = putter.place(0);
@@ -319,12 +320,13 @@ impl WireInput {
 /// The receiver's end of the way in.
 pub(crate) struct PacketTaker {
     taker: Taker<PacketInPlace>,
-    /// Whether an instance looks at the oldest packet, or a fault has ended it there.
+    /// Whether an instance looks at the oldest packet, or a fault has ended the instance during its
+    /// look.
     is_held: bool,
 }
 
 impl PacketTaker {
-    /// Returns a mark between the packets that are there and those that come later.
+    /// Returns a mark between the present packets and later ones.
     pub(crate) fn mark(&self) -> usize {
         self.taker.mark()
     }
@@ -376,9 +378,9 @@ impl SharedTaker {
 
 /// Forgets the claim of an instance ended by a fault.
 fn forget_claim<T>(end: &ExclusiveCell<T>) {
-    // SAFETY: an end is claimed in turns of its subtask and by their completions only, which is
-    // checked where a handle may outlive an instance; the subtask begins an instance now, and so the
-    // claim is of one that has ended.
+    // SAFETY: an end is claimed in turns of its subtask and by their completions only; handles that
+    // may outlive an instance are checked for this. The subtask begins an instance now, so the
+    // claim belongs to an instance that has ended, and is not in use.
     unsafe { end.forget_claim() };
 }
 
@@ -387,20 +389,20 @@ pub(crate) struct WireOutput {
     staging: ExclusiveCell<Staging>,
     leaving: ExclusiveCell<Leaving>,
     level: PlaceLevel<PacketInPlace>,
-    /// The most bytes of a packet.
+    /// The greatest number of bytes in a packet.
     most: AtomicUsize,
-    /// Tells the device that there is something to go.
+    /// Tells the device that there is something to send.
     ready: SetOnce<fn()>,
-    /// Bytes that were shown.
+    /// The number of bytes shown to the device.
     pub(crate) sent: EventCounter,
-    /// Bytes for which there was no room.
+    /// The number of bytes without room.
     pub(crate) lost: EventCounter,
 }
 
 /// The packets of an instance before its completion.
 struct Staging {
     putter: Putter<PacketInPlace>,
-    /// The numbers of whole packets, of bytes of the packet behind them, and of all bytes.
+    /// The numbers of whole packets, of bytes in the open packet after them, and of all bytes.
     packets: usize,
     open: usize,
     bytes: usize,
@@ -412,7 +414,7 @@ struct Staging {
 /// The device's end of the way out.
 struct Leaving {
     taker: Taker<PacketInPlace>,
-    /// How many bytes of the oldest packet have gone.
+    /// The number of bytes of the oldest packet already sent.
     gone: usize,
 }
 
@@ -449,7 +451,8 @@ impl WireOutput {
         }
     }
 
-    /// Lets no packet be longer, and has the device told when there is something to go.
+    /// Limits the length of packets, and sets the function telling the device about packets to
+    /// send.
     pub(crate) fn begin_packets(&self, most: usize, ready: fn()) {
         self.most.store(most, Ordering::Relaxed);
         self.ready.set(ready);
@@ -461,7 +464,8 @@ impl WireOutput {
         self.show(|_| false);
     }
 
-    /// Puts bytes behind what the instance has sent already. Reports whether there was room for all.
+    /// Puts bytes behind the bytes the instance has sent already. Reports whether there was room
+    /// for all.
     pub(crate) fn stage(&self, bytes: &[u8]) -> bool {
         let Some(mut staging) = self.staging.change() else {
             return false;
@@ -470,7 +474,7 @@ impl WireOutput {
         let has_room = staging.open + bytes.len() <= self.most.load(Ordering::Relaxed)
             && (staging.putter.place(staging.packets))
                 .is_some_and(|place| place.append(staging.open, bytes));
-        // Once a byte has found no room, none is put any more: a packet with a hole is worse than
+        // Once a byte has found no room, no further byte is put: a packet with a hole is worse than
         // none.
         staging.is_lost |= !has_room && !bytes.is_empty();
         staging.open = staging.open.saturating_add(bytes.len());
@@ -478,7 +482,7 @@ impl WireOutput {
         !staging.is_lost
     }
 
-    /// Has `write` put a whole packet into its place, and return how many bytes it has.
+    /// Has `write` put a whole packet into its place, and return the packet's length in bytes.
     pub(crate) fn stage_packet(&self, write: impl FnOnce(&mut [u8]) -> usize) {
         let Some(mut staging) = self.staging.change() else {
             return;
@@ -496,7 +500,7 @@ impl WireOutput {
                 buffer.set_range(Buffer::HEADROOM..Buffer::HEADROOM + length.min(room));
                 length
             }
-            // For the count of what is lost.
+            // Called all the same, to count the lost bytes.
             None => {
                 staging.is_lost = true;
                 write(&mut [])
@@ -513,14 +517,14 @@ impl WireOutput {
         }
     }
 
-    /// Says whom the instance's packet, and those after it, are to.
+    /// Sets the receiver of the instance's present packet and of those after it.
     pub(crate) fn address(&self, peer: Option<SocketAddrV4>) {
         if let Some(mut staging) = self.staging.change() {
             staging.peer = peer;
         }
     }
 
-    /// Shows the instance's packets, if it `is_complete`, or loses them.
+    /// Shows the instance's packets, if `is_complete` returns true, or loses them.
     fn show(&self, is_complete: impl FnOnce(&Staging) -> bool) {
         let Some(mut staging) = self.staging.change() else {
             return;
@@ -552,7 +556,7 @@ impl WireOutput {
         });
     }
 
-    /// Takes the next byte that is to go.
+    /// Takes the next byte to be sent.
     pub(crate) fn take_byte(&self) -> Option<u8> {
         let mut leaving = self.leaving.change()?;
         let Leaving { taker, gone } = &mut *leaving;
@@ -566,8 +570,8 @@ impl WireOutput {
         byte
     }
 
-    /// Hands over the oldest packet to go. `send` may swap its buffer, and reports whether the packet
-    /// has gone, as does this.
+    /// Hands over the oldest packet to send. `send` may swap its buffer. Both report whether the
+    /// packet has gone.
     pub(crate) fn take_packet(&self, send: impl FnOnce(&mut PacketInPlace) -> bool) -> bool {
         let Some(mut leaving) = self.leaving.change() else {
             return false;
@@ -581,7 +585,7 @@ impl WireOutput {
         has_gone
     }
 
-    /// Reports whether nothing is to go.
+    /// Reports whether there is nothing to send.
     pub(crate) fn is_empty(&self) -> bool {
         self.level.is_empty()
     }
