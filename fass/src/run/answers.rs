@@ -1,10 +1,11 @@
 //! The answers of a recorded device: written down, and given back in a replay.
 //!
-//! An answer of a device crosses the edge of a DAG, and so does the time that it takes. Both are
-//! written down when the instance has got the answer, or has not; as all that an instance finds,
-//! that goes to the platform when it is complete, or has failed. The answers of one job are one
-//! value: a list of the waits, each by its number, with how long the answer took and the answer. In
-//! a replay no question is sent: a wait takes as long as it took, and comes to the same.
+//! A device's answer crosses the edge of a DAG, and so does its duration. Both are written down
+//! when the instance has got the answer, or has not got it in time. Like all findings of an
+//! instance, they go to the platform when the instance is complete, or has failed. The answers of
+//! one job form one value: a list of the waits, each with its number, the answer's duration and the
+//! answer. In a replay no question is sent: a wait takes as long as recorded, and has the same
+//! result.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -17,43 +18,43 @@ use super::cell::SharedCell;
 use super::effect::RequestTarget;
 use super::line::{ChannelState, TopicEdge, room_for};
 
-/// An answer as it is written down: the number of the wait, how long the answer took in
-/// nanoseconds, and the answer, if there was one in time.
+/// An answer in the recorded format: the number of the wait, the answer's duration in nanoseconds,
+/// and the answer, if there was one in time.
 type FoundAnswer<A> = (u32, u64, Option<A>);
 
-/// A device, of whatever types.
+/// A device of any types.
 pub(crate) trait AnyDevice: Send + Sync {
     fn name(&self) -> &str;
 
-    /// Returns the type of the recorded answers of a job, and their line, if they are recorded.
+    /// Returns the type of a job's recorded answers, and their line, if they are recorded.
     fn line(&self) -> Option<(Schema, Arc<ChannelState>)>;
 
-    /// Returns the DAG that its questions release, if they release one.
+    /// Returns the DAG released by the device's questions, if any.
     fn server(&self) -> Option<&Arc<RequestTarget>>;
 }
 
-/// A subtask, and the device that it asks.
+/// A subtask, and the device asked by it.
 pub(crate) struct AskedDevice(pub(crate) usize, pub(crate) Arc<dyn AnyDevice>);
 
-/// The answers of a device whose answers are recorded.
+/// The answers of a device with recorded answers.
 pub(crate) trait AnyAnswers<A>: Send + Sync {
     fn line(&self) -> (Schema, Arc<ChannelState>);
 
-    /// Reports whether they are recorded in this run, or come from a recording.
+    /// Reports whether answers are recorded in this run, or come from a recording.
     fn is_open(&self) -> bool;
 
-    /// Returns the recorded answer to a wait of a job, and how long that took, if this is a replay
-    /// which has it.
+    /// Returns the recorded answer to a wait of a job, and its duration in ns, if this is a replay
+    /// with such an answer.
     fn recorded(&self, wait: (u64, u32)) -> Option<(u64, Option<A>)>;
 
-    /// Reports whether there is no device, as this is a replay.
+    /// Reports whether this is a replay, and thus without a device.
     fn replays(&self) -> bool;
 
-    /// Writes the answer to a wait of a job down, and how long it took.
+    /// Writes down the answer to a wait of a job, and its duration in ns.
     fn keep(&self, wait: (u64, u32), took_ns: u64, answer: Option<&A>);
 }
 
-/// Answers that are recorded.
+/// Recorded answers.
 pub(crate) struct RecordedAnswers {
     line: Arc<ChannelState>,
     so_far: SharedCell<JobAnswers>,
@@ -63,7 +64,7 @@ pub(crate) struct RecordedAnswers {
 struct JobAnswers {
     job: u64,
     count: u32,
-    /// Longer than a value may be, so that one which is too long is known by that.
+    /// Longer than a permitted value, so a value too long is recognised by its length.
     bytes: Box<[u8]>,
     length: usize,
 }
@@ -84,7 +85,7 @@ impl RecordedAnswers {
 
 impl JobAnswers {
     fn add<A: Recordable>(&mut self, (job, number): (u64, u32), ns: u64, answer: Option<&A>) {
-        // Answers of a job that was cut are given up with the first of the next one.
+        // The answers of a cut job are given up with the first answer of the next job.
         if self.job != job {
             (self.job, self.count, self.length) = (job, 0, 0);
         }
@@ -96,7 +97,7 @@ impl JobAnswers {
         self.count += 1;
         match out.finish() {
             Ok(count) => self.length += count,
-            // Then the whole value is too long for its line, which counts it as lost.
+            // Then the whole value is too long for its line, which counts the value as lost.
             Err(Full { .. }) => self.length = self.bytes.len(),
         }
     }

@@ -1,8 +1,8 @@
-//! The way of a channel's values across the edge of a DAG, to the platform.
+//! The line of a channel: the path of its values across the edge of a DAG, to the platform.
 //!
-//! A value is written into an [outbox](super::cell::outbox) when its instance has it, and goes on
-//! when the instance is complete: the platform's reader finds it there, or, if it has none, is
-//! given it at once.
+//! An instance writes a value into an [outbox](super::cell::outbox) as soon as it has the value.
+//! When the instance is complete, the platform's reader finds the value there. Without a reader,
+//! the platform is given the value at once.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -17,16 +17,16 @@ use super::cell::SetOnce;
 use super::effect::Effect;
 use crate::run::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 
-/// The number of a channel while it has none.
+/// Stands for "no number yet" in the place of a channel's number.
 const NO_CHANNEL: u16 = u16::MAX;
 
 /// The state of a channel, shared by its writer, its publisher and a replay.
 pub(crate) struct ChannelState {
     number: AtomicU16,
     pub(super) edge: &'static TopicEdge,
-    /// Whether the platform reads the values; else it is given each.
+    /// Whether the platform reads the values; otherwise each is given to it.
     is_read: AtomicBool,
-    /// Where the values are written, if anybody wants them.
+    /// The outbox for the values, if anybody wants them.
     outbox: SetOnce<Outbox>,
 }
 
@@ -40,7 +40,7 @@ impl ChannelState {
         }
     }
 
-    /// Reports whether the channel has a number, for else nobody wants its values.
+    /// Reports whether the channel has a number; without one, nobody wants its values.
     pub(super) fn is_open(&self) -> bool {
         self.number() != NO_CHANNEL
     }
@@ -54,12 +54,13 @@ impl ChannelState {
         self.number.store(number, Ordering::Relaxed);
     }
 
-    /// Notes whether the platform reads the values, which have at least so many bytes.
+    /// Notes whether the platform reads the values, each of at least `least_bytes` bytes.
     pub(crate) fn open(&self, is_read: bool, least_bytes: usize) {
         self.is_read.store(is_read, Ordering::Relaxed);
-        // Nobody drains it in the background, so one value at a time needs room.
+        // Nobody drains the outbox in the background, so it needs room for only one value at a
+        // time.
         if !is_read && let Some((outbox, _)) = outbox(words_of(room_for(least_bytes))) {
-            // The commit, which comes once, does this or the other.
+            // Cannot fail: the commit, which comes once, sets this outbox or the other.
             let _ = self.outbox.set(outbox);
         }
     }
@@ -73,18 +74,18 @@ impl ChannelState {
     }
 
     /// Makes a reader of values of at least `least_bytes` bytes, with room for `words` words, or
-    /// more where that would hold too few values. `None`: out of memory. If the platform is given
-    /// each value in place of reading it, returns the outbox into which it puts them, too.
+    /// more if too few values would fit. `None`: out of memory. If the platform is given each value
+    /// instead of reading it, also returns the outbox in which it puts given values.
     pub(crate) fn reader(
         &self,
         words: usize,
         least_bytes: usize,
     ) -> Option<(OutboxReader, Option<Outbox>)> {
-        // Half of it is in one piece, wherever the next value comes.
+        // Half of this room is in one piece, wherever the next value starts.
         let least = 2 * words_of(room_for(least_bytes)) + 1;
         let (outbox, reader) = outbox(words.max(least))?;
-        // The outbox that the writer stages into is in place already; this one is for what it
-        // gives.
+        // The outbox for staging is in place already; this one is for the platform to keep given
+        // values.
         if !self.is_read.load(Ordering::Relaxed) {
             return Some((reader, Some(outbox)));
         }
@@ -92,11 +93,11 @@ impl ChannelState {
         Some((reader, None))
     }
 
-    /// Writes the value of an instance that is not complete.
+    /// Writes the value of an instance before its completion.
     #[inline(always)]
     pub(super) fn stage<T: Recordable>(&self, job: u64, write: impl Fn(&mut Encoder<'_>)) {
         if let Some(outbox) = self.outbox.get() {
-            // Computed by the compiler, not on the way of each value.
+            // Computed by the compiler, not on the path of each value.
             let most = const { room_for(T::LEAST_BYTES) };
             outbox.stage(job, most, |bytes| {
                 let mut out = Encoder::new(bytes);
@@ -106,19 +107,18 @@ impl ChannelState {
         }
     }
 
-    /// Lets the reader have the value, if there is one: its instance is complete.
+    /// Lets the reader have the staged value, if there is one, as its instance is complete.
     #[inline(always)]
     fn publish(&self, completed_ns: u64) {
         if let Some(outbox) = self.outbox.get()
-            // No room to publish: the value is given instead, and the platform decides what is
-            // lost.
+            // No room to publish: the value is given instead, and the platform counts the loss.
             && !outbox.publish(completed_ns)
         {
             self.show(completed_ns, self.edge.record);
         }
     }
 
-    /// Gives what is there to the platform: the value, or that it had no room.
+    /// Gives the staged value to the platform, or reports the lack of room for it.
     #[inline(never)]
     pub(crate) fn show(&self, completed_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         if let Some(outbox) = self.outbox.get() {
@@ -133,12 +133,13 @@ impl ChannelState {
         }
     }
 
-    /// Publishes or gives the value, whichever it is.
+    /// Publishes the value, or gives it to the platform if it cannot be published.
     pub(super) fn give(&self, completed_ns: u64) {
         self.publish_or_give(completed_ns, self.edge.record);
     }
 
-    /// Publishes the value, or gives it to that, as what has no room to be published.
+    /// Publishes the value. If there is no reader, or no room to publish, gives the value to
+    /// `take`.
     pub(crate) fn publish_or_give(&self, at_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         let is_read = self.is_read.load(Ordering::Relaxed);
         if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
@@ -167,8 +168,8 @@ impl Effect for PlatformGive {
     }
 }
 
-/// Publishes or gives what an instance has found, also if it has failed: without that nobody
-/// could compute its fault again.
+/// Publishes or gives the samples and states found by an instance, even a failed one: without them
+/// nobody could compute its fault again.
 pub(super) struct InstanceOutputs(pub(super) Arc<ChannelState>);
 
 impl Effect for InstanceOutputs {
@@ -181,21 +182,21 @@ impl Effect for InstanceOutputs {
     }
 }
 
-/// A state that is written down, of whatever type.
+/// A recorded state of any type.
 pub(crate) trait AnyState: Send + Sync {
     fn schema(&self) -> Schema;
 
-    /// Writes down what it is now, unless somebody changes it.
+    /// Writes down the present value, unless somebody is changing it.
     fn stage(&self, line: &ChannelState, job: u64);
 
-    /// Makes it what was written down; `false`: it cannot be.
+    /// Restores a recorded value; `false`: the bytes are no such value, or somebody has a claim.
     fn restore(&self, bytes: &[u8]) -> bool;
 }
 
-/// A state that is written down, and how often.
+/// A recorded state, and how often it is written down.
 pub(crate) struct KeptState {
     pub(crate) state: Arc<dyn AnyState>,
-    /// It is written down in each job whose number is a multiple of that.
+    /// The state is written down in each job whose number is a multiple of `every`.
     every: AtomicU32,
 }
 
@@ -207,32 +208,32 @@ impl KeptState {
         }
     }
 
-    /// Writes it down, if that is due in the job.
+    /// Writes the state down, if due in the job.
     pub(crate) fn keep(&self, line: &ChannelState, job: u64) {
         if job.is_multiple_of(self.every.load(Ordering::Relaxed).into()) {
             self.state.stage(line, job);
         }
     }
 
-    /// Has it written down every so many jobs, if that is more often.
+    /// Has the state written down every so many jobs, unless it already is more often.
     pub(crate) fn keep_every(&self, jobs: u32) {
-        // Two may ask for it; the more frequent one serves both.
+        // There may be two requests; the more frequent one serves both.
         self.every.fetch_min(jobs.max(1), Ordering::Relaxed);
     }
 }
 
-/// The line of a channel of a plan, and of which subtask it is.
+/// The line of a channel of a plan, with its subtask.
 pub(crate) struct LineOf {
     pub(crate) dag: DagId,
     pub(crate) subtask: usize,
     pub(crate) role: Role,
     pub(crate) line: Arc<ChannelState>,
-    /// The state whose values they are, if they are of one.
+    /// The state whose values the line carries, if any.
     pub(crate) state: Option<Arc<KeptState>>,
 }
 
 impl LineOf {
-    /// Reports whether it has what an instance has found: samples, or a state.
+    /// Reports whether the line carries samples or a state found by an instance.
     pub(crate) fn is_found_by(&self, instance: Instance) -> bool {
         let of = (self.dag, self.subtask);
         !self.role.is_written() && of == (instance.dag, instance.subtask.index())
@@ -251,10 +252,10 @@ impl fmt::Debug for LineOf {
     }
 }
 
-/// The least room for a value.
+/// The least room for a value, in bytes.
 const ROOM: usize = 4096;
 
-/// A value that a recorded topic gives to the platform, when its writer's instance is complete.
+/// A value of a recorded topic, given to the platform when the writer's instance is complete.
 ///
 /// ```
 /// fn show(value: &fass::edge::RecordedValue<'_>) {
@@ -266,17 +267,18 @@ const ROOM: usize = 4096;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedValue<'v> {
-    /// The number of the channel ([`Platform::open_channels`](crate::platform::Platform::open_channels)).
+    /// The number of the channel
+    /// ([`Platform::open_channels`](crate::platform::Platform::open_channels)).
     pub channel: u16,
     /// The job.
     pub job: u64,
-    /// When the instance was complete, on the clock of [`crate::now_ns`].
+    /// The time of the instance's completion, on the clock of [`crate::now_ns`].
     pub completed_ns: u64,
     /// The value; `None` if there was no room for it.
     pub bytes: Option<&'v [u8]>,
 }
 
-/// The way from a topic to the platform, and back. An image without recorded topics has none.
+/// The path from a topic to the platform, and back. An image without recorded topics has none.
 pub(crate) struct TopicEdge {
     /// Takes a value.
     pub(crate) record: fn(&RecordedValue<'_>),
@@ -286,10 +288,10 @@ pub(crate) struct TopicEdge {
     pub(crate) replay: Lend,
 }
 
-/// Lends the value of a channel and a job.
+/// A function lending the value of a channel and a job.
 type Lend = fn(u16, u64, &mut dyn FnMut(&[u8]));
 
-/// Returns the room for a value of at least so many bytes.
+/// Returns the room for a value of at least `least_bytes` bytes, in bytes.
 pub(crate) const fn room_for(least_bytes: usize) -> usize {
     match 2 * least_bytes {
         room if room > ROOM => room,

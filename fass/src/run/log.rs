@@ -1,21 +1,20 @@
-//! The log: lines that functions say while they run, for people.
+//! The log: lines for people, written by functions while they run.
 //!
-//! [`log!`](crate::log!) copies a *line* into a ring of fixed size, and goes on. Nothing is
-//! allocated, nobody is waited for, and no text is made: that is left to the platform, which
-//! [takes](LogLine::take) lines when it has nothing else to do. Where the ring is full, the new
-//! line
-//! is left out and counted.
+//! [`log!`](crate::log!) copies a *line* into a ring of fixed size, and continues. The call neither
+//! allocates, waits nor formats text: the platform does the rest, and [takes](LogLine::take) lines
+//! when it has nothing else to do. If the ring is full, the new line is left out and counted.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
 //! - A line of a level that is off costs a load and a comparison; its fields are not computed.
-//! - A line is no result. It is shown although its instance fails later, for it may say why.
+//! - A line is no result. It is shown even if its instance fails later, as it may tell why.
 //!
-//! # What is not
+//! # No guarantees
 //!
-//! - Lines of several cores come in about the order in which they were said; their times tell.
-//! - An instance that is ended by its budget in the middle of a line takes the line's place with
-//!   it: one of 64, until the next boot.
+//! - Lines of several cores come only roughly in the order of their writing; their times tell the
+//!   exact order.
+//! - An instance ended by its budget in the middle of a line takes the line's place with it: one of
+//!   64, until the next boot.
 
 use core::array;
 use core::fmt::{self, Display, Formatter};
@@ -27,13 +26,13 @@ use sched_dag::{Instance, TaskSet};
 
 use super::cell::SharedCell;
 
-/// The most fields of a line. See [`log!`](crate::log!).
+/// The greatest number of fields in a line. See [`log!`](crate::log!).
 pub const FIELDS: usize = 4;
 
-/// How many lines can wait.
+/// The number of lines that can wait.
 const PLACES: usize = 64;
 
-/// How much a line matters.
+/// The importance of a line.
 ///
 /// ```standalone_crate
 /// use fass::log::{Level, set_level};
@@ -49,23 +48,22 @@ const PLACES: usize = 64;
 pub enum Level {
     /// Something does not work.
     Error = 1,
-    /// Something may not.
+    /// Something may not work.
     Warn,
     /// The course of events.
     Info,
-    /// Details that help to find a mistake.
+    /// Details for finding a mistake.
     Debug,
 }
 
-/// The level that is on; 0: none.
+/// The most detailed level shown; 0: none.
 static LEVEL: AtomicU8 = AtomicU8::new(Level::Info as u8);
 
-/// The lines that wait.
+/// The waiting lines.
 static RING: [SharedCell<LogSlot>; PLACES] = [const { SharedCell::new(LogSlot::Empty) }; PLACES];
 
-/// A place for a line. Its representation has zeros where it is empty, which those of an `Option`
-/// are
-/// not: so an image does not hold the ring.
+/// A place for a line. An empty place is represented by zeros, so an image need not contain the
+/// ring. An empty `Option` would have another representation.
 #[repr(u8)]
 #[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
 enum LogSlot {
@@ -73,20 +71,20 @@ enum LogSlot {
     Full(LogLine),
 }
 
-/// How many these are, so that a look at an empty ring is short.
+/// The number of waiting lines, so a look at an empty ring is short.
 static WAITING: AtomicU32 = AtomicU32::new(0);
 
-/// The place behind the one that was filled last, where the next one is likely free, counted on and
-/// on.
+/// The place after the one filled last, where the next place is likely free. Counted up without
+/// end.
 static FILLED: AtomicUsize = AtomicUsize::new(0);
 
-/// The place behind the one that was emptied last, where the oldest line likely is, counted too.
+/// The place after the one emptied last, where the oldest line likely is. Counted up, too.
 static EMPTIED: AtomicUsize = AtomicUsize::new(0);
 
-/// How many lines had no room since one was taken.
+/// The number of lines without room since the last one taken.
 static LEFT_OUT: AtomicU32 = AtomicU32::new(0);
 
-/// Has lines up to this level said from now on, or none.
+/// Has lines up to this level written from now on, or none.
 ///
 /// See [`Level`].
 pub fn set_level(most: Option<Level>) {
@@ -94,13 +92,13 @@ pub fn set_level(most: Option<Level>) {
 }
 
 impl Level {
-    /// Reports whether lines of this level are said.
+    /// Reports whether lines of this level are written.
     #[inline]
     pub fn is_on(self) -> bool {
         self as u8 <= LEVEL.load(Ordering::Relaxed)
     }
 
-    /// Returns its name in lines and on the command line.
+    /// Returns the level's name in lines and on the command line.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Error => "error",
@@ -114,7 +112,7 @@ impl Level {
 /// The key and the value of a field. See [`log!`](crate::log!).
 pub type Field = (&'static str, Part<'static>);
 
-/// A line that was said.
+/// A written line.
 ///
 /// ```standalone_crate
 /// use fass::log::LogLine;
@@ -123,19 +121,20 @@ pub type Field = (&'static str, Part<'static>);
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct LogLine {
-    /// How much it matters.
+    /// The importance of the line.
     pub level: Level,
-    /// Its text, without the fields.
+    /// The text, without the fields.
     pub text: &'static str,
     fields: [Option<Field>; FIELDS],
-    /// The function that makes a value's text: code that a program which says nothing does not
-    /// have.
+    /// The function formatting a field's value. A program writing no lines does not contain such
+    /// code.
     write: fn(&Part<'static>, &mut Formatter<'_>) -> fmt::Result,
-    /// The instance that has said it, if one has.
+    /// The instance writing the line, if any.
     pub instance: Option<Instance>,
-    /// When, on the time of the run, or of the one before if none goes on.
+    /// The time of the line, in ns since the begin of the present run, or of the last run if none
+    /// goes on.
     pub at_ns: u64,
-    /// How many lines had no room since the one that was taken before.
+    /// The number of lines without room since the line taken before.
     pub left_out: u32,
 }
 
@@ -152,7 +151,8 @@ impl LogLine {
         }
     }
 
-    /// Has it wait until it is taken, for platforms ([`Platform::log`](crate::platform::Platform::log)).
+    /// Keeps the line until it is taken. For platforms
+    /// ([`Platform::log`](crate::platform::Platform::log)).
     pub fn keep(self) {
         let fill = |place: &mut LogSlot| {
             matches!(place, LogSlot::Empty).then(|| *place = LogSlot::Full(self))
@@ -162,9 +162,9 @@ impl LogLine {
         count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Takes the oldest line that waits, to show it.
+    /// Takes the oldest waiting line, to show it.
     ///
-    /// Platforms do so, and programs that have one without such a service. See [`LogLine`].
+    /// Called by platforms, and by programs whose platform shows no lines. See [`LogLine`].
     #[must_use]
     pub fn take() -> Option<Self> {
         if WAITING.load(Ordering::Relaxed) == 0 {
@@ -181,14 +181,14 @@ impl LogLine {
         Some(Self { left_out, ..line })
     }
 
-    /// Returns the keys and the values of its fields; these are JSON.
+    /// Returns the keys and the values of the fields; the values are JSON.
     pub fn fields(&self) -> impl Iterator<Item = (&'static str, impl Display)> {
         let fields = self.fields.iter().flatten();
         fields.map(|(key, value)| (*key, fmt::from_fn(|f| (self.write)(value, f))))
     }
 
-    /// Returns the names of its DAG and its subtask, and the instance, if it is of one of these
-    /// DAGs.
+    /// Returns the names of the line's DAG and subtask, and the instance, if one of these DAGs has
+    /// it.
     pub fn names<'t>(&self, task_set: Option<&'t TaskSet>) -> Option<(&'t str, &'t str, Instance)> {
         let instance = self.instance?;
         let dag = task_set?.dags().get(instance.dag.index())?;
@@ -196,7 +196,7 @@ impl LogLine {
         Some((dag.name(), subtask.name(), instance))
     }
 
-    /// Returns the line for people.
+    /// Returns the line as text for people.
     ///
     /// See [`log!`](crate::log!).
     pub fn shown<'s>(&'s self, task_set: Option<&'s TaskSet>) -> impl Display + 's {
@@ -212,14 +212,13 @@ impl LogLine {
     }
 }
 
-/// Goes round the places from `next` on, and moves it behind the first one that `fits`. Nobody
-/// waits:
-/// a place that somebody else uses is passed over.
+/// Goes round the places from `next` on, and moves `next` past the first place that `fits`. Nobody
+/// waits: a place in use by somebody else is passed over.
 fn find<T>(next: &AtomicUsize, fits: impl Fn(&mut LogSlot) -> Option<T>) -> Option<T> {
     let first = next.load(Ordering::Relaxed);
     (first..first + PLACES).find_map(|number| {
         let found = fits(&mut *RING[number % PLACES].change()?)?;
-        // One that was slow does not set back what others have moved on.
+        // A slow caller does not set back the progress of others.
         next.fetch_max(number + 1, Ordering::Relaxed);
         Some(found)
     })

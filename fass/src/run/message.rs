@@ -1,25 +1,23 @@
 //! Messages: values that may travel on a topic, to one reader or to several.
 //!
-//! A *message* is the value that one job carries along one topic. With one
-//! reader it is moved, never copied. With several readers every reader but the
-//! last gets a clone and the last gets the value itself. The app decides what a
-//! clone costs: an `i32` is copied, an `Arc<PointCloud>` is *shared* (all
-//! readers see the same bytes, nothing is copied), a `Vec` is duplicated and so
-//! allocates, which an app with deadlines avoids.
+//! A *message* is the value carried by one job along one topic. With one reader it is moved, never
+//! copied. With several readers every reader but the last gets a clone and the last gets the value
+//! itself. The app decides the cost of a clone: an `i32` is copied, an `Arc<PointCloud>` is
+//! *shared* (all readers see the same bytes, nothing is copied), a `Vec` is duplicated and so
+//! allocates, to be avoided in an app with deadlines.
 //!
-//! A type that cannot be cloned, or must not be, travels inside [`Unique`]. It
-//! is always moved; a second reader of its topic is refused at commit.
+//! A type that cannot or must not be cloned travels inside [`Unique`]. It is always moved; a second
+//! reader of its topic is refused at commit.
 
 use core::any::{TypeId, type_name};
 use core::ops::{Deref, DerefMut};
 
 use sched_dag::TopicPort;
 
-/// A value that a topic can carry from one subtask to others.
+/// A value carried by a topic from one subtask to others.
 ///
-/// Every type that is `Clone + Send + 'static` is a message already, and so is
-/// [`Unique<T>`](Unique) for the types that are not `Clone`. There is nothing to
-/// implement.
+/// Every `Clone + Send + 'static` type is a message already, and so is [`Unique<T>`](Unique) for
+/// types without `Clone`. There is nothing to implement.
 ///
 /// # Examples
 ///
@@ -33,7 +31,7 @@ use sched_dag::TopicPort;
 /// is_message::<fass::Unique<std::sync::mpsc::Receiver<u8>>>(); // only moved
 /// ```
 ///
-/// A type that is neither is refused by the compiler:
+/// The compiler refuses any other type:
 ///
 /// ```compile_fail,E0277
 /// struct NotClone;
@@ -55,8 +53,7 @@ pub trait Message: Send + Sized + 'static {
     /// ```
     const CAN_FAN_OUT: bool;
 
-    /// Makes the value for one more reader, or returns `None` if the type can
-    /// only be moved.
+    /// Makes the value for one more reader, or returns `None` if the type can only be moved.
     ///
     /// ```
     /// use fass::{Message, Unique};
@@ -84,10 +81,10 @@ impl<T: Send + 'static> Message for Unique<T> {
     }
 }
 
-/// A message that is moved from its writer to its one reader, never cloned.
+/// A message that is moved from its writer to its only reader, never cloned.
 ///
-/// It is deliberately not `Clone`, whatever `T` is. Two subtasks reading a topic
-/// of this type are a fault at commit.
+/// It is deliberately not `Clone`, whatever `T` is. Two subtasks reading a topic of this type are a
+/// fault at commit.
 ///
 /// # Examples
 ///

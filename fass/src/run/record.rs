@@ -1,13 +1,13 @@
-//! A recorded topic: what writes its values down, and what gives them back in a replay.
+//! A recorded topic: writing its values down, and giving them back in a replay.
 //!
-//! Such a topic has a *tap* between its writer and its readers. It looks at each value when the
-//! writer's function has returned, and writes it down; the writer's completion lets that go to
-//! the platform. In a replay the body of a source is another one, which asks the
+//! A recorded topic has a *tap* between its writer and its readers. The tap looks at each value
+//! when the writer's function has returned, and writes the value down; the writer's completion
+//! passes the record to the platform. In a replay a source has another body, which asks the
 //! platform for the values of the job, and sends them.
 //!
-//! A sample that a subtask takes of such a topic is written down when it looks, and goes to the
-//! platform when
-//! the instance is complete, or has failed: without it nobody could compute its fault again.
+//! A sample of such a topic is written down when the subtask takes it, and goes to the platform
+//! when the instance is complete, or has failed: without the sample nobody could compute its fault
+//! again.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -37,16 +37,16 @@ pub(crate) struct RecordedTopic<T> {
     of: PhantomData<fn() -> T>,
 }
 
-/// A recorded topic of whatever type.
+/// A recorded topic of any type.
 pub(crate) trait AnyRecorded: AnyLatest {
-    /// Returns the type of its values, and their way.
+    /// Returns the type of the values, and their line.
     fn line(&self) -> (Schema, Arc<ChannelState>);
 
-    /// Returns a sender of recorded values, in the place of the writer's next output port.
+    /// Returns a sender of recorded values, in place of the writer's next output port.
     fn replayed(&self, ports: &mut Ports<'_>) -> Replayed;
 
-    /// Sets a probe for samples of the topic, and returns it, with the type of the samples and
-    /// their line; none if the latest value is of another type.
+    /// Sets a probe for samples of the topic. Returns the probe, with the type of the samples and
+    /// their line; `None` if the latest value has another type.
     fn probe(
         &self,
         latest: &dyn Any,
@@ -54,7 +54,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
     ) -> Option<(Arc<dyn Probe>, Schema, Arc<ChannelState>)>;
 }
 
-/// Defers making the body of a source that a replay does not call until the commit knows the wiring.
+/// Defers making the body of a source, not called in a replay, until the commit knows the wiring.
 pub(crate) fn defer_replayed(outputs: Vec<Rc<dyn AnyRecorded>>) -> MakeBody {
     Box::new(move |wiring, subtask| {
         let turn = Arc::new(TurnState::new(wiring.waits(subtask)));
@@ -91,7 +91,7 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
         MessageType::of::<T>().port(&self.topic)
     }
 
-    /// The tap, which is a reader.
+    /// Returns 1: the tap is a reader.
     fn samplers(&self) -> usize {
         1
     }
@@ -159,10 +159,10 @@ impl<T: Message + Recordable> Relay<T> for TopicTap<T> {
     }
 }
 
-/// A source that is not called.
+/// A source that the replay does not call.
 struct ReplayedSource {
     outputs: Vec<Replayed>,
-    /// It takes its waits all the same.
+    /// The turns of the source, which takes its waits all the same.
     turn: Arc<TurnState>,
 }
 
@@ -179,17 +179,17 @@ impl PolledSubtask for ReplayedSource {
 
     fn discard(&mut self, _job: u64) {}
 
-    // It has no function.
+    // Nothing to leave out: there is no function of the app in here.
     fn forget(self: Box<Self>) {}
 }
 
-/// A sample as it is written down: its job, when that was complete, and the value.
+/// A sample in the recorded format: its job, the time of the job's completion in ns, and the value.
 type FoundSample<T> = Option<(u64, u64, T)>;
 
-/// The probe of a subtask that samples values of this type.
+/// The probe of a subtask sampling values of this type.
 struct SampleProbe<T> {
     line: Arc<ChannelState>,
-    /// The job whose instance runs.
+    /// The job of the running instance.
     job: AtomicU64,
     of: PhantomData<fn() -> T>,
 }
@@ -225,7 +225,7 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
         };
         let job = self.job.load(Ordering::Relaxed);
         self.line.stage::<FoundSample<T>>(job, |out| {
-            // As an `Option` of a tuple is written.
+            // In the format of an `Option` of a tuple.
             sample.is_some().encode(out);
             if let Some(entry) = &*sample {
                 (entry.job, entry.completed_ns).encode(out);
@@ -235,10 +235,10 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
     }
 }
 
-/// Puts something around a body.
+/// A function putting something around a body.
 pub(crate) type Around = Box<dyn FnOnce(SubtaskCode) -> SubtaskCode>;
 
-/// Has a subtask look for something before each turn, and the line give away what it has found.
+/// Calls `look` before each job's first turn, and has the line pass on the subtask's findings.
 pub(crate) fn looking(line: Arc<ChannelState>, look: impl Fn(u64) + Send + 'static) -> Around {
     let found = finding(line);
     let look = move |job| {
@@ -248,7 +248,7 @@ pub(crate) fn looking(line: Arc<ChannelState>, look: impl Fn(u64) + Send + 'stat
     Box::new(|body| found(body.before(look)))
 }
 
-/// Has the line give away what a subtask finds.
+/// Has the line pass on a subtask's findings at its completion.
 pub(crate) fn finding(line: Arc<ChannelState>) -> Around {
     let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
     Box::new(|mut body| {

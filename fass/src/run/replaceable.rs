@@ -1,24 +1,24 @@
-//! A subtask whose function another one can replace after a fault.
+//! A subtask with a function replaceable by another after a fault.
 //!
-//! Of what a fault has ended nothing is dropped: it may be half changed. The function's place is
-//! used again, what it owned is lost. The ends of the topics are *claimed* for the time in which
-//! the subtask receives or sends, as a state would be. While the app's function runs nobody has a
-//! claim; so the next function finds the ends as they should be. If they are claimed, the fault
-//! came while values were handed over, and the subtask cannot go on.
+//! Nothing that a fault has ended is dropped, as it may be half changed. The function's place is
+//! reused, but everything it owned is lost. The subtask *claims* the ends of the topics while it
+//! receives or sends, as it would claim a state. While the app's function runs, nobody has a claim,
+//! so the next function finds the ends in order. If the ends are claimed, the fault came in the
+//! middle of a hand-over of values, and the subtask cannot go on.
 //!
-//! A function that is *made anew* is made by the next instance, in its time. So, however many
-//! faults are survived, there is one place for it.
+//! A function *made anew* is made by the next instance, in the instance's time. So a single place
+//! for the function suffices, however many faults are survived.
 //!
-//! # A state's value, and those that take its place after faults
+//! # The values of a state after faults
 //!
-//! A subtask that a fault has ended may have left a state half changed, and its claim of
-//! the value is never given back. So the value is given up with it: the next use finds
-//! the next of the values that the app has given for that, all made at the commit.
+//! A subtask ended by a fault may have left a state half changed, and never gives back its claim of
+//! the value. So the value is given up with the subtask: the next use finds the next of the values
+//! provided by the app, all made at the commit.
 //!
-//! A state may be written down, so that a replay can begin with a later job than the first one. The
-//! first subtask that may change a state in a job finds there what all jobs before have left.
-//! So much is written down every so many jobs, before its function is called, and goes to the
-//! platform as a sample does: when the instance is complete, or has failed.
+//! A state may be written down, so a replay can begin with a job other than the first. The first
+//! subtask permitted to change a state in a job finds the value left by all earlier jobs. Every so
+//! many jobs, this value is written down before the subtask's function is called. Like a sample, it
+//! goes to the platform when the instance is complete, or has failed.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -37,25 +37,25 @@ use super::plan::{PolledSubtask, ReplacementCode, SubtaskCode};
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
-/// Functions of which one is the *present* one.
+/// Functions, one of which is the *present* one.
 pub(crate) trait Alternatives<Args, Ret>: Send {
-    /// Reports whether the one after the present one is made anew, each time.
+    /// Reports whether the next function is made anew each time.
     fn restarts(&self) -> bool;
 
-    /// Makes the present one, if it is not there.
+    /// Makes the present function, if it is not there.
     fn prepare(&mut self);
 
-    /// Calls the present one.
+    /// Calls the present function.
     fn call(&mut self, args: Args) -> Ret;
 
-    /// Gives the present one up, without a destructor: the next one takes its place.
+    /// Gives up the present function without a destructor, in favour of the next.
     fn lose(&mut self);
 
-    /// Gives their own memory back, without a destructor of what they own.
+    /// Frees their own memory, without running destructors of owned values.
     fn forget(self: Box<Self>);
 }
 
-/// Functions that `make` makes, which are called by way of `call`.
+/// Functions made by `make` and called through `call`.
 pub(crate) struct RemadeFunction<M, F, C> {
     pub(crate) make: M,
     pub(crate) present: Option<F>,
@@ -138,7 +138,7 @@ pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
             <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
             <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
         ));
-        // A fault may come before the first call, so this is told from the beginning on.
+        // A fault may come before the first call, so the next function is set from the beginning.
         let next = AtomicU8::new(if restarts { ANEW } else { FALLBACK });
         let ends = Arc::new(ReplaceableEnds { both, next });
         SubtaskCode::new(Box::new(ReplaceableBody {
@@ -151,13 +151,13 @@ pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
 
 struct ReplaceableBody<Args: VecToSubs, Ret: VecToPubs> {
     alternatives: Box<dyn Alternatives<Args, Ret>>,
-    /// The states that they use.
+    /// The states used by the functions.
     states: Vec<Arc<dyn Reset>>,
     ends: Arc<ReplaceableEnds<(Args::Subs, Ret::Pubs)>>,
 }
 
-/// The ends of the topics, and which function is next: all that others may look at while the
-/// present one runs.
+/// The ends of the topics, and the kind of the next function: everything that others may look at
+/// while the present function runs.
 struct ReplaceableEnds<T> {
     both: SharedCell<T>,
     next: AtomicU8,
@@ -165,9 +165,9 @@ struct ReplaceableEnds<T> {
 
 /// There is no other function.
 const NONE: u8 = 0;
-/// The next one is made anew.
+/// The next function is made anew.
 const ANEW: u8 = 1;
-/// The next one is that to fall back on.
+/// The next function is the fallback.
 const FALLBACK: u8 = 2;
 
 impl<T: Send + Sync> Alternate for ReplaceableEnds<T> {
@@ -189,10 +189,10 @@ impl<T> ReplaceableEnds<T> {
 impl<Args: VecToSubs, Ret: VecToPubs> PolledSubtask for ReplaceableBody<Args, Ret> {
     fn take_turn(&mut self, job: u64) {
         let context = &mut Context::from_waker(Waker::noop());
-        // Claimed twice, for receiving and for sending, and not between: a fault of the function
-        // must find them free.
+        // Claimed twice, for receiving and for sending, and not in between: a fault of the function
+        // must find the ends free.
         let mut ends = self.ends.claim();
-        // A fault in here ends the DAG: what makes functions may be half changed.
+        // A fault in here ends the DAG: the maker of functions may be half changed.
         let next = self.ends.next.load(Ordering::Relaxed);
         self.ends.next.store(NONE, Ordering::Relaxed);
         self.alternatives.prepare();
@@ -242,16 +242,16 @@ fn refuse() -> ! {
     )
 }
 
-/// The values of a state, one after the other.
+/// The values of a state, used one after the other.
 #[doc(hidden)]
 pub struct ResettableState<T> {
     first: SharedCell<T>,
-    /// The values after faults; none where no fault is survived.
+    /// The values after faults; empty if no fault is survived.
     others: SetOnce<Box<[SharedCell<T>]>>,
     resets: AtomicUsize,
 }
 
-/// A state of whatever type.
+/// A state of any type.
 #[doc(hidden)]
 pub trait Reset: Send + Sync {
     /// Gives up the present value.
@@ -272,7 +272,7 @@ impl<T> ResettableState<T> {
         self.others.set(values.map(SharedCell::new).collect());
     }
 
-    /// Returns the present value. There is one for each fault that is survived.
+    /// Returns the present value. There is one for each survived fault.
     #[inline]
     pub(crate) fn present(&self) -> &SharedCell<T> {
         match self.resets.load(Ordering::Acquire) {

@@ -1,16 +1,15 @@
 //! A subtask as a future: the loop of the paper's figure 4.
 //!
-//! [`create_subtask`] turns a function into the one future that a subtask is
-//! for its whole life. It is polled once an instance. In that poll it receives
-//! all inputs, calls the function, sends all outputs, and comes to rest at the
-//! next `recv_all`. Nothing leaves before the function has returned (R3).
+//! [`create_subtask`] turns a function into a single future for the subtask's whole life, polled
+//! once for each instance. In each poll the future receives all inputs, calls the function, sends
+//! all outputs, and comes to rest at the next `recv_all`. Nothing leaves before the function has
+//! returned (R3).
 //!
-//! The figure generates subscribers and publishers in the future's first poll.
-//! Here they are generated before the future is made, since a source may
-//! otherwise publish before a later subtask listens, and that subtask's topics
-//! would be one job behind forever.
+//! The figure generates subscribers and publishers in the future's first poll. Here they are
+//! generated before the future is made: otherwise a source might publish before a later subtask
+//! listens, and that subtask's topics would be one job behind forever.
 //!
-//! An untyped subtask is as a typed one, with tokens for values, and no future, since it
+//! An untyped subtask works like a typed one, with tokens for values. It has no future, since it
 //! has nothing to wait for.
 
 use alloc::boxed::Box;
@@ -23,8 +22,7 @@ use super::plan::{PolledSubtask, SubtaskCode};
 use super::topic::{DagWiring, Publisher, Subscriber, Token};
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
-/// Makes a registered subtask's body, at the commit: with the DAG's
-/// wiring and the subtask's number.
+/// Makes a registered subtask's body at the commit, from the DAG's wiring and the subtask's number.
 pub(crate) type MakeBody = Box<dyn FnOnce(&mut DagWiring, usize) -> SubtaskCode>;
 
 /// Defers [`create_subtask`] until the commit knows the wiring.
@@ -55,16 +53,16 @@ where
     }
 }
 
-/// The loop of the paper's figure, one iteration a poll. It waits in one place, so no state has to
-/// be kept between polls: an iteration neither begins with finding out where it was, nor ends with
-/// a look at the closed gate.
+/// The loop of the paper's figure, one iteration for each poll. It waits in a single place, so no
+/// state has to be kept between polls: an iteration neither begins by finding its place, nor ends
+/// with a look at the closed gate.
 struct PollLoop<F, Subs, Pubs> {
     f: F,
     subs: Subs,
     pubs: Pubs,
 }
 
-/// Nothing in it is pinned: a turn's futures do not outlive the turn.
+/// Nothing in the loop is pinned: a turn's futures do not outlive the turn.
 impl<F, Subs, Pubs> Unpin for PollLoop<F, Subs, Pubs> {}
 
 impl<F, Subs: MulRecv, Pubs: MulSend> Future for PollLoop<F, Subs, Pubs>
@@ -78,7 +76,7 @@ where
         let Self { f, subs, pubs } = self.get_mut();
         let args = ready!(pin!(subs.recv_all()).poll(context));
         let results = f(args);
-        // Sending never waits, so there is no turn to be taken up again here.
+        // Sending never waits, so no later poll has to continue here.
         let sent = pin!(pubs.send_all(results)).poll(context);
         debug_assert!(sent.is_ready());
         Poll::Pending

@@ -1,16 +1,14 @@
-//! The two ends of a topic inside its subtasks, and how the commit ties them.
+//! The two ends of a topic in its subtasks, and how the commit ties them together.
 //!
-//! A [`Publisher`] is the writing end of a topic and owns the writer of every
-//! edge that leaves it, one a reading port, and one of every subtask that samples
-//! the topic's latest value; if it is recorded, a *tap* looks at each value before; a
-//! [`Subscriber`] is one reading
-//! port. At commit [`DagWiring`] hands out the ends: whichever end of an edge is
-//! asked for first makes the ring and leaves the other end for the one
-//! that asks second. All rings exist before the first release, so no job can be missed
-//! because a reader was not there yet.
+//! A [`Publisher`] is the writing end of a topic. It owns a writer for each edge leaving the topic,
+//! one for each reading port, and a writer for each subtask sampling the topic's latest value. If
+//! the topic is recorded, a *tap* looks at each value first. A [`Subscriber`] is one reading port.
+//! At the commit, [`DagWiring`] hands out the ends: the first request for either end of an edge
+//! makes the ring, and leaves the other end for the second request. All rings exist before the
+//! first release, so no job can be missed because its reader was not there yet.
 //!
-//! The verification has already compared the types of both ends; the downcast
-//! in [`DagWiring`] relies on it.
+//! The verification has already compared the types of both ends; the downcast in [`DagWiring`]
+//! relies on it.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -39,8 +37,8 @@ impl<T> Subscriber<T> {
     ///
     /// # Panics
     ///
-    /// If the value is not there, which means that the platform started the
-    /// instance before a predecessor was complete.
+    /// If the value is not there: the platform started the instance before a predecessor was
+    /// complete.
     #[inline]
     pub(crate) fn recv(&mut self, job: u64) -> T {
         self.0.take(job).unwrap_or_else(|| missing(job))
@@ -52,7 +50,7 @@ impl<T> Subscriber<T> {
     }
 }
 
-/// The writing end of a topic in its one writer. Made by the commit only.
+/// The writing end of a topic in its single writer. Made by the commit only.
 ///
 /// ```
 /// use fass::{Publisher, Publishers, VecToPubs};
@@ -63,9 +61,9 @@ impl<T> Subscriber<T> {
 pub struct Publisher<T>(PublisherKind<T>);
 
 enum PublisherKind<T> {
-    /// To the one reading port, where nobody else reads the topic.
+    /// To the only reading port, if nobody else reads the topic.
     One(Writer<T>),
-    /// To any number of readers, or by way of somebody who looks at the values.
+    /// To any number of readers, or through a relay looking at the values.
     Other(Box<dyn Relay<T>>),
 }
 
@@ -74,20 +72,20 @@ pub(super) trait Relay<T>: Send + Sync {
     fn send(&mut self, job: u64, value: T);
 }
 
-/// A function that puts a relay between a writer and its readers.
+/// A function putting a relay between a writer and its readers.
 pub(super) type Wrap<T> = Option<Box<dyn FnOnce(Publisher<T>) -> Publisher<T>>>;
 
 /// Any number of readers.
 struct FanOut<T> {
-    /// One a reading port.
+    /// A writer for each reading port.
     writers: Box<[Writer<T>]>,
-    /// One a subtask that samples the topic's latest value.
+    /// A place for each subtask sampling the topic's latest value.
     stages: Box<[Box<dyn Stage<T>>]>,
 }
 
 impl<T: Message> Publisher<T> {
     fn new(mut writers: Vec<Writer<T>>, stages: Box<[Box<dyn Stage<T>>]>) -> Self {
-        // The usual case, one reader, pays for no indirect call.
+        // The usual case, a single reader, pays for no indirect call.
         if stages.is_empty()
             && writers.len() == 1
             && let Some(writer) = writers.pop()
@@ -102,15 +100,14 @@ impl<T: Message> Publisher<T> {
         Self(PublisherKind::Other(Box::new(relay)))
     }
 
-    /// Hands the value of `job` to every reader: clones for all but the last,
-    /// the value itself for the last. A subtask that samples the latest value is a reader
-    /// whose value is prepared, and shows at the completion.
+    /// Hands the value of `job` to every reader: clones to all but the last, and the value itself
+    /// to the last. For a subtask sampling the latest value, the value is only prepared, and shows
+    /// at the completion.
     ///
     /// # Panics
     ///
-    /// If no slot is free, which means that the platform cancelled an
-    /// instance and did not discard its inputs, or let more jobs be in flight
-    /// than the plan says.
+    /// If no slot is free: the platform cancelled an instance without discarding its inputs, or let
+    /// more jobs be in flight than the plan permits.
     #[inline]
     pub(crate) fn send(&mut self, job: u64, value: T) {
         match &mut self.0 {
@@ -122,13 +119,13 @@ impl<T: Message> Publisher<T> {
 
 impl<T: Message> Relay<T> for FanOut<T> {
     fn send(&mut self, job: u64, value: T) {
-        // The commit refuses several readers of a type that gives `None`.
+        // For a type returning `None`, the commit refuses several readers.
         let stage = |stage: &mut Box<dyn Stage<T>>| {
             if let Some(clone) = value.for_another_reader() {
                 stage.stage(job, clone);
             }
         };
-        // The value itself goes to the last reader, so one reader costs no clone.
+        // The value itself goes to the last reader, so a single reader costs no clone.
         if let Some((last, others)) = self.writers.split_last_mut() {
             // Before the value is moved away.
             for part in &mut self.stages {
@@ -149,7 +146,7 @@ impl<T: Message> Relay<T> for FanOut<T> {
     }
 }
 
-// Always, as `Writer::put`.
+// Always, like `Writer::put`.
 #[inline(always)]
 fn put<T>(writer: &mut Writer<T>, job: u64, value: T) {
     if writer.put(job, value).is_err() {
@@ -173,37 +170,36 @@ fn no_free_slot(job: u64) -> ! {
     )
 }
 
-/// The message of an edge between untyped subtasks: that the predecessor's
-/// instance is complete.
+/// The message of an edge between untyped subtasks: the predecessor's instance is complete.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Token;
 
-/// The edges of one DAG while the commit ties them.
+/// The edges of a DAG while the commit ties them.
 pub(crate) struct DagWiring {
     /// The number of slots of every ring.
     in_flight: usize,
-    /// For each edge the end that was made but not yet asked for.
+    /// For each edge, the end made but not yet requested.
     ends: Vec<Option<Box<dyn Any>>>,
     /// The edges with their topics, by topic and in the order of the reading ports.
     edges_by_topic: Vec<(String, usize)>,
-    /// For each subtask the edges of its input ports.
+    /// For each subtask, the edges of its input ports.
     edges_of_inputs: Vec<Vec<usize>>,
-    /// For each subtask the topics of its output ports.
+    /// For each subtask, the topics of its output ports.
     outputs: Vec<Vec<String>>,
-    /// For each subtask the edges that lead to it carrying tokens.
+    /// For each subtask, the edges carrying tokens to it.
     tokens_to: Vec<Vec<usize>>,
-    /// For each subtask the edges that lead from it carrying tokens.
+    /// For each subtask, the edges carrying tokens from it.
     tokens_from: Vec<Vec<usize>>,
-    /// For each latest value its topic, and where the writer puts it: a
-    /// `Vec<Box<dyn Stage<T>>>`; or what shall stand between, a [`Wrap<T>`].
+    /// For each latest value, its topic and the places written by its writer, a `Vec<Box<dyn
+    /// Stage<T>>>`; or a function putting a relay in between, a [`Wrap<T>`].
     stages: Vec<(String, Box<dyn Any>)>,
-    /// For each subtask its waits.
+    /// For each subtask, its waits.
     waits: Vec<Vec<Wait>>,
 }
 
 impl DagWiring {
-    /// Numbers the edges of a verified DAG: one a reading port, then those
-    /// between untyped subtasks.
+    /// Numbers the edges of a verified DAG: first one for each reading port, then those between
+    /// untyped subtasks.
     pub(crate) fn new(spec: &DagSpec, latest: &[Rc<dyn AnyLatest>], in_flight: usize) -> Self {
         let mut topics = Vec::new();
         let mut edges_of_inputs = Vec::with_capacity(spec.subtasks.len());
@@ -212,7 +208,7 @@ impl DagWiring {
             topics.extend(subtask.inputs.iter().map(|port| &port.topic));
             edges_of_inputs.push((first..topics.len()).collect());
         }
-        // A stable sort: readers of one topic stay in the order of their registration.
+        // A stable sort: the readers of a topic stay in the order of their registration.
         let by_topic = sorted_by_key(topics.len(), |edge| topics[edge]).into_iter();
         let edges_by_topic = by_topic.map(|edge| (topics[edge].clone(), edge)).collect();
         let outputs = spec
@@ -245,13 +241,13 @@ impl DagWiring {
         }
     }
 
-    /// Returns the waits that a subtask states.
+    /// Returns the stated waits of a subtask.
     pub(crate) fn waits(&self, subtask: usize) -> &[Wait] {
         self.waits.get(subtask).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns the ends of the edges that lead to an untyped subtask, and from it. Compiled with
-    /// the app, so that its sending is: this crate's own code is compiled for size.
+    /// Returns the ends of the edges to and from an untyped subtask. Compiled with the app to make
+    /// its sending fast: this crate's own code is compiled for size.
     #[inline]
     pub(crate) fn tokens(&mut self, subtask: usize) -> (Vec<Subscriber<Token>>, Publisher<Token>) {
         let to = core::mem::take(&mut self.tokens_to[subtask]);
@@ -272,17 +268,17 @@ impl DagWiring {
         }
     }
 
-    /// Makes the end of a topic that leads to these readers.
+    /// Makes the end of a topic leading to these readers.
     fn publisher<T: Message>(&mut self, topic: &str, writers: Vec<Writer<T>>) -> Publisher<T> {
         let mut found = Vec::new();
         let of_topic = self.stages.iter_mut().filter(|(of, _)| of == topic);
         let mut wrap = None;
         for (_, any) in of_topic {
-            // A latest value, or a tap of a recorded topic: only the type tells which.
+            // A latest value, or the tap of a recorded topic: only the type tells which.
             if let Some(stages) = any.downcast_mut::<Vec<Box<dyn Stage<T>>>>() {
                 found.append(stages);
             } else if let Some(found) = any.downcast_mut::<Wrap<T>>() {
-                // The tap of a recorded topic stands before all readers, so there is one.
+                // The tap of a recorded topic comes before all readers, so there is only one.
                 wrap = found.take();
             }
         }
@@ -312,8 +308,8 @@ impl DagWiring {
     }
 }
 
-/// The topic ends of one subtask that [`gen_subs`](crate::VecToSubs::gen_subs)
-/// and [`gen_pubs`](crate::VecToPubs::gen_pubs) draw from. Made by the commit only.
+/// The topic ends of one subtask, taken in order by [`gen_subs`](crate::VecToSubs::gen_subs) and
+/// [`gen_pubs`](crate::VecToPubs::gen_pubs). Made by the commit only.
 ///
 /// ```
 /// use fass::{Ports, VecToSubs};
@@ -342,7 +338,7 @@ impl Ports<'_> {
         let topic = &self.wiring.outputs[self.subtask][self.next].clone();
         self.next += 1;
         let all = &self.wiring.edges_by_topic;
-        // The edges of a topic lie together, as they are sorted by it.
+        // The edges are sorted by topic, so the edges of one topic lie together.
         let first = all.partition_point(|(other, _)| other < topic);
         let of_topic = all[first..].iter().take_while(|(other, _)| other == topic);
         let edges: Vec<usize> = of_topic.map(|(_, edge)| *edge).collect();

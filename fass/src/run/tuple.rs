@@ -1,21 +1,20 @@
 //! The traits of the paper's figure 4, for tuples of 0 to 16 messages.
 //!
-//! A subtask is a function from a tuple of messages to a tuple of messages. The
-//! tuple types say all that the system needs to generate the rest: from the
-//! arguments' tuple come the subscribers ([`VecToSubs`]) that receive them
-//! ([`MulRecv`]), from the results' tuple the publishers ([`VecToPubs`]) that
-//! send them ([`MulSend`]). The names are the paper's. Two things differ from
-//! its figure:
+//! A subtask is a function from a tuple of messages to a tuple of messages. From the tuple types
+//! the system generates everything else: from the arguments' tuple the subscribers ([`VecToSubs`]),
+//! which receive the arguments ([`MulRecv`]), and from the results' tuple the publishers
+//! ([`VecToPubs`]), which send the results ([`MulSend`]). The names are the paper's. Two things
+//! differ from its figure:
 //!
-//! - `recv_all` and `send_all` return `impl Future + Send` where the figure
-//!   returns a boxed future, so no job allocates.
-//! - They take `&mut self` where the figure takes `&self`: each end of an edge
-//!   then has one user at a time by the borrow checker's word, and needs no lock.
+//! - `recv_all` and `send_all` return `impl Future + Send` where the figure returns a boxed future,
+//!   so no job allocates.
+//! - Both take `&mut self` where the figure takes `&self`: the borrow checker then guarantees a
+//!   single user at a time for each end of an edge, and the end needs no lock.
 //!
-//! One macro, `for_each_arity`, counts from 0 to 16 and implements all four
-//! traits for each arity. Apps never call these traits; they meet them in the
-//! bounds of [`Dag::register_subtask`](crate::Dag::register_subtask) and in the
-//! compiler's messages, which speak our words. The futures exist only inside a
+//! One macro, `for_each_arity`, counts from 0 to 16 and implements all four traits for each arity.
+//! Apps never call these traits. They meet them in the bounds of
+//! [`Dag::register_subtask`](crate::Dag::register_subtask) and in the compiler's messages, which
+//! use the words of this crate. The futures exist only inside a
 //! [`SubtaskCode`](crate::platform::SubtaskCode).
 
 use alloc::vec::Vec;
@@ -27,7 +26,8 @@ use super::message::{Message, MessageType};
 use super::topic::{Ports, Publisher, Subscriber};
 
 mod sealed {
-    /// Kept to this crate: what is granted and discarded is so in the scheduler's steps.
+    /// Keeps the traits to this crate: granting and discarding happen only in the scheduler's
+    /// steps.
     pub trait Sealed {}
 
     impl<Ends> Sealed for super::Subscribers<Ends> {}
@@ -50,23 +50,22 @@ mod sealed {
     note = "the receivers are generated from the argument tuple: `<Args as VecToSubs>::Subs`"
 )]
 pub trait MulRecv: sealed::Sealed {
-    /// The tuple that one job's inputs form.
+    /// The tuple of one job's inputs.
     type Items;
 
-    /// Waits until the platform grants an instance, then returns its inputs,
-    /// all of one job.
+    /// Waits until the platform grants an instance, then returns its inputs, all of one job.
     ///
     /// # Panics
     ///
-    /// When polled, if an input is missing: the platform granted an instance
-    /// whose predecessors were not complete.
+    /// When polled, if an input is missing: the platform granted an instance whose predecessors
+    /// were not complete.
     fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send;
 
     /// Grants an instance: the next `recv_all` returns the inputs of `job`, once.
     fn grant(&mut self, job: u64);
 
-    /// Gives up the inputs of `job` that have arrived, which no instance will take.
-    /// Runs no code of the app and waits for nothing.
+    /// Gives up the arrived inputs of `job`, which no instance will take. Runs no code of the app
+    /// and waits for nothing.
     fn discard_all(&mut self, job: u64);
 }
 
@@ -86,26 +85,25 @@ pub trait MulRecv: sealed::Sealed {
     note = "the senders are generated from the result tuple: `<Ret as VecToPubs>::Pubs`"
 )]
 pub trait MulSend: sealed::Sealed {
-    /// The tuple that one job's outputs form.
+    /// The tuple of one job's outputs.
     type Items;
 
-    /// Puts each item into its topic for the instance's job and ends the instance,
-    /// at once: the future has nothing left to do.
+    /// Puts each item into its topic for the instance's job and ends the instance, at once: the
+    /// future has nothing left to do.
     ///
     /// # Panics
     ///
-    /// If no slot is free: the platform did not discard the inputs
-    /// of a cancelled instance.
+    /// If no slot is free: the platform did not discard the inputs of a cancelled instance.
     fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send;
 
-    /// Grants an instance: the next `send_all` is of `job`.
+    /// Grants an instance: the next `send_all` sends outputs of `job`.
     fn grant(&mut self, job: u64);
 }
 
-/// An argument tuple, from which a subtask's subscribers are generated.
+/// An argument tuple. A subtask's subscribers are generated from it.
 ///
-/// Implemented for tuples of 0 to 16 [`Message`]s. `()` is the argument of a
-/// source, whose function takes no argument at all.
+/// Implemented for tuples of 0 to 16 [`Message`]s. `()` is the argument of a source, whose function
+/// takes no argument at all.
 ///
 /// # Examples
 ///
@@ -115,7 +113,7 @@ pub trait MulSend: sealed::Sealed {
 /// assert_eq!(<(i32, String)>::input_types().len(), 2);
 /// ```
 ///
-/// An argument that is no tuple is refused by the compiler:
+/// The compiler refuses an argument other than a tuple:
 ///
 /// ```compile_fail,E0277
 /// use fass::VecToSubs;
@@ -128,7 +126,7 @@ pub trait MulSend: sealed::Sealed {
     note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
 )]
 pub trait VecToSubs: sealed::Sealed + Sized + Send + 'static {
-    /// The number of elements, which is that of the input topics.
+    /// The number of elements, equal to the number of input topics.
     const ARITY: usize;
 
     /// The subscribers, one for each element.
@@ -146,7 +144,7 @@ pub trait VecToSubs: sealed::Sealed + Sized + Send + 'static {
     fn gen_subs(ports: Ports<'_>) -> Self::Subs;
 }
 
-/// A result tuple, from which a subtask's publishers are generated.
+/// A result tuple. A subtask's publishers are generated from it.
 ///
 /// Implemented for tuples of 0 to 16 [`Message`]s. `()` is the result of a sink.
 ///
@@ -158,7 +156,7 @@ pub trait VecToSubs: sealed::Sealed + Sized + Send + 'static {
 /// assert_eq!(<(i32, String)>::output_types().len(), 2);
 /// ```
 ///
-/// A result that is no tuple is refused by the compiler:
+/// The compiler refuses a result other than a tuple:
 ///
 /// ```compile_fail,E0277
 /// use core::time::Duration;
@@ -178,7 +176,7 @@ pub trait VecToSubs: sealed::Sealed + Sized + Send + 'static {
     note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
 )]
 pub trait VecToPubs: sealed::Sealed + Sized + Send + 'static {
-    /// The number of elements, which is that of the output topics.
+    /// The number of elements, equal to the number of output topics.
     const ARITY: usize;
 
     /// The publishers, one for each element.
@@ -200,7 +198,7 @@ pub trait VecToPubs: sealed::Sealed + Sized + Send + 'static {
 ///
 /// See [`MulRecv`].
 pub struct Subscribers<Ends> {
-    /// The job that is granted and not yet begun: the *gate* is open for it.
+    /// The job granted and not yet begun: the *gate* is open for it.
     granted: Option<u64>,
     ends: Ends,
 }
@@ -209,16 +207,16 @@ pub struct Subscribers<Ends> {
 ///
 /// See [`MulSend`].
 pub struct Publishers<Ends> {
-    /// The job that was granted last.
+    /// The job granted last.
     job: u64,
     ends: Ends,
 }
 
-/// The future that waits at the gate: the one place where a subtask's future ever waits.
-/// Values that arrive open nothing; only a grant does. So an instance cannot begin before
-/// the platform says that its predecessors are complete (R2), and once begun it reaches its
-/// end in the same poll (R3). It is `core::future::PollFn` but for being
-/// compiled into its caller, also where that is compiled for size.
+/// The future waiting at the gate, the only place where a subtask's future ever waits. Arriving
+/// values do not open the gate; only a grant does. So an instance cannot begin before the platform
+/// declares its predecessors complete (R2), and once begun it reaches its end in the same poll
+/// (R3). Equivalent to `core::future::PollFn`, but compiled into its caller, even where the caller
+/// is compiled for size.
 struct AtTheGate<F>(F);
 
 impl<T, F: FnMut() -> Poll<T> + Unpin> Future for AtTheGate<F> {
@@ -328,8 +326,8 @@ macro_rules! implement_arity {
     };
 }
 
-/// Calls a macro with no element, with the first element, with the first two,
-/// and so on up to all of them.
+/// Calls a macro with no element, with the first element, with the first two, and so on up to all
+/// of them.
 macro_rules! for_each_arity {
     ($implement:ident: $($element:tt)*) => {
         for_each_arity!(@step $implement [] $($element)*);

@@ -1,9 +1,9 @@
-//! Latest values: slots that carry one from its writer to a subtask that samples it.
+//! Latest values: the slots carrying a value from its writer to a sampling subtask.
 //!
-//! Each sampling subtask has three slots for itself: one that the writer fills, one
-//! that the reader looks at, and one in the middle. The writer, when complete, swaps
-//! its slot for the middle one; the reader does so if that is fresh (a triple buffer).
-//! So neither waits for the other, and a value shows as a whole or not at all.
+//! Each sampling subtask has three slots of its own: one filled by the writer, one read by the
+//! reader, and one in the middle. At its completion, the writer swaps its slot for the middle one;
+//! the reader does so if the middle one is fresh (a triple buffer). So neither waits for the other,
+//! and a value shows as a whole or not at all.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -25,7 +25,7 @@ use super::message::{Message, MessageType};
 /// A latest value while DAGs are built.
 pub(crate) struct SharedLatest<T> {
     pub(crate) topic: String,
-    /// One for each sampling subtask.
+    /// A triple buffer for each sampling subtask.
     triples: RefCell<Vec<Arc<TripleBuffer<T>>>>,
 }
 
@@ -37,7 +37,7 @@ impl<T> SharedLatest<T> {
         }
     }
 
-    /// Adds a sampling subtask and returns its reading end, and its number.
+    /// Adds a sampling subtask. Returns its reading end and its number.
     pub(crate) fn sampler(&self) -> (Sampler<T>, usize) {
         let triple = Arc::new(TripleBuffer::new());
         let mut triples = self.triples.borrow_mut();
@@ -45,25 +45,25 @@ impl<T> SharedLatest<T> {
         (Sampler { triple, front: 2 }, triples.len() - 1)
     }
 
-    /// Sets what looks at each sample of a sampling subtask.
+    /// Sets the probe looking at each sample of a sampling subtask.
     pub(crate) fn set_probe(&self, sampler: usize, probe: Arc<dyn Probe>) {
-        // The commit, which comes once, does so for each sampler once.
+        // Cannot fail: the commit, which comes once, does so once for each sampler.
         let _ = self.triples.borrow()[sampler].probe.set(probe);
     }
 }
 
-/// A latest value of whatever type.
+/// A latest value of any type.
 pub(crate) trait AnyLatest: Any {
     fn topic(&self) -> &str;
 
-    /// Returns the topic with the type that is read.
+    /// Returns the topic with the type of the value.
     fn port(&self) -> TopicPort;
 
-    /// Returns the number of subtasks that sample it.
+    /// Returns the number of sampling subtasks.
     fn samplers(&self) -> usize;
 
-    /// Returns the writing ends, a `Vec<Box<dyn Stage<T>>>`, or what shall stand between the
-    /// writer and all others, a [`Wrap<T>`](super::topic::Wrap).
+    /// Returns the writing ends, a `Vec<Box<dyn Stage<T>>>`, or the function putting a relay
+    /// between the writer and all readers, a [`Wrap<T>`](super::topic::Wrap).
     fn stages(&self) -> Box<dyn Any>;
 
     /// Returns the effects of the writer's completion.
@@ -99,24 +99,23 @@ impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
     }
 }
 
-/// Where a writer puts what shall show at its completion.
+/// The place for a value that shows at its writer's completion.
 pub(crate) trait Stage<T>: Send + Sync {
     fn stage(&mut self, job: u64, value: T);
 }
 
-/// A probe of the samples of one subtask, which it records or replays. It gets the reader's slot,
-/// a [`LatestSlot<T>`] whose type it knows, so that a subtask whose samples are not recorded has
-/// next to
+/// A probe recording or replaying the samples of one subtask. It gets the reader's slot, a
+/// [`LatestSlot<T>`] of a type known to the probe, so a subtask without recorded samples has almost
 /// no code for it.
 pub(crate) trait Probe: Send + Sync {
-    /// Notes the job whose instance runs.
+    /// Notes the job of the running instance.
     fn note_job(&self, job: u64);
 
-    /// Puts into the slot what the instance found when it was recorded, and reports whether that
-    /// is known.
+    /// In a replay, puts the recorded sample of the instance into the slot. Reports whether there
+    /// is one.
     fn replay(&self, slot: &dyn Any) -> bool;
 
-    /// Looks at what the instance finds.
+    /// Looks at the instance's sample.
     fn look_at(&self, slot: &dyn Any);
 }
 
@@ -128,15 +127,15 @@ struct TripleBuffer<T> {
     slots: [LatestSlot<T>; 3],
     /// The slot in the middle, with [`FRESH`] if the reader has not had it.
     middle: AtomicU8,
-    /// The writer's slot. Only the writer's body uses it, which is `&mut` there.
+    /// The writer's slot. Only the writer's body uses it, through `&mut`.
     back: AtomicU8,
-    /// Whether the writer's slot has a value that shall show at its completion.
+    /// Whether the writer's slot has a value to show at the completion.
     staged: AtomicBool,
-    /// Looks at what the reader finds, if the topic is recorded.
+    /// Looks at the reader's samples, if the topic is recorded.
     probe: SetOnce<Arc<dyn Probe>>,
 }
 
-/// A value, the job that it is of, and when its writer was complete.
+/// A value, its job, and the time of its writer's completion.
 pub(crate) struct LatestEntry<T> {
     pub(crate) value: T,
     pub(crate) job: u64,
@@ -182,7 +181,7 @@ impl<T: Send + Sync> Stage<T> for Arc<TripleBuffer<T>> {
 
 impl<T: Send + Sync> Effect for Arc<TripleBuffer<T>> {
     fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
-        // An instance that failed, or sends nothing, has staged no value: the older one stays the
+        // An instance that failed, or sends nothing, has staged no value: the older value stays the
         // latest.
         if !self.staged.load(Ordering::Relaxed) {
             return;
@@ -194,10 +193,10 @@ impl<T: Send + Sync> Effect for Arc<TripleBuffer<T>> {
             }
         });
         let back = self.back.load(Ordering::Relaxed);
-        // Release: the reader that takes the slot sees the value. Acquire: the slot that comes
-        // back is no longer read.
+        // Release: the reader taking the slot sees the value. Acquire: nobody reads the slot coming
+        // back any more.
         let middle = self.middle.swap(back | FRESH, Ordering::AcqRel);
-        // Only the writer reads it.
+        // Relaxed: only the writer uses `back`.
         self.back.store(middle & SLOT, Ordering::Relaxed);
     }
 }
@@ -214,22 +213,21 @@ pub struct Sampler<T> {
 pub struct SampledSlot<'a, T>(ReadClaim<'a, Option<LatestEntry<T>>>);
 
 impl<T: 'static> Sampler<T> {
-    /// Takes the slot of the latest complete instance, for the time of the guard.
+    /// Takes the slot of the latest complete instance, for the life of the guard.
     pub(crate) fn look(&mut self) -> SampledSlot<'_, T> {
         let Self { triple, front } = self;
         let probe = triple.probe.get();
         let slot = &triple.slots[usize::from(*front)];
-        // In a replay the recorded sample takes the place of what the writer has shown.
+        // In a replay the recorded sample takes the place of the value shown by the writer.
         if probe.is_none_or(|probe| !probe.replay(slot))
             && triple.middle.load(Ordering::Relaxed) & FRESH != 0
         {
-            // The reader's own slot goes to the middle, so that the writer never waits for a
-            // reader.
+            // The reader's own slot goes to the middle, so the writer never waits for a reader.
             *front = triple.middle.swap(*front, Ordering::AcqRel) & SLOT;
         }
         let slot = &triple.slots[usize::from(*front)];
         if let Some(probe) = probe {
-            // After the exchange: what is recorded is what the function gets.
+            // After the exchange: the recorded sample is the one passed to the function.
             probe.look_at(slot);
         }
         match slot.look() {
@@ -249,7 +247,7 @@ impl<T> SampledSlot<'_, T> {
 #[cfg(test)]
 mod tests;
 
-/// How old the value that a subtask samples can be at its start.
+/// The greatest age of a sampled value at the start of the sampling instance.
 ///
 /// ```
 /// use core::time::Duration;
@@ -275,17 +273,18 @@ mod tests;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Staleness {
-    /// The DAG of the subtask that samples.
+    /// The DAG of the sampling subtask.
     pub reader_dag: DagLabel,
-    /// The subtask that samples.
+    /// The sampling subtask.
     pub reader: SubtaskLabel,
-    /// The DAG that writes.
+    /// The writing DAG.
     pub writer_dag: DagLabel,
     /// The topic.
     pub topic: String,
-    /// The time, never reached, from the nominal release of the job that the value is
-    /// of to the start of the instance that samples it, while jobs of the writer come: not in a pause,
-    /// up to the first job after it, and not after the last one. `None` if the writer has no proven bound, or is sporadic.
+    /// The bound on the value's age: from the nominal release of the job writing the value to the
+    /// start of the sampling instance. The age is always less. The bound holds while jobs of the
+    /// writer come: neither in a pause, up to the first job after it, nor after the last job.
+    /// `None` if the writer has no proven bound, or is sporadic.
     pub bound: Option<Duration>,
 }
 
