@@ -1,8 +1,8 @@
-//! The echo of a recorded topic: shows people its latest value while the run goes on.
+//! The echo of a recorded topic: shows people the latest value while the run goes on.
 //!
 //! At each completion, the value of the watched topic is copied into a single room, where it
 //! replaces the value before: a person reads slower than a DAG writes. The console takes the value
-//! out, and makes its text in its own time.
+//! out, and makes the text in the console's own time.
 
 use alloc::boxed::Box;
 use alloc::string::String;

@@ -446,6 +446,7 @@ impl Edge {
         let at_ns = self.of_run(clock_ns);
         match (&mut self.crossing, instance) {
             (Some(crossing), Some(instance)) => crossing.tell_time(instance, clock_ns, at_ns),
+            // Outside an instance the time is no input of a job, so there is nothing to record.
             _ => clock_ns,
         }
     }

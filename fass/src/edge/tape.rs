@@ -375,6 +375,8 @@ impl Drain for OfTape {
 
     fn send_losses(&mut self, to: &mut Record) -> Option<RecordingState> {
         let is_cut = self.has_ended(u64::MAX);
+        // A cut recording tells nothing of the time after its end, so it tells no losses there
+        // either.
         if !is_cut {
             (0..)
                 .take(self.records.len())

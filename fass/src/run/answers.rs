@@ -2,10 +2,10 @@
 //!
 //! A device's answer crosses the edge of a DAG, and so does its duration. Both are written down
 //! when the instance has got the answer, or has not got it in time. Like all findings of an
-//! instance, they go to the platform when the instance is complete, or has failed. The answers of
-//! one job form one value: a list of the waits, each with its number, the answer's duration and the
-//! answer. In a replay no question is sent: a wait takes as long as recorded, and has the same
-//! result.
+//! instance, the answer goes to the platform when the instance is complete, or has failed. The
+//! answers of one job form a single value: a list of the waits, each with its number, the answer's
+//! duration and the answer. In a replay no question is sent: a wait takes as long as recorded, and
+//! has the same result.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -26,7 +26,7 @@ type FoundAnswer<A> = (u32, u64, Option<A>);
 pub(crate) trait AnyDevice: Send + Sync {
     fn name(&self) -> &str;
 
-    /// Returns the type of a job's recorded answers, and their line, if they are recorded.
+    /// Returns the type of a job's recorded answers, and their line, if recorded.
     fn line(&self) -> Option<(Schema, Arc<ChannelState>)>;
 
     /// Returns the DAG released by the device's questions, if any.

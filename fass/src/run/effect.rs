@@ -80,6 +80,7 @@ impl RequestTarget {
 
     /// Sets the plan's number and the DAG, at the commit.
     pub(crate) fn set(&self, plan: u64, dag: DagId) {
+        // The plan last, by `Release`: a reader seeing the plan's number sees the DAG, too.
         self.dag.store(dag.0, Ordering::Relaxed);
         self.plan.store(plan, Ordering::Release);
     }

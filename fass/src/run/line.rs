@@ -1,8 +1,8 @@
 //! The line of a channel: the path of its values across the edge of a DAG, to the platform.
 //!
-//! An instance writes a value into an [outbox](super::cell::outbox) as soon as it has the value.
-//! When the instance is complete, the platform's reader finds the value there. Without a reader,
-//! the platform is given the value at once.
+//! An instance writes a value into an [outbox](super::cell::outbox) on having it. When the instance
+//! is complete, the platform's reader finds the value there. A platform without a reader is given
+//! the value at once.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -17,7 +17,7 @@ use super::cell::SetOnce;
 use super::effect::Effect;
 use crate::run::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 
-/// Stands for "no number yet" in the place of a channel's number.
+/// The number of a channel without a number.
 const NO_CHANNEL: u16 = u16::MAX;
 
 /// The state of a channel, shared by its writer, its publisher and a replay.
@@ -40,7 +40,7 @@ impl ChannelState {
         }
     }
 
-    /// Reports whether the channel has a number; without one, nobody wants its values.
+    /// Reports whether the channel has a number: otherwise nobody wants its values.
     pub(super) fn is_open(&self) -> bool {
         self.number() != NO_CHANNEL
     }
@@ -75,7 +75,7 @@ impl ChannelState {
 
     /// Makes a reader of values of at least `least_bytes` bytes, with room for `words` words, or
     /// more if too few values would fit. `None`: out of memory. If the platform is given each value
-    /// instead of reading it, also returns the outbox in which it puts given values.
+    /// instead, also returns the outbox where it puts them.
     pub(crate) fn reader(
         &self,
         words: usize,
@@ -107,18 +107,19 @@ impl ChannelState {
         }
     }
 
-    /// Lets the reader have the staged value, if there is one, as its instance is complete.
+    /// Lets the reader have the staged value, if any: its instance is complete.
     #[inline(always)]
     fn publish(&self, completed_ns: u64) {
         if let Some(outbox) = self.outbox.get()
-            // No room to publish: the value is given instead, and the platform counts the loss.
+            // No room to publish: the value is given instead, and the platform decides about the
+            // loss.
             && !outbox.publish(completed_ns)
         {
             self.show(completed_ns, self.edge.record);
         }
     }
 
-    /// Gives the staged value to the platform, or reports the lack of room for it.
+    /// Gives the staged value to the platform, or reports its lack of room.
     #[inline(never)]
     pub(crate) fn show(&self, completed_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         if let Some(outbox) = self.outbox.get() {
@@ -138,8 +139,7 @@ impl ChannelState {
         self.publish_or_give(completed_ns, self.edge.record);
     }
 
-    /// Publishes the value. If there is no reader, or no room to publish, gives the value to
-    /// `take`.
+    /// Publishes the value, or gives it to `take` without a reader or room to publish.
     pub(crate) fn publish_or_give(&self, at_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         let is_read = self.is_read.load(Ordering::Relaxed);
         if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
@@ -215,7 +215,7 @@ impl KeptState {
         }
     }
 
-    /// Has the state written down every so many jobs, unless it already is more often.
+    /// Has the state written down at least every so many jobs.
     pub(crate) fn keep_every(&self, jobs: u32) {
         // There may be two requests; the more frequent one serves both.
         self.every.fetch_min(jobs.max(1), Ordering::Relaxed);

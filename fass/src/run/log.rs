@@ -187,8 +187,8 @@ impl LogLine {
         fields.map(|(key, value)| (*key, fmt::from_fn(|f| (self.write)(value, f))))
     }
 
-    /// Returns the names of the line's DAG and subtask, and the instance, if one of these DAGs has
-    /// it.
+    /// Returns the names of the line's DAG and subtask, and the instance, if the line belongs to
+    /// one of these DAGs.
     pub fn names<'t>(&self, task_set: Option<&'t TaskSet>) -> Option<(&'t str, &'t str, Instance)> {
         let instance = self.instance?;
         let dag = task_set?.dags().get(instance.dag.index())?;

@@ -1,13 +1,13 @@
-//! Messages: values that may travel on a topic, to one reader or to several.
+//! Messages: values travelling on a topic, to one reader or to several.
 //!
-//! A *message* is the value carried by one job along one topic. With one reader it is moved, never
-//! copied. With several readers every reader but the last gets a clone and the last gets the value
-//! itself. The app decides the cost of a clone: an `i32` is copied, an `Arc<PointCloud>` is
-//! *shared* (all readers see the same bytes, nothing is copied), a `Vec` is duplicated and so
-//! allocates, to be avoided in an app with deadlines.
+//! A *message* is the value carried by a job along a topic. With a single reader the value is
+//! moved, never copied. With several readers every reader but the last gets a clone, and the last
+//! gets the value itself. The app decides the cost of a clone: an `i32` is copied, an
+//! `Arc<PointCloud>` is *shared* (all readers see the same bytes, nothing is copied), a `Vec` is
+//! duplicated and so allocates, to be avoided in an app with deadlines.
 //!
-//! A type that cannot or must not be cloned travels inside [`Unique`]. It is always moved; a second
-//! reader of its topic is refused at commit.
+//! A type without permitted clones travels inside [`Unique`]. Such a value is always moved; a
+//! second reader of its topic is refused at commit.
 
 use core::any::{TypeId, type_name};
 use core::ops::{Deref, DerefMut};
@@ -53,7 +53,7 @@ pub trait Message: Send + Sized + 'static {
     /// ```
     const CAN_FAN_OUT: bool;
 
-    /// Makes the value for one more reader, or returns `None` if the type can only be moved.
+    /// Makes the value for another reader, or returns `None` if the type can only be moved.
     ///
     /// ```
     /// use fass::{Message, Unique};
@@ -81,10 +81,10 @@ impl<T: Send + 'static> Message for Unique<T> {
     }
 }
 
-/// A message that is moved from its writer to its only reader, never cloned.
+/// A message moved from its writer to its only reader, never cloned.
 ///
-/// It is deliberately not `Clone`, whatever `T` is. Two subtasks reading a topic of this type are a
-/// fault at commit.
+/// `Unique<T>` is deliberately not `Clone`, whatever `T` is. Two subtasks reading a topic of this
+/// type are a fault at commit.
 ///
 /// # Examples
 ///

@@ -336,6 +336,7 @@ impl SubtaskCode {
     /// - If an output finds no free slot, because the inputs of a cancelled instance were not
     ///   [discarded](Self::discard).
     pub fn run(&mut self, job: u64) {
+        // After a panic the job stays set, and the future must not be polled again.
         assert!(
             self.job == NO_JOB,
             "the subtask panicked in job {} and cannot continue",

@@ -53,9 +53,9 @@ where
     }
 }
 
-/// The loop of the paper's figure, one iteration for each poll. It waits in a single place, so no
-/// state has to be kept between polls: an iteration neither begins by finding its place, nor ends
-/// with a look at the closed gate.
+/// The loop of the paper's figure, one iteration for each poll. The loop waits in a single place,
+/// so no state has to be kept between polls: an iteration neither begins by finding its place, nor
+/// ends with a look at the closed gate.
 struct PollLoop<F, Subs, Pubs> {
     f: F,
     subs: Subs,

@@ -1,9 +1,10 @@
-//! The turns of a waiting subtask: the wait each asks for, and whether it may.
+//! The turns of a waiting subtask: the requested waits, and their checks.
 //!
 //! A *turn* is the execution of an instance from the start, or the end of a wait, to the finish, or
-//! the next wait. One poll of the instance's future tells how it ends. A ready future means: the
-//! instance has finished, and its outputs go out. A pending one means: a future of this crate has
-//! begun one wait in it. The completion of such a turn returns that wait, and causes nothing else.
+//! the next wait. One poll of the instance's future tells how the turn ends. With a ready future,
+//! the instance has finished, and its outputs go out. With a pending future, a future of this crate
+//! has begun a single wait in the turn. The completion of such a turn returns the wait, and causes
+//! nothing else.
 //!
 //! A subtask states the number of waits and the limit of each. An instance with any other waits
 //! panics with a [`WaitFault`].
@@ -94,9 +95,9 @@ pub(crate) enum WaitEnd {
 
 /// The turn asks for no wait.
 const NONE: u8 = 0;
-/// It asks for a wait of so many nanoseconds.
+/// The turn asks for a wait of so many nanoseconds.
 const AFTER: u8 = 1;
-/// It asks for a wait until so many nanoseconds after the release.
+/// The turn asks for a wait until so many nanoseconds after the release.
 const SINCE_RELEASE: u8 = 2;
 
 /// Stands for "no job".
@@ -133,7 +134,7 @@ impl TurnState {
         }
     }
 
-    /// Returns its address, which differs from those of other subtasks.
+    /// Returns an address different from those of other subtasks.
     pub(crate) fn address(&self) -> usize {
         core::ptr::from_ref(self).addr()
     }
@@ -152,7 +153,7 @@ impl TurnState {
         self.reached_ns.store(0, Ordering::Relaxed);
     }
 
-    /// Returns the job and the number of waits it has begun.
+    /// Returns the job and the number of waits begun.
     pub(crate) fn latest(&self) -> (u64, u32) {
         let (job, begun) = (&self.job, &self.begun);
         (job.load(Ordering::Relaxed), begun.load(Ordering::Relaxed))

@@ -22,7 +22,7 @@ use super::turn::{TurnState, WaitEnd, WaitFault};
 /// A wait, begun by the first poll.
 pub(crate) struct WaitStep {
     end: WaitEnd,
-    /// The address of the turns, the job, and the number of waits with this one.
+    /// The address of the turns, the job, and the number of waits including this.
     begun: Option<(usize, u64, u32)>,
     is_over: bool,
 }
@@ -114,15 +114,15 @@ impl Future for WaitStep {
 ///
 /// # Panics
 ///
-/// With a [`WaitFault`], in the turn that begins the wait, if the wait is not as stated.
+/// With a [`WaitFault`], in the turn beginning the wait, if the wait is not as stated.
 pub async fn sleep(duration: Duration) {
     WaitStep::new(WaitEnd::After(nanoseconds(duration))).await;
 }
 
-/// Waits, in the function of an async subtask, until that much time has passed since the release of
-/// its job; for no time if it has.
+/// Waits, in the function of an async subtask, until so much time has passed since the release of
+/// the job; for no time if the instant has passed.
 ///
-/// The limit of the wait must be that long, less the time covered by an earlier `until` of the
+/// The limit of the wait must be as long, less the time covered by an earlier `until` of the
 /// instance; when the job started does not matter.
 ///
 /// ```
@@ -145,7 +145,7 @@ pub async fn sleep(duration: Duration) {
 ///
 /// # Panics
 ///
-/// With a [`WaitFault`], in the turn that begins the wait, if the wait is not as stated.
+/// With a [`WaitFault`], in the turn beginning the wait, if the wait is not as stated.
 pub async fn until(since_release: Duration) {
     WaitStep::new(WaitEnd::SinceRelease(nanoseconds(since_release))).await;
 }

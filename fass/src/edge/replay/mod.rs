@@ -603,6 +603,8 @@ impl SignalTimes {
     /// Takes the place of all signals of a plan.
     fn take_over(plan: &mut Plan, replay: &mut Replay) -> Self {
         plan.number = REPLAYED;
+        // The recording has the signals raised by faults and functions as well: raised again here,
+        // they would release jobs twice.
         plan.after_fault.fill(None);
         for body in plan.bodies.iter_mut().flatten() {
             body.mute();

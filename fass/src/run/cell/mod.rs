@@ -219,6 +219,8 @@ impl<T> Ring<T> {
                 return Some(slot);
             }
         }
+        // The near slot again: in `make_room` its value may have been given up, so `near` did not
+        // match.
         is_meant(self.near.turn.load(Ordering::Acquire)).then_some(&self.near)
     }
 }
@@ -280,6 +282,7 @@ impl<T> SharedCell<T> {
 
     /// Claims the value for reading, unless somebody may change the value.
     pub(crate) fn look(&self) -> Option<ReadClaim<'_, T>> {
+        // One count less than the maximum, which means `CHANGING`.
         let one_more = |claims| (claims < CHANGING - 1).then(|| claims + 1);
         let claim = self
             .claims

@@ -202,6 +202,8 @@ impl RecordRing {
     /// The caller has the claim.
     #[cold]
     fn go_to_start(&self, place: usize, read: usize, needed: usize) -> bool {
+        // `place < read`: the writer has gone to the start already. An end at `read` would mean
+        // empty.
         if place < read || words_of(needed) >= read {
             return false;
         }
@@ -241,6 +243,8 @@ impl OutboxReader {
             return None;
         }
         let first = records.words.get(place);
+        // At the end of the words, or at the writer's mark: the next record is at the start, where
+        // perhaps nothing is published yet.
         if first.is_none_or(|job| job.load(Ordering::Relaxed) == WRAP) {
             place = 0;
             records.read.store(0, Ordering::Release);

@@ -1,8 +1,8 @@
-//! The waker by which this crate's futures find the turn they are polled in.
+//! The waker by which futures of this crate find the turn in which they are polled.
 //!
-//! The app's future is polled with a special [`Waker`]. It wakes nobody: the scheduler decides when
-//! a turn is taken. The waker's data is the state of the turn. Through it a future of this crate
-//! asks for a wait, however deeply other futures enclose it.
+//! The app's future is polled with a special [`Waker`]. The waker wakes nobody: the scheduler
+//! decides when a turn is taken. The waker's data is the state of the turn. Through the waker a
+//! future of this crate asks for a wait, however deeply other futures enclose the future.
 //!
 //! > **Turn waker invariant.** The data of a waker with [`TURN`] as its functions points to a
 //! > [`TurnState`] living at least as long as every reference to the waker. Such a waker is made in
@@ -24,7 +24,7 @@ fn inert() -> RawWaker {
     RawWaker::new(ptr::null(), &INERT)
 }
 
-/// Polls with a context in which this crate's futures find the turn.
+/// Polls with a context in which the crate's futures find the turn.
 pub(crate) fn poll_in<T>(turn: &TurnState, poll: impl FnOnce(&mut Context<'_>) -> T) -> T {
     let data = ptr::from_ref(turn).cast();
     // SAFETY: the functions neither use nor free their data, from any thread, and a clone has
@@ -33,7 +33,7 @@ pub(crate) fn poll_in<T>(turn: &TurnState, poll: impl FnOnce(&mut Context<'_>) -
     poll(&mut Context::from_waker(&waker))
 }
 
-/// Returns the turn in which a future is polled with this waker, or `None` outside a turn.
+/// Returns the turn in which a future is polled with a turn waker, or `None` for any other waker.
 pub(crate) fn turn_of(waker: &Waker) -> Option<&TurnState> {
     let turn = ptr::eq(waker.vtable(), &TURN).then(|| waker.data().cast::<TurnState>())?;
     // SAFETY: by the turn waker invariant the data points to a state living as long as this
