@@ -2,7 +2,7 @@
 //!
 //! At each completion, the value of the watched topic is copied into a single room, where it
 //! replaces the value before: a person reads slower than a DAG writes. The console takes the value
-//! out, and makes the text in the console's own time.
+//! out, and formats it in the console's own time.
 
 use alloc::boxed::Box;
 use alloc::string::String;

@@ -72,7 +72,7 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
         self.expect(plan.task_set.clusters().count());
     }
 
-    /// Expects events of so many clusters, from the first event on.
+    /// Expects events of `clusters` clusters, from the first event on.
     fn expect(&mut self, clusters: usize) {
         self.taken.clear();
         self.taken.resize(clusters, 0);

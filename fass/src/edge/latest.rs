@@ -224,7 +224,7 @@ struct ChannelHistory {
 }
 
 impl LatestJobs {
-    /// Makes room for the inputs of so many jobs; `None`: there is no memory.
+    /// Makes room for the inputs of `jobs` jobs; `None`: there is no memory.
     pub fn new(channels: &[Channel], jobs: u32) -> Option<Self> {
         let count = usize::try_from(jobs).unwrap_or(usize::MAX);
         let mut places = Vec::with_capacity(channels.len());

@@ -10,9 +10,9 @@
 //! [`Platform::open_channels`](crate::platform::Platform::open_channels), so an image without a
 //! recorded topic contains none of this code.
 //!
-//! The [`Edge`] of a platform's runs knows the wishes of the command line, and owns the parts
-//! carrying them out. A platform has one edge, behind a lock of its own. Most work under that lock
-//! is done under the scheduler's lock, too. The drain is lent to the sender, so sending holds
+//! The [`Edge`] of a platform's runs knows the mode requested on the command line, and owns the
+//! parts carrying it out. A platform has one edge, behind a lock of its own. Most work under that
+//! lock is done under the scheduler's lock, too. The drain is lent to the sender, so sending holds
 //! neither lock.
 
 mod echo;
@@ -77,7 +77,7 @@ pub(crate) struct ReplayHost {
     pub(crate) now_ns: fn() -> u64,
 }
 
-/// A function making the crossing for the wished mode, and an echo if people can look.
+/// A function making the crossing for the requested mode, and an echo if people can look.
 pub type Begin =
     fn(Option<EdgeMode>, bool) -> (Option<Box<dyn Crossing>>, Option<Box<dyn Echoing>>);
 
@@ -105,18 +105,18 @@ pub trait Crossing: Send {
     /// Returns a message if there is no memory, or the replay does not fit.
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String>;
 
-    /// Takes a value at its writer's completion, `at_ns` on the time of the run.
+    /// Takes a value at its writer's completion, at time `at_ns` of the run.
     fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64);
 
     /// Takes an event of a job or an instance, of the kinds in [`HEARS`].
     fn happened(&mut self, notice: &DriverNotice);
 
-    /// Notes that an instance has failed, and takes its samples: `at_ns` on the time of the run,
-    /// `clock_ns` on that of [`crate::now_ns`].
+    /// Notes that an instance has failed, and takes its samples: at time `at_ns` of the run, and
+    /// `clock_ns` on the clock of [`crate::now_ns`].
     fn failed(&mut self, _instance: Instance, _at_ns: u64, _clock_ns: u64) {}
 
-    /// Returns the time for an instance asking for it, `clock_ns` on the clock of [`crate::now_ns`]
-    /// and `at_ns` on the time of the run.
+    /// Returns the time for an instance asking for it, at `clock_ns` on the clock of
+    /// [`crate::now_ns`] and at time `at_ns` of the run.
     fn tell_time(&mut self, _instance: Instance, clock_ns: u64, _at_ns: u64) -> u64 {
         clock_ns
     }
@@ -150,8 +150,8 @@ pub trait Echoing: Send {
     /// Takes a value at its writer's completion.
     fn record(&mut self, value: &RecordedValue<'_>);
 
-    /// Keeps the latest value of this topic from now on, or of none. Reports whether the topic is
-    /// recorded.
+    /// Keeps the latest value of this topic from now on; `None`: of no topic. Reports whether the
+    /// topic is recorded.
     fn watch(&mut self, topic: Option<&str>) -> bool;
 
     /// Takes the latest value out, if one has come since the last call. Allocates nothing.
@@ -165,7 +165,7 @@ pub trait Echoing: Send {
 pub struct WatchedValue {
     /// The job of the value.
     pub job: u64,
-    /// The number of values since the previous taken one that nobody took.
+    /// The number of values skipped since the last value taken.
     pub left_out: u64,
     /// The value's length in bytes; `None`: longer than the room for it.
     length: Option<usize>,
@@ -198,7 +198,7 @@ pub trait Drain: Send {
     /// Sends the header.
     fn send_header(&mut self, to: &mut Record);
 
-    /// Takes the begin of the run's time, on the clock of [`crate::now_ns`].
+    /// Takes the start of the run's time, on the clock of [`crate::now_ns`].
     fn begin_run(&mut self, _epoch_ns: u64) {}
 
     /// Sends the next entry, if the file can take it now; `false`: nothing was sent.
@@ -232,7 +232,7 @@ impl RecordingState {
     }
 }
 
-/// Makes the crossing for the wished mode.
+/// Makes the crossing for the requested mode.
 pub(crate) fn new_crossing(wish: EdgeMode, host: ReplayHost) -> Box<dyn Crossing> {
     match wish {
         EdgeMode::Record { app, bytes, .. } => Box::new(tape::RunRecorder::new(app, bytes)),
@@ -309,24 +309,24 @@ pub struct Edge {
     shows: bool,
     crossing: Option<Box<dyn Crossing>>,
     echo: Option<Box<dyn Echoing>>,
-    /// Whether a plan has been launched with a wish.
+    /// Whether a plan has been launched in a requested mode.
     is_on: bool,
     /// Whether the time told to functions is recorded or replayed.
     tells: bool,
-    /// The begin of the run's time, on the clock.
+    /// The start of the run's time, on the clock.
     epoch_ns: u64,
     /// The sender of the next run's recording.
     outgoing: Outgoing,
     /// Whether the jobs before a fault have been sent.
     has_sent_latest: bool,
-    /// Why the wish does not go with the recording or the app.
+    /// Why the requested mode does not suit the recording or the app.
     refusal: Option<String>,
     /// The difference of a replay from its recording, if any.
     complaint: Option<String>,
 }
 
 impl Edge {
-    /// Makes an edge without a wish.
+    /// Makes an edge without a requested mode.
     pub const fn new() -> Self {
         Self {
             wish: None,
@@ -353,7 +353,7 @@ impl Edge {
         self.shows = true;
     }
 
-    /// Reports whether there is any wish.
+    /// Reports whether a mode or an echo is requested.
     pub const fn is_wished(&self) -> bool {
         self.wish.is_some() || self.shows
     }
@@ -363,12 +363,12 @@ impl Edge {
         self.shows || !matches!(self.wish, Some(EdgeMode::Latest { .. }))
     }
 
-    /// Reports whether a replay is wished.
+    /// Reports whether a replay is requested.
     pub const fn is_replay(&self) -> bool {
         matches!(self.wish, Some(EdgeMode::Replay { .. }))
     }
 
-    /// Reports whether a plan has been launched with a wish, so events are of interest.
+    /// Reports whether a plan has been launched in a requested mode, so events are of interest.
     pub(crate) const fn is_on(&self) -> bool {
         self.is_on
     }
@@ -393,8 +393,8 @@ impl Edge {
         is_read && self.echo.is_none()
     }
 
-    /// Sets up the recording or replay of a plan, if wished, and begins the recording in the file,
-    /// if there is one.
+    /// Sets up the recording or replay of a plan, if requested, and begins the recording in the
+    /// file, if there is one.
     pub(crate) fn launch(
         &mut self,
         plan: &mut Plan,
@@ -451,8 +451,7 @@ impl Edge {
         }
     }
 
-    /// Takes the sender for the run beginning now, with the clock's time as the begin of the run's
-    /// time.
+    /// Takes the sender for the run starting now. The run's time starts at `epoch_ns` on the clock.
     pub fn begin_run(&mut self, epoch_ns: u64) -> Outgoing {
         self.epoch_ns = epoch_ns;
         let mut outgoing = self.outgoing.take();
@@ -505,8 +504,8 @@ impl Edge {
         }
     }
 
-    /// Keeps the latest value of a recorded topic from now on, or of none. Reports whether such a
-    /// topic exists.
+    /// Keeps the latest value of a recorded topic from now on; `None`: of no topic. Reports whether
+    /// such a topic exists.
     pub fn watch(&mut self, topic: Option<&str>) -> bool {
         (self.echo.as_mut()).is_some_and(|echo| echo.watch(topic))
     }
@@ -521,8 +520,8 @@ impl Edge {
         self.crossing.as_ref()?.find(channel, job)
     }
 
-    /// Returns why the wish could not be met, and how a replay differs from its recording, where
-    /// either applies.
+    /// Returns why the requested mode could not be carried out, and how a replay differs from its
+    /// recording, where either applies.
     #[must_use]
     pub fn objections(&self) -> [Option<String>; 2] {
         [self.refusal.clone(), self.complaint.clone()]

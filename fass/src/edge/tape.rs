@@ -99,8 +99,8 @@ impl RunRecorder {
     }
 }
 
-/// Takes a value missing from the places read by the drain. A given value is put there; any other
-/// is lost.
+/// Takes a value missing where the drain reads: puts a given value there, or notes the loss of the
+/// value.
 fn store(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, at_ns: u64) {
     let outbox = given
         .get(usize::from(value.channel))
@@ -192,7 +192,7 @@ struct OfTape {
     lost: LossCounts,
     header: Header,
     releases: ReleaseTimes,
-    /// The begin of the run's time, on the clock. Values are stamped on the clock.
+    /// The start of the run's time, on the clock. Values are stamped on the clock.
     epoch_ns: u64,
 }
 

@@ -22,7 +22,7 @@ use super::line::{ChannelState, TopicEdge, room_for};
 /// and the answer, if there was one in time.
 type FoundAnswer<A> = (u32, u64, Option<A>);
 
-/// A device of any types.
+/// A device, with any types of questions and answers.
 pub(crate) trait AnyDevice: Send + Sync {
     fn name(&self) -> &str;
 

@@ -86,18 +86,18 @@ impl RequestTarget {
     }
 }
 
-/// No wish.
+/// No request.
 const NOTHING: u8 = 0;
-/// The wish to pause a DAG, or to end the run.
+/// The request to pause a DAG, or to end the run.
 pub(crate) const STOP: u8 = 1;
-/// The wish to resume a DAG, or to release a DAG by a signal.
+/// The request to resume a DAG, or to release a DAG by a signal.
 pub(crate) const GO: u8 = 2;
-/// The wish to enter a mode at once.
+/// The request to enter a mode at once.
 pub(crate) const AT_ONCE: u8 = 1;
-/// The wish to enter a mode once the DAGs leaving are idle.
+/// The request to enter a mode once the DAGs leaving are idle.
 pub(crate) const WHEN_IDLE: u8 = 2;
 
-/// A place for the wish of an instance, initially empty; the last wish counts.
+/// A place for the request of an instance, initially empty; the last request counts.
 pub(crate) type Wish = Arc<AtomicU8>;
 
 /// The kind of a request.
@@ -133,7 +133,7 @@ impl Effect for InstanceRequests {
 
     fn mute(&mut self) {
         if let RequestKind::Signal(_) = self.of {
-            // A fresh place unknown to every function, so later wishes have no effect.
+            // A fresh place unknown to every function, so later requests have no effect.
             self.wish = Wish::default();
         }
     }

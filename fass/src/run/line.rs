@@ -1,8 +1,8 @@
 //! The line of a channel: the path of its values across the edge of a DAG, to the platform.
 //!
-//! An instance writes a value into an [outbox](super::cell::outbox) on having it. When the instance
-//! is complete, the platform's reader finds the value there. A platform without a reader is given
-//! the value at once.
+//! An instance writes a value into an [outbox](super::cell::outbox) as soon as it has the value.
+//! When the instance is complete, the platform's reader finds the value there. A platform without a
+//! reader is given the value at once.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -17,7 +17,7 @@ use super::cell::SetOnce;
 use super::effect::Effect;
 use crate::run::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 
-/// The number of a channel without a number.
+/// The number of a channel not numbered yet.
 const NO_CHANNEL: u16 = u16::MAX;
 
 /// The state of a channel, shared by its writer, its publisher and a replay.
@@ -139,7 +139,7 @@ impl ChannelState {
         self.publish_or_give(completed_ns, self.edge.record);
     }
 
-    /// Publishes the value, or gives it to `take` without a reader or room to publish.
+    /// Publishes the value, or gives it to `take` if there is no reader or no room to publish.
     pub(crate) fn publish_or_give(&self, at_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         let is_read = self.is_read.load(Ordering::Relaxed);
         if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
@@ -215,7 +215,7 @@ impl KeptState {
         }
     }
 
-    /// Has the state written down at least every so many jobs.
+    /// Has the state written down at least every `jobs` jobs.
     pub(crate) fn keep_every(&self, jobs: u32) {
         // There may be two requests; the more frequent one serves both.
         self.every.fetch_min(jobs.max(1), Ordering::Relaxed);

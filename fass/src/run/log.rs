@@ -84,7 +84,7 @@ static EMPTIED: AtomicUsize = AtomicUsize::new(0);
 /// The number of lines without room since the last one taken.
 static LEFT_OUT: AtomicU32 = AtomicU32::new(0);
 
-/// Has lines up to this level written from now on, or none.
+/// Enables lines up to this level from now on; `None`: no lines.
 ///
 /// See [`Level`].
 pub fn set_level(most: Option<Level>) {
@@ -131,7 +131,7 @@ pub struct LogLine {
     write: fn(&Part<'static>, &mut Formatter<'_>) -> fmt::Result,
     /// The instance writing the line, if any.
     pub instance: Option<Instance>,
-    /// The time of the line, in ns since the begin of the present run, or of the last run if none
+    /// The time of the line, in ns since the start of the present run, or of the last run if none
     /// goes on.
     pub at_ns: u64,
     /// The number of lines without room since the line taken before.

@@ -132,7 +132,7 @@ impl Plan {
 /// ```
 pub struct SubtaskCode {
     subtask: Box<dyn PolledSubtask>,
-    /// The job in execution, or in which it panicked; otherwise [`NO_JOB`].
+    /// The job in execution, or the job of a panic; otherwise [`NO_JOB`].
     job: u64,
     /// Effects of its completions beyond the DAG.
     effects: Effects,

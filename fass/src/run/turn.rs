@@ -85,7 +85,7 @@ impl WaitFault {
 pub(crate) enum WaitEnd {
     /// The stated limit.
     Limit,
-    /// So many nanoseconds after its begin.
+    /// So many nanoseconds after the start of the wait.
     After(u64),
     /// So many, or the stated limit if that is less.
     AtMost(u64),
@@ -95,9 +95,9 @@ pub(crate) enum WaitEnd {
 
 /// The turn asks for no wait.
 const NONE: u8 = 0;
-/// The turn asks for a wait of so many nanoseconds.
+/// The turn asks for a wait of the stored number of nanoseconds.
 const AFTER: u8 = 1;
-/// The turn asks for a wait until so many nanoseconds after the release.
+/// The turn asks for a wait until the stored number of nanoseconds after the release.
 const SINCE_RELEASE: u8 = 2;
 
 /// Stands for "no job".
@@ -134,7 +134,7 @@ impl TurnState {
         }
     }
 
-    /// Returns an address different from those of other subtasks.
+    /// Returns the address of this state, to identify the subtask.
     pub(crate) fn address(&self) -> usize {
         core::ptr::from_ref(self).addr()
     }

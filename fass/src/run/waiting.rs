@@ -22,7 +22,7 @@ use super::turn::{TurnState, WaitEnd, WaitFault};
 /// A wait, begun by the first poll.
 pub(crate) struct WaitStep {
     end: WaitEnd,
-    /// The address of the turns, the job, and the number of waits including this.
+    /// The address of the turns, the job, and the number of waits including the present wait.
     begun: Option<(usize, u64, u32)>,
     is_over: bool,
 }
@@ -119,8 +119,8 @@ pub async fn sleep(duration: Duration) {
     WaitStep::new(WaitEnd::After(nanoseconds(duration))).await;
 }
 
-/// Waits, in the function of an async subtask, until so much time has passed since the release of
-/// the job; for no time if the instant has passed.
+/// Waits, in the function of an async subtask, until `since_release` has passed since the release
+/// of the job; for no time if it has passed already.
 ///
 /// The limit of the wait must be as long, less the time covered by an earlier `until` of the
 /// instance; when the job started does not matter.

@@ -67,7 +67,7 @@ pub(crate) const fn words_of(bytes: usize) -> usize {
     HEAD + bytes.div_ceil(8)
 }
 
-/// Makes an outbox of so many words; `None`: there is no memory.
+/// Makes an outbox of `count` words; `None`: there is no memory.
 pub(crate) fn outbox(count: usize) -> Option<(Outbox, OutboxReader)> {
     let mut words = Vec::new();
     words.try_reserve_exact(count).ok()?;

@@ -35,7 +35,7 @@ pub(crate) struct Taker<T>(Arc<Places<T>>);
 /// Tells anybody how many places are the taker's.
 pub(crate) struct PlaceLevel<T>(Arc<Places<T>>);
 
-/// Makes places for at least so many values.
+/// Makes places for at least `count` values.
 pub(crate) fn places<T>(
     count: usize,
     value: impl FnMut() -> T,
@@ -59,7 +59,7 @@ impl<T> Places<T> {
 }
 
 impl<T> Putter<T> {
-    /// Returns the place so many behind the shown ones, unless the taker has it.
+    /// Returns the place `ahead` places behind the shown ones, unless the taker has it.
     #[inline]
     pub(crate) fn place(&mut self, ahead: usize) -> Option<&mut T> {
         let places = &*self.0;

@@ -31,7 +31,7 @@ impl Buffer {
     /// The number of bytes before the packet left to the headers of a device.
     pub const HEADROOM: usize = 64;
 
-    /// Makes an empty buffer of at least so many bytes. Allocates.
+    /// Makes an empty buffer of at least `bytes` bytes. Allocates.
     pub fn new(bytes: usize) -> Self {
         Self {
             bytes: alloc::vec![0; bytes.max(Self::LEAST_BYTES)].into(),

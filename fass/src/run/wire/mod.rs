@@ -64,7 +64,7 @@ pub enum Framing {
     Lines,
     /// With this byte, which is not in the packet. Two of them in a row enclose no packet.
     Until(u8),
-    /// After so many bytes.
+    /// After a fixed number of bytes.
     Fixed(usize),
     /// After as many bytes as the two bytes before say, the more significant byte first. A single
     /// wrong length displaces all later packets, so this is only for undisturbed connections.
@@ -148,7 +148,7 @@ struct OpenPacket {
 }
 
 impl WireInput {
-    /// Makes a way in with places for so many packets.
+    /// Makes a way in with places for `count` packets.
     pub(crate) fn new(framing: Framing, longest: usize, count: usize) -> Self {
         let longest = match framing {
             // A fixed length is the longest packet, whatever the options say.
