@@ -1,26 +1,25 @@
-//! The levels of SCHED_FIFO that the program's threads are at, and which thread is at which.
+//! The levels of SCHED_FIFO used by the program's threads.
 //!
 //! | level | threads |
 //! |---|---|
 //! | top | the release thread |
-//! | top - 1 | a worker that reports an end, if it was demoted |
-//! | top - 2 | workers that run what the scheduler wants |
-//! | top - 3 | demoted workers: what they run was preempted |
-//! | none | abandoned workers: what they run has exceeded its budget |
+//! | top - 1 | a worker reporting an end after its demotion |
+//! | top - 2 | workers running the scheduler's choice |
+//! | top - 3 | demoted workers: their instances were preempted |
+//! | none | abandoned workers: their instances have exceeded their budgets |
 //!
-//! Four neighbours, below the 50 at which Linux runs interrupt handlers that are threads. A
-//! policy of `sched_ext` has the same four.
+//! The four levels are neighbours, below the level 50 of Linux's threaded interrupt handlers. Our
+//! `sched_ext` policy has the same four.
 //!
 //! # The policy
 //!
-//! `bpf/seats.bpf.c` is that policy. As this program sees it, it is a table of threads, in which
-//! one
-//! that is higher comes before a lower one on the same processor.
+//! `bpf/seats.bpf.c` contains the policy. For this program, the policy is a table of threads: on
+//! the same processor, a thread with a higher entry goes before a thread with a lower entry.
 //!
-//! It is loaded by a person who may; this program then has it to its own end. Putting a
-//! thread somewhere is a store. It needs no system call, as what follows does for it: a
-//! preemption wakes the worker that takes the core over, and where a demoted one goes on, the
-//! worker that had the core sleeps. Both have Linux ask the policy.
+//! A privileged person loads the policy; then this program owns the policy until the program ends.
+//! A store moves a thread within the order. No system call is necessary, since Linux asks the
+//! policy in the steps that follow anyway: a preemption wakes the worker taking the core over, and
+//! where a demoted worker goes on, the worker that had the core goes to sleep.
 
 use std::fs;
 use std::sync::OnceLock;
@@ -29,31 +28,32 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::sys;
 use crate::sys::ThreadId;
 
-/// Where the levels end, if nobody says otherwise.
+/// The top level, unless set otherwise.
 pub(crate) const USUAL_TOP: i32 = 49;
 
-/// The levels of a run's threads, and what carries them out.
+/// The levels of a run's threads, and the mechanism behind them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Levels {
     /// SCHED_FIFO up to this level.
     Fifo(i32),
-    /// Our policy of sched_ext.
+    /// Our `sched_ext` policy.
     SchedExt(Seats),
 }
 
-/// The role for which a thread has its level, the lower levels first.
+/// The role deciding a thread's level, lowest level first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Role {
-    /// Its instance was ended: it is to delay nobody any more, in no other program either.
+    /// The thread's instance was ended: the thread must not delay anybody any more, not even other
+    /// programs.
     Abandoned,
-    /// It has lost its core.
+    /// The thread has lost its core.
     Demoted,
-    /// It runs what its core should run.
+    /// The thread runs the instance its core should run.
     Run,
-    /// It needs the scheduler's lock at once, whatever its core computes.
+    /// The thread needs the scheduler's lock at once, whatever its core computes.
     Report,
-    /// It releases jobs.
+    /// The thread releases jobs.
     Release,
 }
 
@@ -62,7 +62,7 @@ impl Levels {
     ///
     /// # Errors
     ///
-    /// The kernel's reason, if it does not let us.
+    /// The kernel's reason for refusing.
     pub(crate) fn of_fifo(top: i32) -> std::io::Result<Self> {
         let probe = move || {
             let me = sys::thread();
@@ -77,9 +77,9 @@ impl Levels {
 
     /// Brings a thread to its role's level.
     pub(crate) fn bring(self, thread: ThreadId, role: Role) {
-        // Its place above what has no level.
+        // Its place above the threads without a level.
         let rank = role as u8;
-        // It worked before; a thread that has gone needs no level.
+        // The probe has succeeded before, and a thread that has ended needs no level.
         let _ = match self {
             Self::Fifo(_) if rank == 0 => sys::set_normal(thread),
             Self::Fifo(top) => sys::set_level(thread, top - 4 + i32::from(rank)),
@@ -93,14 +93,14 @@ impl Levels {
 
 /// The policy's name.
 const NAME: &str = "fass_seats";
-/// Where its table is pinned.
+/// The path at which the policy's table is pinned.
 const PLACE: &std::ffi::CStr = c"/sys/fs/bpf/fass_seats";
-/// How many threads it has a word for: no Linux numbers more.
+/// How many threads the table has a byte for: Linux's thread numbers never exceed this.
 const THREADS: usize = 1 << 22;
-/// Linux's name of the numbering of threads that is not a container's.
+/// Linux's name of the host's thread numbering, outside of containers.
 const FIRST_NUMBERING: &str = "pid:[4026531836]";
 
-/// The table, with a byte for each thread and then the number of the program that has it.
+/// The policy's table: a byte for each thread, then the number of the owning program.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seats(&'static [AtomicU32]);
 
@@ -147,7 +147,7 @@ impl Seats {
         Ok(seats)
     }
 
-    /// Makes this program the one with whose end the policy is unloaded.
+    /// Makes this program the owner of the policy. The policy is unloaded when its owner ends.
     fn own(self) -> Result<(), String> {
         let (me, owner) = (std::process::id(), &self.0[Self::OWNER]);
         let taken = owner.compare_exchange(0, me, Ordering::AcqRel, Ordering::Acquire);
@@ -159,20 +159,20 @@ impl Seats {
         }
     }
 
-    /// Puts a thread at a place in the order, 0 being that of all programs.
+    /// Gives a thread a place in the order; 0 is the place of ordinary programs.
     pub(crate) fn put(self, thread: ThreadId, rank: u8) {
         let Ok(number) = usize::try_from(thread.0) else {
             return;
         };
         let (word, shift) = (&self.0[number / 4 % Self::OWNER], number % 4 * 8);
-        // Another thread's byte may be changed at the same time.
+        // Another thread's byte in the same word may be changed at the same time.
         let _ = word.fetch_update(Ordering::AcqRel, Ordering::Relaxed, |word| {
             Some(word & !(0xff << shift) | u32::from(rank) << shift)
         });
     }
 }
 
-/// Looks at what the kernel says of `sched_ext`: its state, and the loaded policy's name.
+/// Checks the kernel's report on `sched_ext`: its state, and the loaded policy's name.
 fn check(state: Option<&str>, policy: Option<&str>) -> Result<(), String> {
     const LOAD: &str = "do load it, as root: `bpftool struct_ops register seats.bpf.o`";
     match (state, policy) {

@@ -1,41 +1,43 @@
-//! Runs DAGs built with `fass` on Linux: the scheduler decides, and the kernel's classes
-//! carry it out.
+//! Runs DAGs built with `fass` on Linux. The scheduler decides, and the kernel's scheduling classes
+//! carry its decisions out.
 //!
-//! For our purposes a *worker* is a thread that runs instances. Each core of the machine
-//! has an *active* worker, pinned to its processor, which calls functions in place: from a
-//! completion that hands its core the next instance the same thread goes on. The *release
-//! thread* sleeps until the scheduler's next event. A worker whose instance loses its core
-//! is *demoted* to a lower level of SCHED_FIFO, and a *spare* one takes its place.
-//! `docs/linux.md` says what to set up, and who may delay what.
+//! A *worker* is a thread running instances. Each core of the machine has one *active* worker,
+//! pinned to the core's processor. The worker calls functions in place: when a completion hands its
+//! core the next instance, the same thread goes on. The *release thread* sleeps until the
+//! scheduler's next event. When an instance loses its core, its worker is *demoted* to a lower
+//! level of SCHED_FIFO, and a *spare* worker takes the core over. `docs/linux.md` lists the setup
+//! steps, and says which thread may delay which other.
 //!
-//! Where the cores are divided all that is so for each cluster by itself: it has a scheduler, a
-//! lock, a release thread that keeps to its processors, workers and a journal.
+//! When the cores are divided into clusters, each cluster has its own scheduler, lock, workers,
+//! journal and release thread. The release thread stays on the cluster's processors.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - R1 to R4 of the task model, whatever Linux does to the threads: they hold by the order
-//!   of what the scheduler is told. [`violations`](sched_dag::engine::Run::violations) checks them.
-//! - R5 as far as Linux runs the threads that it is told to: a decision takes effect when it
-//!   has switched. [`dispatch_violations`](sched_dag::engine::Run::dispatch_violations)
-//!   checks it within a stated bound.
-//! - From the commit on, nothing is allocated for a release, a preemption or a completion;
-//!   a completion that concerns its own core makes no system call but to read clocks.
-//! - No thread holds the scheduler's lock below the level of what computes.
-//! - A panic in a function ends its DAG alone, in a program that unwinds, whatever its destructors
-//!   do.
-//! - No end of the program, however sudden, leaves anything at a raised level.
+//! - R1 to R4 of the task model hold, whatever Linux does to the threads: they depend only on the
+//!   order in which the scheduler hears of events.
+//!   [`violations`](sched_dag::engine::Run::violations) checks them.
+//! - R5 holds as far as Linux runs the threads the scheduler wants: a decision takes effect when
+//!   Linux has switched. [`dispatch_violations`](sched_dag::engine::Run::dispatch_violations)
+//!   checks R5 within a stated bound.
+//! - From the commit on, releases, preemptions and completions allocate nothing. A completion
+//!   concerning only its own core makes no system calls except to read clocks.
+//! - No thread holds the scheduler's lock below the level of the computing threads.
+//! - If the program unwinds, a panic in a function ends only that function's DAG, whatever its
+//!   destructors do.
+//! - However suddenly the program ends, no thread stays at a raised level.
 //!
-//! # What is not
+//! # Limits
 //!
-//! - Anything about the time that Linux itself takes, interrupts included.
-//! - A demoted worker runs on while its core has nothing else, so it may finish what was
-//!   preempted. Were it stopped, it could keep the allocator's lock from all others.
-//! - A function whose budget is exceeded is not ended, only its DAG is: its thread goes
-//!   on, as a normal one, until the function returns.
-//! - An instance that blocks in mid-function (reads a file, locks a mutex) leaves its core to
-//!   what was demoted there, and to other programs; an async one can ask for such a call
-//!   ([`blocking`](fn@blocking)), and wait. So does a non-preemptive one: what was
-//!   demoted there and ends meanwhile is reported when that one has ended, or when it is wanted.
+//! - Nothing is guaranteed about the time Linux itself takes, interrupts included.
+//! - A demoted worker runs on while its core has nothing else to do, so a preempted instance may
+//!   finish. If the worker were stopped, it could keep the allocator's lock from all others.
+//! - When a function exceeds its budget, only its DAG is ended. The function's thread goes on, as a
+//!   normal thread, until the function returns.
+//! - An instance blocking in mid-function (reading a file, locking a mutex) leaves its core to
+//!   workers demoted there, and to other programs. An async instance can ask
+//!   [`blocking`](fn@blocking) to make such a call, and wait. A non-preemptive instance leaves its
+//!   core as well: when an instance demoted there ends meanwhile, the end is reported only after
+//!   the non-preemptive instance has ended, or when the scheduler wants the demoted instance.
 #![deny(unsafe_code)]
 
 mod blocking;

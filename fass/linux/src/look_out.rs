@@ -1,46 +1,49 @@
-//! Which thread looks at the scheduler's next event when it is due.
+//! Decides which thread looks at the scheduler's next event when the event is due.
 //!
-//! A core without work has a thread that sleeps. It sleeps until the next event, and so makes the
-//! step that releases a job on the core where that job mostly begins: the scheduler takes the
-//! core that has become idle last. Were the release thread to do it, two threads would wake up
-//! one after the other. So this *looks out*:
+//! Each core without work has a sleeping thread. That thread sleeps only until the next event, and
+//! then makes the step releasing a job, mostly on the job's future core: the scheduler prefers the
+//! core that became idle last. With the release thread making the step instead, two threads would
+//! wake up one after the other. So several threads *look out*, in this order:
 //!
-//! - the worker of the core that has become idle last, at the event;
-//! - those of the other idle cores a little later, in case the first was taken meanwhile;
-//! - the release thread last, or at the event if no core is idle. Then it preempts.
+//! - the worker of the core that became idle last, at the event;
+//! - the workers of the other idle cores a little later, in case the first worker was taken
+//!   meanwhile;
+//! - the release thread last, or at the event if no core is idle. Then the release thread preempts.
 //!
-//! The first that comes *claims* the event, makes the step, and is the first to be given something.
-//! The others leave the event to it, find none due when it is done, and sleep on, without the
-//! scheduler's lock. Did two come at once, the one that gets the lock would have to wake the other
-//! one before it could begin.
+//! The first thread to come *claims* the event, makes the step, and is the first to get work. The
+//! others leave the event alone, find no due event afterwards, and sleep on without the scheduler's
+//! lock. If two threads came at once, the thread getting the lock would have to wake the other
+//! before the other could begin.
 //!
-//! The release thread is above all that compute, so it should not wake up when a job begins. If no
-//! core is idle it looks a little before the event, too: if one is by then, it sleeps on.
+//! The release thread is above all computing threads, so it should not wake up when a job begins.
+//! If no core is idle, the release thread also looks a little before the event. If a core has
+//! become idle by then, it sleeps on.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use sched_dag::CoreId;
 
-/// How much later than the one before it a thread looks, and for how long others leave an event to
-/// the one that has claimed it.
+/// How much later each thread looks than the thread before it, and how long other threads leave an
+/// event to the thread that has claimed the event.
 const PATIENCE_NS: u64 = 15_000;
 
 /// How long before an event the release thread looks whether a core has become idle.
 const EARLY_NS: u64 = 200_000;
 
-/// State shared by the threads that look out.
+/// State shared by the threads looking out.
 #[derive(Debug)]
 pub(crate) struct LookOut {
-    /// When the scheduler has its next event, on the clock; `u64::MAX`: never, 0: all is over.
+    /// The instant of the scheduler's next event, on the clock; `u64::MAX`: never, 0: the run is
+    /// over.
     next_ns: AtomicU64,
-    /// The idle cores, as bits. No thread looks out for cores beyond them.
+    /// The idle cores, as bits. No thread looks out for cores beyond bit 63.
     idle: AtomicU64,
-    /// The core that has become idle last.
+    /// The core that became idle last.
     last: AtomicU32,
-    /// Until when the next event is left to the thread that has claimed it.
+    /// Until when the next event is left to the thread that has claimed the event.
     claimed_until_ns: AtomicU64,
-    /// Whether idle workers never sleep. Then the release thread is not needed for events: nothing
-    /// is preempted, so one that is due while all cores are busy is seen to by the next end.
+    /// Whether idle workers never sleep. Then events do not need the release thread: nothing is
+    /// preempted, so an event due while all cores are busy is handled at the next completion.
     polls: bool,
 }
 
@@ -55,10 +58,10 @@ impl LookOut {
         }
     }
 
-    /// Says when the next event is. Under the scheduler's lock.
+    /// Publishes the instant of the next event. Called under the scheduler's lock.
     #[inline]
     pub(crate) fn announce(&self, next_ns: u64) {
-        // Where workers poll, the release thread looks at the end alone.
+        // Where workers poll, only the end of the run concerns the release thread.
         match self.polls && next_ns > 0 {
             true => self.next_ns.store(next_ns, Ordering::Release),
             false => self.next_ns.store(next_ns, Ordering::SeqCst),
@@ -66,7 +69,7 @@ impl LookOut {
         self.claimed_until_ns.store(0, Ordering::Release);
     }
 
-    /// Claims the next event, which is due now, and reports whether no other thread has.
+    /// Claims the next event, due now, and reports whether the claim is the first.
     pub(crate) fn claim(&self, now_ns: u64) -> bool {
         let before_ns = self.claimed_until_ns.load(Ordering::Acquire);
         let until_ns = now_ns.saturating_add(PATIENCE_NS);
@@ -78,13 +81,13 @@ impl LookOut {
                 .is_ok()
     }
 
-    /// Returns when the next event is.
+    /// Returns the instant of the next event.
     #[inline]
     pub(crate) fn next_ns(&self) -> u64 {
         self.next_ns.load(Ordering::SeqCst)
     }
 
-    /// Takes note that a core's worker has nothing to do. Under the scheduler's lock.
+    /// Marks a core as idle: its worker has nothing to do. Called under the scheduler's lock.
     pub(crate) fn rest(&self, core: CoreId) {
         if let Some(bit) = bit(core) {
             self.idle.fetch_or(bit, Ordering::Relaxed);
@@ -92,7 +95,7 @@ impl LookOut {
         }
     }
 
-    /// Takes note that it has something to do, or is about to see.
+    /// Marks a core as not idle: its worker has something to do, or is about to see.
     pub(crate) fn leave(&self, core: CoreId) {
         if let Some(bit) = bit(core) {
             self.idle.fetch_and(!bit, Ordering::Relaxed);
@@ -113,7 +116,7 @@ impl LookOut {
         own_ns.max(self.claimed_until_ns.load(Ordering::Acquire))
     }
 
-    /// Returns when the release thread looks at an event, or whether a core has become idle.
+    /// Returns when the release thread looks at an event, or looks whether a core has become idle.
     pub(crate) fn of_release(&self, next_ns: u64, now_ns: u64) -> u64 {
         if self.polls {
             return u64::MAX;
@@ -127,11 +130,11 @@ impl LookOut {
         own_ns.max(self.claimed_until_ns.load(Ordering::Acquire))
     }
 
-    /// Reports whether the release thread, which looks at `looks_at_ns`, would come too late for
-    /// the next event, or longer after it than it ever may.
+    /// Reports whether the release thread, due to look at `looks_at_ns`, would come too late for
+    /// the next event: later than its largest delay after an event.
     #[inline]
     pub(crate) fn is_late(&self, looks_at_ns: &AtomicU64, next_ns: u64) -> bool {
-        // At the end of all it has to look in any case.
+        // At the end of the run the release thread has to look in any case.
         let is_needed = !self.polls || next_ns == 0;
         let latest_ns = next_ns.saturating_add(2 * PATIENCE_NS);
         is_needed && latest_ns < looks_at_ns.load(Ordering::SeqCst)

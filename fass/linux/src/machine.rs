@@ -1,10 +1,10 @@
-//! The machine as an app sees it: so many cores of this computer.
+//! The machine as an app sees it: a number of cores of this computer.
 //!
-//! # Wires on Linux: bytes from whatever can be read, and to whatever can be written
+//! # Wires on Linux: from any readable file, and to any writable one
 //!
-//! Each wire has two threads of no level, which wait where the run's threads never do: one in a
-//! read, one for a millisecond whenever nothing is to go. So bytes may arrive and go late where
-//! the cores are busy, and delay nobody.
+//! Each wire has two threads without a real-time level. They wait where the run's threads never do:
+//! one in a read, the other for a millisecond whenever nothing is to be sent. So bytes may arrive
+//! and leave late while the cores are busy, but delay nobody.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::AsFd;
@@ -29,28 +29,29 @@ use crate::team::{self, with_own_worker};
 use crate::worker::Worker;
 use crate::{clock, sys};
 
-/// How the scheduler's decisions are carried out.
+/// How Linux carries out the scheduler's decisions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mechanism {
-    /// By levels of SCHED_FIFO. An instance that should run comes before all normal programs,
-    /// and is preempted by those that the scheduler puts before it.
+    /// Levels of SCHED_FIFO. An instance chosen to run goes before all normal programs, and more
+    /// urgent instances preempt it.
     Fifo,
-    /// By our policy of `sched_ext`, the paper's way: the same order, put by a store and not
-    /// by a system call. The policy has to be loaded.
+    /// Our `sched_ext` policy, the paper's mechanism. The order is the same as with
+    /// [`Fifo`](Self::Fifo), but a store sets it instead of a system call. The policy has to be
+    /// loaded.
     SchedExt,
-    /// By threads like all others: nothing is preempted, and other programs have their
-    /// share of the cores. It needs no privilege.
+    /// Ordinary threads. Nothing is preempted, and other programs get their share of the cores. No
+    /// privilege is needed.
     Normal,
-    /// As [`Normal`](Self::Normal), by threads that never sleep: an idle core's thread watches for
-    /// work, so that being called takes a cache line and not a wake of the kernel's. It keeps its
-    /// processors busy as long as the run goes on.
+    /// Ordinary threads, as with [`Normal`](Self::Normal), but without sleep: the thread of an idle
+    /// core watches for work. Calling such a thread costs a cache line instead of a wake-up by the
+    /// kernel. The processors stay busy as long as the run goes on.
     Poll,
 }
 
-/// Cores of this computer, for the DAGs that are committed next.
+/// Cores of this computer, for the next commit of DAGs.
 ///
-/// Made with static priorities and preemption; [`with`](Self::with) changes that, before the
-/// commit. A program has one at a time.
+/// A new machine has static priorities and preemption; [`with`](Self::with) changes the settings
+/// before the commit. A program has one machine at a time.
 ///
 /// # Examples
 ///
@@ -78,7 +79,7 @@ pub struct Linux {
     warnings: Vec<String>,
 }
 
-/// Why a machine cannot be had, or has nothing to run: fact, offender, remedy.
+/// Why a machine cannot be had, or has nothing to run: the fact, the offender and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StartError(pub(crate) String);
 
@@ -90,13 +91,13 @@ impl fmt::Display for StartError {
 
 impl std::error::Error for StartError {}
 
-/// Returns the core of the model that the calling thread computes for, counted within its cluster;
-/// `None` outside of functions of a run.
+/// Returns the model's core for the calling thread, counted within its cluster; `None` outside of
+/// functions of a run.
 pub fn own_core() -> Option<u32> {
     with_own_worker(Worker::seat).flatten().map(|core| core.0)
 }
 
-/// Returns the time on the clock, whatever functions are told.
+/// Returns the time on the clock, whatever time functions are told.
 pub fn now_ns() -> u64 {
     clock::now_ns()
 }
@@ -107,16 +108,16 @@ pub fn processors() -> u32 {
 }
 
 impl Linux {
-    /// Takes the first `cores` processors of those that this program may use, and
-    /// checks what will hurt ([`warnings`](Self::warnings)).
+    /// Takes the first `cores` processors available to this program, and checks for settings
+    /// harmful to real time ([`warnings`](Self::warnings)).
     ///
-    /// Where the program may not use SCHED_FIFO, it runs as by [`Mechanism::Normal`], and
-    /// commits answer for that.
+    /// If the program may not use SCHED_FIFO, the machine works as with [`Mechanism::Normal`], and
+    /// commits account for that.
     ///
     /// # Errors
     ///
-    /// If there are fewer processors, or none is asked for; or if `sched_ext` is asked for and
-    /// our policy is not loaded, or another program has it.
+    /// If `cores` is 0 or exceeds the available processors; or if `sched_ext` is requested and our
+    /// policy is not loaded, or belongs to another program.
     ///
     /// # Panics
     ///
@@ -134,15 +135,15 @@ impl Linux {
         Self::on(processors, mechanism)
     }
 
-    /// Takes so many cores, of which several share a processor if there are fewer of those.
+    /// Takes `cores` cores. If there are fewer processors, several cores share each.
     ///
-    /// For what waits and does not compute: a held execution
-    /// ([`Occupation::Hold`](fass::Occupation)) leaves its processor to the others, one that
-    /// computes keeps it from them, whatever the scheduler wants.
+    /// For executions that wait and do not compute. A held execution
+    /// ([`Occupation::Hold`](fass::Occupation)) leaves its processor to the others. A computing
+    /// execution keeps its processor from them, whatever the scheduler wants.
     ///
     /// # Errors
     ///
-    /// If none is asked for, or as [`new`](Self::new) because of the mechanism.
+    /// If `cores` is 0, or if the mechanism is not available, as with [`new`](Self::new).
     ///
     /// # Panics
     ///
@@ -158,7 +159,7 @@ impl Linux {
         }
     }
 
-    /// Makes a machine whose cores are these processors.
+    /// Makes a machine with one core for each entry of `processors`.
     fn on(processors: Vec<u32>, mechanism: Mechanism) -> Result<Self, StartError> {
         let (mut levels, mut found) = (None, Vec::new());
         match mechanism {
@@ -204,8 +205,8 @@ impl Linux {
         HOST.terms()
     }
 
-    /// Changes these. Without SCHED_FIFO or `sched_ext` a started instance never loses its core,
-    /// whatever they say.
+    /// Changes the terms of the commits to come. Without SCHED_FIFO or `sched_ext` a started
+    /// instance never loses its core, whatever the terms say.
     pub fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         if let Some(Threads { terms, levels, .. }) = HOST.threads().as_mut() {
             change(terms);
@@ -247,25 +248,26 @@ impl Linux {
         self
     }
 
-    /// Has the run's time skip what would pass idly: when no core has work, the next event is due
-    /// at once. So jobs follow one another as fast as they go, whatever their periods. For
-    /// measuring; it needs one cluster, or clusters that have no instant in common.
+    /// Makes the run's time skip idle intervals: when no core has work, the next event is due at
+    /// once. So jobs follow one another as fast as possible, whatever their periods. This is for
+    /// measurements, and needs a single cluster, or clusters without common instants.
     #[must_use = "the machine itself is returned"]
     pub fn skipping_idle_time(self) -> Self {
         self.set(|threads| threads.skips_idle = true)
     }
 
-    /// Says how to count what the program has allocated so far, for
-    /// [`allocations`](sched_dag::engine::Run::allocations): in [threads of a run](crate::is_of_run),
-    /// or what other threads allocate meanwhile counts as the jobs'.
+    /// Sets the function counting the program's allocations so far, for
+    /// [`allocations`](sched_dag::engine::Run::allocations). The function should count only in
+    /// [threads of a run](crate::is_of_run); otherwise, allocations of other threads meanwhile
+    /// count as the jobs'.
     #[must_use = "the machine itself is returned"]
     pub fn allocations(self, count: fn() -> u64) -> Self {
         self.set(|threads| threads.allocations = count)
     }
 
-    /// Has the kernel end this program, by SIGKILL, when one of its threads has run at a
-    /// real-time level for so long without ever waiting. For tests, and whenever a
-    /// computer must not be lost to an error.
+    /// Makes the kernel end this program, by SIGKILL, when one of its threads has run at a
+    /// real-time level for `time` without ever waiting. For tests, and wherever an error must not
+    /// make a computer unusable.
     ///
     /// # Errors
     ///
@@ -274,7 +276,7 @@ impl Linux {
         sys::limit_real_time(u64::try_from(time.as_micros()).unwrap_or(u64::MAX))
     }
 
-    /// Returns what will hurt here, a line each: fact and remedy.
+    /// Returns warnings of harmful settings of this computer, a line each: fact and remedy.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
@@ -285,14 +287,14 @@ impl Linux {
         self.terms().scheduler.preemption == Preemption::Enabled
     }
 
-    /// Returns what changes the committed run from any thread; `None` if nothing is
+    /// Returns the handle for changing the committed run from any thread; `None` if nothing is
     /// committed.
     pub fn control(&self) -> Option<Control> {
         control::latest()
     }
 
-    /// Raises a signal whenever something arrives in a file that `poll` can wait for (a
-    /// pipe, a socket, a device), until the run ends. The signal's DAG is to read it.
+    /// Raises a signal whenever input arrives in a file that `poll` can wait for (a pipe, a socket,
+    /// a device), until the run ends. The signal's DAG is expected to read the input.
     ///
     /// # Errors
     ///
@@ -311,8 +313,8 @@ impl Linux {
         control.raise_on_input(dag, sys::Arrivals::of(file)?)
     }
 
-    /// Runs the committed DAGs until each has ended all its jobs. Releases count from when
-    /// all threads are ready.
+    /// Runs the committed DAGs until each has ended all its jobs. Releases count from the instant
+    /// at which all threads are ready.
     ///
     /// # Errors
     ///
@@ -325,8 +327,8 @@ impl Linux {
         self.run_when(None)
     }
 
-    /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on the clock of
-    /// [`fass::now_ns`]. If that is past when the threads are ready, releases are late.
+    /// Works like [`run`](Self::run), but counts releases from `epoch_ns` on the clock of
+    /// [`fass::now_ns`]. If `epoch_ns` has passed before the threads are ready, releases are late.
     ///
     /// # Errors
     ///
@@ -352,12 +354,12 @@ impl Drop for Linux {
     }
 }
 
-/// How much may wait to be sent.
+/// The most bytes waiting to be sent.
 const ROOM_BYTES: usize = 8 << 20;
 
 impl Linux {
-    /// Keeps a record of the commits and runs to come, with the values that are recorded, by the
-    /// name of an app. The file grows while a run goes on.
+    /// Keeps a record of the commits and runs to come, with recorded values, under the name of an
+    /// app. The file grows while a run goes on.
     ///
     /// ```no_run
     /// use std::fs::File;
@@ -380,7 +382,7 @@ impl Linux {
         edge::get().set_wish(wish);
     }
 
-    /// Keeps a record without values, each run of it when that is over.
+    /// Keeps a record without values, and adds each run when that run is over.
     ///
     /// See [`keep`](Self::keep).
     pub fn keep_events(&self, to: impl Write + Send + 'static) {
@@ -397,14 +399,15 @@ impl Linux {
         }
     }
 
-    /// Has the run to come replay a recording, which may begin with this job of a DAG, or before.
+    /// Makes the next run replay a recording. The replay may begin at the given job of a DAG, or
+    /// earlier.
     pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
         let bytes = recording;
         edge::get().set_wish(EdgeMode::Replay { bytes, from });
     }
 
-    /// Writes the rest of what a run has recorded. Returns what a replay has found, and how
-    /// complete the recording is. `is_over`: the run has not been ended before its time.
+    /// Writes the rest of a run's recording. Returns the outcome of a replay, and how complete the
+    /// recording is. `is_over` says that the run has not been ended before its time.
     ///
     /// See [`keep`](Self::keep).
     pub fn end_recording(&self, is_over: bool) -> (Option<ReplayOutcome>, Option<RecordingState>) {
@@ -418,7 +421,7 @@ impl Linux {
     ///
     /// # Errors
     ///
-    /// Why it could not be written.
+    /// Why the file could not be written.
     ///
     /// See [`keep`](Self::keep).
     pub fn end_record() -> io::Result<()> {
@@ -431,7 +434,7 @@ impl Linux {
     }
 }
 
-/// Says that SCHED_FIFO is refused, and what that means.
+/// Warns that SCHED_FIFO is refused, and names the consequences.
 fn no_privilege(top: i32, why: &io::Error) -> String {
     format!(
         "SCHED_FIFO is refused ({why}), so nothing is preempted, and other programs share the \
@@ -440,8 +443,8 @@ fn no_privilege(top: i32, why: &io::Error) -> String {
     )
 }
 
-/// Looks at the kernel's settings, those for real-time classes among them if these are used, and
-/// locks the memory.
+/// Checks the kernel's settings, including those of real-time classes if the run uses such a class,
+/// and locks the memory.
 pub(crate) fn look(processors: &[u32], is_real_time: bool) -> Vec<String> {
     let mut found = Vec::new();
     let setting = |name: &str| {
@@ -487,10 +490,10 @@ fn read(name: &str) -> Option<String> {
     Some(text.trim().to_owned())
 }
 
-/// The time between two looks for bytes that are to go.
+/// The time between two looks for bytes to send.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// A wire that is connected, until this is dropped, which sends what is left to go.
+/// A connected wire. Dropping the connection sends the remaining bytes and ends it.
 ///
 /// See [`Linux::connect`].
 #[derive(Debug)]
@@ -500,8 +503,8 @@ pub struct Connection {
 }
 
 impl Linux {
-    /// Connects a wire: what is read from `input` arrives, until its end, and what is sent goes
-    /// to `output`, as long as that takes it. To be called after the commit and once a wire.
+    /// Connects a wire: bytes read from `input` arrive, until its end, and sent bytes go to
+    /// `output`, until `output` fails. To be called after the commit and once a wire.
     ///
     /// ```
     /// use std::time::Duration;
@@ -541,7 +544,7 @@ impl Linux {
             has_ended,
             writer: Some(writer),
         };
-        // It may stand in a read for ever, and so nobody waits for it.
+        // A read may block for ever, so nobody waits for this thread.
         thread::Builder::new().spawn(move || receive(&end, input, &ended))?;
         Ok(connection)
     }
@@ -557,7 +560,7 @@ pub(crate) fn end_of(wire: &Wire) -> io::Result<DeviceEnd> {
     DeviceEnd::of(wire).ok_or_else(why)
 }
 
-/// Lets arrive what can be read.
+/// Reads input and lets the bytes arrive.
 fn receive(wire: &DeviceEnd, mut input: impl Read, has_ended: &AtomicBool) {
     let mut bytes = [0; 4096];
     while !has_ended.load(Ordering::Relaxed) {
@@ -573,7 +576,7 @@ fn receive(wire: &DeviceEnd, mut input: impl Read, has_ended: &AtomicBool) {
     }
 }
 
-/// Writes what is to go, and ends when nothing is left.
+/// Writes bytes waiting to be sent. Once the connection has ended, returns when none is left.
 fn send(wire: &DeviceEnd, mut output: impl Write, has_ended: &AtomicBool) {
     let mut bytes = Vec::new();
     loop {
@@ -591,7 +594,7 @@ fn send(wire: &DeviceEnd, mut output: impl Write, has_ended: &AtomicBool) {
             .and_then(|()| output.flush())
             .is_err()
         {
-            // What is sent from now on finds no room in the end, and is counted.
+            // From now on, sent bytes find no room in the device's end, and are counted.
             return;
         }
         bytes.clear();
@@ -601,7 +604,7 @@ fn send(wire: &DeviceEnd, mut output: impl Write, has_ended: &AtomicBool) {
 impl Drop for Connection {
     fn drop(&mut self) {
         self.has_ended.store(true, Ordering::Release);
-        // A panic in a writer of the app's own is told on its thread.
+        // A panic in the app's own writer is reported on the writer's thread.
         let _ = self.writer.take().map(JoinHandle::join);
     }
 }

@@ -1,17 +1,19 @@
-//! State shared by the clusters of a run: where each is asked for something, and the end.
+//! State shared by the clusters of a run: mailboxes for requests between clusters, and the end of
+//! the run.
 //!
-//! A run whose cores are not divided is one cluster. Each has a [`Team`](crate::team::Team) of
-//! its own: a scheduler under a lock, workers, a release thread. A request to another cluster is
-//! left here, and its release thread is *rung* for; so nobody waits for another cluster's
-//! lock.
+//! A run with undivided cores is one cluster. Each cluster has a [`Team`](crate::team::Team) of its
+//! own: a scheduler under a lock, workers and a release thread. A request to another cluster is
+//! left here as a letter, and the other cluster's release thread is *rung* for. So nobody waits for
+//! another cluster's lock.
 //!
 //! # The end
 //!
-//! A cluster whose DAGs are over *rests*, and a signal may set it going again. The run is over when
-//! all of them rest and no letter is on its way. Both are one count, of *reasons to go on*: each
-//! letter adds to it as a cluster that does not rest. It is there before it is counted, as its writer
-//! may be a thread from outside, which may lose its processor at any instruction. So a step that
-//! another letter has opened may serve it earlier; a step opens only letters that are counted.
+//! A cluster *rests* when its DAGs are over; a signal may set a resting cluster going again. The
+//! run is over when all clusters rest and no letter is on its way. One count of *reasons to go on*
+//! covers both conditions: each letter adds one, and so does each cluster that does not rest. A
+//! letter is delivered before being counted, since the writer may be a thread from outside, losing
+//! its processor at any instruction. So a step opened by another letter may serve the new letter
+//! early. A step opens only counted letters.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -22,34 +24,34 @@ use sched_dag::{ClusterId, DagId, TaskSet};
 use crate::level::Levels;
 use crate::sys;
 
-/// State shared by all threads of a run, of whatever cluster.
+/// State shared by all threads of a run, in all clusters.
 #[derive(Debug)]
 pub(crate) struct Office {
-    /// The number of the plan that runs.
+    /// The number of the running plan.
     pub(crate) plan: u64,
     pub(crate) levels: Option<Levels>,
     pub(crate) task_set: Arc<TaskSet>,
     pub(crate) letters: Mailboxes,
     doors: Box<[Door]>,
-    /// How many clusters do not rest, and how many have letters.
+    /// How many clusters do not rest, plus how many letters are counted and not settled.
     reasons: AtomicU64,
     /// 1 when all jobs have ended.
     over: AtomicU32,
 }
 
-/// Where the others ring for a cluster's release thread. In two cache lines of its own, since
-/// processors fetch them in pairs.
+/// The place where other threads ring for a cluster's release thread. Aligned to two cache lines,
+/// since processors fetch lines in pairs.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct Door {
-    /// Changes whenever that is to look at once.
+    /// Changes whenever the release thread should look at once.
     alarm: AtomicU32,
     /// How many letters may be there.
     letters: AtomicU64,
 }
 
 impl Office {
-    /// Makes it for the clusters of a plan, none of which rests.
+    /// Makes the office for the clusters of a plan, none of them resting.
     pub(crate) fn new(
         plan: u64,
         task_set: &Arc<TaskSet>,
@@ -68,7 +70,7 @@ impl Office {
         }
     }
 
-    /// Returns the word that changes whenever a cluster's release thread is to look at once.
+    /// Returns the word changed whenever a cluster's release thread should look at once.
     pub(crate) fn alarm(&self, cluster: ClusterId) -> &AtomicU32 {
         &self.doors[cluster.index()].alarm
     }
@@ -87,9 +89,10 @@ impl Office {
         }
     }
 
-    /// Sends a request to the clusters that it concerns, other than the one whose functions ask, if
-    /// any do, and reports whether it does not concern that one. A thread from outside may be of
-    /// any level, so it must not take a scheduler's lock: it would lose its core with it.
+    /// Sends a request to the clusters concerned, except to `from`, the cluster of the asking
+    /// function. Reports whether `from` is not concerned; `from` is `None` for a thread from
+    /// outside. An outside thread may have any level, so it must not take a scheduler's lock: it
+    /// could lose its core while holding the lock.
     pub(crate) fn send(&self, from: Option<ClusterId>, request: Request) -> bool {
         self.letters.send(from, request, |cluster| {
             self.reasons.fetch_add(1, Ordering::AcqRel);
@@ -99,8 +102,8 @@ impl Office {
         })
     }
 
-    /// Returns how many letters a step of a cluster is to take: so many reasons less to go on once
-    /// they are taken.
+    /// Returns how many letters a step of a cluster has to take. Taking the letters removes as many
+    /// reasons to go on.
     pub(crate) fn open(&self, cluster: ClusterId) -> u64 {
         let letters = &self.doors[cluster.index()].letters;
         match letters.load(Ordering::Relaxed) {
@@ -114,8 +117,8 @@ impl Office {
         self.doors[cluster.index()].letters.load(Ordering::Relaxed) > 0
     }
 
-    /// Takes note, after a step of a cluster's release thread, of how many letters were taken, and of
-    /// whether all its DAGs are over. Reports whether the run is.
+    /// Accounts for a step of a cluster's release thread: how many letters the step took, and
+    /// whether all the cluster's DAGs are over. Reports whether the run is over.
     pub(crate) fn settle(&self, rests: &mut bool, is_finished: bool, opened: u64) -> bool {
         let mut lost = opened;
         match (*rests, is_finished) {
