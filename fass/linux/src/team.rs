@@ -1,16 +1,16 @@
-//! The workers of a cluster, and how one goes from an instance to the next.
+//! The workers of a cluster, and a worker's way from one instance to the next.
 //!
-//! A worker calls functions in place: from a completion that hands its core the next
-//! instance, the same thread goes on, without a switch, a wake or an allocation.
+//! A worker calls functions in place: after a completion that hands the core its next instance, the
+//! same thread goes on without a switch, a wake-up or an allocation.
 //!
 //! # The release thread
 //!
-//! It is the clock of the scheduler; each cluster has one, on its own processors. It sleeps until
-//! the scheduler's next event, at an absolute time, so that releases keep
-//! to the nominal grid whatever one of them was late by. Idle workers are to be there first
-//! (`look_out`); where all cores are busy it comes in time, and preempts. Others wake it earlier
-//! with a request, or if the next event has become an earlier one. It makes the step and calls
-//! the workers; it runs nothing itself.
+//! The release thread is the clock of the scheduler. Each cluster has one, on its own processors.
+//! The thread sleeps until the scheduler's next event, at an absolute time, so releases keep to the
+//! nominal grid however late one of them was. Idle workers should come first (`look_out`). If all
+//! cores are busy, the release thread comes in time, and preempts. Other threads wake it earlier
+//! with a request, or if the next event has moved forward. The release thread makes the step and
+//! calls the workers, but runs no instances.
 
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
@@ -31,13 +31,13 @@ use crate::worker::{self, Lead, Worker};
 use crate::{clock, edge, panics, section, sys};
 
 thread_local! {
-    /// The run and the number of the worker that this thread is.
+    /// The team and the number of the worker on this thread.
     static OWN: RefCell<Option<(Arc<Team>, Number)>> = const { RefCell::new(None) };
-    /// Whether it is a thread of a run. Without a destructor, so that an allocator may look.
+    /// Whether this thread belongs to a run. Has no destructor, so an allocator may look.
     static IS_OF_RUN: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Reports whether the calling thread is one that releases or runs jobs, for an allocator that
+/// Reports whether the calling thread releases or runs jobs, for an allocator that
 /// [counts](crate::Linux::allocations).
 ///
 /// ```
@@ -48,36 +48,37 @@ pub fn is_of_run() -> bool {
     IS_OF_RUN.get()
 }
 
-/// Calls a function with the worker that the calling thread is; `None` if it is none.
+/// Calls a function with the calling thread's worker; returns `None` if the thread is no worker.
 pub(crate) fn with_own_worker<R>(look: impl FnOnce(&Worker) -> R) -> Option<R> {
     OWN.with_borrow(|own| own.as_ref().map(|(team, me)| look(&team.workers[*me])))
 }
 
-/// Returns the number of the plan whose instances the calling thread runs, if it is a worker.
+/// Returns the number of the plan whose instances the calling thread runs, if the thread is a
+/// worker.
 pub(crate) fn own_plan() -> Option<u64> {
     OWN.with_borrow(|own| own.as_ref().map(|(team, _)| team.office.plan))
 }
 
-/// Reports whether the calling thread may call the app's code: not one that decides, or holds the
-/// scheduler's lock.
+/// Reports whether the calling thread may call the app's code. A thread that decides, or holds the
+/// scheduler's lock, must not.
 pub(crate) fn may_call_app() -> bool {
     !is_of_run() || edge::running().is_some()
 }
 
-/// Ends the instance that the calling thread runs, which can neither return nor unwind, and reports
-/// whether there is one. The thread is to do nothing any more.
+/// Ends the calling thread's instance, which can neither return nor unwind, and reports whether
+/// there is one. The thread must not do anything afterwards.
 pub(crate) fn strand(cause: &str) -> bool {
     let own = OWN.with_borrow(Clone::clone);
     let instance = edge::running();
     own.zip(instance).is_some_and(|((team, me), instance)| {
-        // It takes the lock, so it may call nothing of the app's.
+        // The thread is about to take the lock, so it must not call the app's code any more.
         edge::note_running(None);
         team.strand(me, instance, cause);
         true
     })
 }
 
-/// All that the threads of a cluster share.
+/// The state shared by the threads of a cluster.
 pub(crate) struct Team {
     state: Lock<State>,
     pub(crate) workers: Box<[Worker]>,
@@ -89,23 +90,24 @@ pub(crate) struct Team {
     pub(crate) cluster: ClusterId,
     pub(crate) office: Arc<Office>,
     pub(crate) look_out: LookOut,
-    /// When the release thread looks of its own accord.
+    /// The instant at which the release thread looks of its own accord.
     pub(crate) looks_at_ns: AtomicU64,
     /// How many threads have begun.
     begun: AtomicU32,
-    /// By vertex, what its instance has taken; of no vertex if no subtask waits.
+    /// By vertex, the processor time of its instance; empty if no subtask waits.
     pub(crate) turns: Box<[TurnClock]>,
 }
 
-/// The processor time of an instance that waits.
+/// The processor time of an instance of a waiting subtask.
 pub(crate) struct TurnClock {
-    /// How much those of its turns have taken that are over.
+    /// The processor time of its completed turns.
     pub(crate) taken_ns: AtomicU64,
     budget_ns: u64,
 }
 
 impl TurnClock {
-    /// Makes one for each vertex, if any may wait, with its budget, or so many of its WCETs.
+    /// Makes a clock for each vertex, if any subtask waits. The limit is the subtask's budget, or
+    /// `wcets` times its WCET.
     fn all(task_set: &TaskSet, wcets: u64) -> Box<[Self]> {
         let subtasks = || task_set.dags().iter().flat_map(|dag| dag.subtasks());
         if subtasks().all(|subtask| subtask.waits().is_empty()) {
@@ -120,7 +122,8 @@ impl TurnClock {
 }
 
 impl Team {
-    /// Makes it; idle threads poll, and the run's time skips what would pass idly, or not.
+    /// Makes the team. Two flags say whether idle threads poll, and whether the run's time skips
+    /// idle intervals.
     pub(crate) fn new(
         mut state: State,
         office: &Arc<Office>,
@@ -154,7 +157,7 @@ impl Team {
         self.state.enter()
     }
 
-    /// Takes it, as a worker.
+    /// Takes the scheduler's lock, as a worker.
     #[inline]
     fn lock_as(&self, me: Number) -> Guard<'_, State> {
         match me {
@@ -163,13 +166,13 @@ impl Team {
         }
     }
 
-    /// Says that a thread is ready for the run.
+    /// Counts the calling thread as ready for the run.
     pub(crate) fn say_ready(&self) {
         self.begun.fetch_add(1, Ordering::Release);
         sys::wake(&self.begun, i32::MAX);
     }
 
-    /// Waits until so many threads are.
+    /// Waits until so many threads are ready.
     pub(crate) fn wait_until_ready(&self, threads: usize) {
         loop {
             let begun = self.begun.load(Ordering::Acquire);
@@ -180,9 +183,9 @@ impl Team {
         }
     }
 
-    /// Has the run's time begin at an instant, for which the workers look out from now on. Called by
-    /// none but the thread that starts the run: the release thread may come later than that instant,
-    /// and where idle workers watch, none but they see to events.
+    /// Begins the run's time at an instant, and from now on lets the workers look out for that
+    /// instant. Only the thread starting the run calls this: the release thread may come later than
+    /// the instant, and where idle workers watch, only workers handle events.
     pub(crate) fn begin(&self, epoch_ns: u64) {
         let mut state = self.lock();
         state.port.time = RunTime::beginning(epoch_ns);
@@ -233,7 +236,7 @@ impl Team {
                 Woken::ByTime => {
                     let mut state = self.lock_as(me);
                     let core = state.seats[me];
-                    // The others' workers may still sleep.
+                    // The other cores' workers may still sleep.
                     state.step(&self.workers, |moment| {
                         core.into_iter().for_each(|core| moment.prefer(core));
                     });
@@ -249,7 +252,7 @@ impl Team {
         }
     }
 
-    /// Sleeps until there is something to do: work, or, on behalf of its core, an event.
+    /// Sleeps until there is something to do: work or, on behalf of the worker's core, an event.
     fn wait(&self, me: Number, lead: &mut Lead) -> Woken {
         let (worker, core) = (&self.workers[me], self.workers[me].seat());
         let woken = loop {
@@ -267,7 +270,7 @@ impl Team {
             if was_called {
                 break Woken::ByCall;
             }
-            // The event may have been seen to, or another one is to look first.
+            // The event may have been handled, or another thread looks first.
             let next_ns = self.look_out.next_ns();
             let own_ns = core.map_or(u64::MAX, |core| self.look_out.of_worker(core, next_ns));
             let now_ns = clock::now_ns();
@@ -281,8 +284,8 @@ impl Team {
         woken
     }
 
-    /// Calls one function after the other, as long as the scheduler has one; a panic ends that, and
-    /// the instance. Catching it takes its time, so all are called from one place that does.
+    /// Calls functions one after the other, as long as the scheduler has one. A panic ends the loop
+    /// and the instance. Catching panics costs time, so a single catch surrounds all the calls.
     fn run_on(&self, me: Number, next: &mut Option<Box<SubtaskRunner>>) -> Result<(), Abandoned> {
         let message = match panics::caught(|| self.run_all(me, next)) {
             Ok(done) => return done,
@@ -290,7 +293,7 @@ impl Team {
         };
         edge::note_running(None);
         match next.take() {
-            // It was not in a function.
+            // The panic did not come from a function of an instance.
             None => std::panic::resume_unwind(Box::new(message)),
             Some(runner) => {
                 *next = self.complete(me, runner, Err(FaultCause::Panic(message)))?;
@@ -299,7 +302,7 @@ impl Team {
         }
     }
 
-    /// Calls the functions. A runner stays with the caller until its function has returned.
+    /// Calls the functions. The caller keeps each runner until the runner's function has returned.
     #[inline]
     fn run_all(&self, me: Number, next: &mut Option<Box<SubtaskRunner>>) -> Result<(), Abandoned> {
         while let Some(runner) = next {
@@ -321,7 +324,7 @@ impl Team {
         Ok(())
     }
 
-    /// Runs a turn of an instance, and adds what it takes to what the others have taken.
+    /// Runs a turn of an instance, and adds the turn's processor time to the time of earlier turns.
     fn take_turn(runner: &mut SubtaskRunner, clock: &TurnClock) -> Result<(), FaultCause> {
         let goes_on = runner.body.goes_on(runner.instance.job);
         let before_ns = clock.taken_ns.load(Ordering::Relaxed);
@@ -337,8 +340,8 @@ impl Team {
         }
     }
 
-    /// Reports that a worker's instance has finished, where none is ever demoted, and finds what it
-    /// does next.
+    /// Reports that a worker's instance has finished, where workers are never demoted, and finds
+    /// the worker's next instance.
     #[inline(always)]
     fn pass_on(&self, me: Number, runner: Box<SubtaskRunner>) -> Option<Box<SubtaskRunner>> {
         let finish_ns = clock::now_ns();
@@ -356,7 +359,7 @@ impl Team {
         }
     }
 
-    /// Reports that a worker's instance has ended, and finds what it does next.
+    /// Reports that a worker's instance has ended, and finds the worker's next instance.
     pub(crate) fn complete(
         &self,
         me: Number,
@@ -368,7 +371,7 @@ impl Team {
         let is_raised = workers[me].report(self.levels);
         let mut state = self.lock_as(me);
         if is_raised {
-            // It has its core until it waits: nobody at its level preempts it.
+            // The worker keeps its core until it waits: nobody at its level preempts it.
             workers[me].bring(self.levels, Role::Run);
         }
         if state.abandoned.contains(&me) {
@@ -386,7 +389,8 @@ impl Team {
         Ok(self.report(me, state, runner, outcome, finish_ns))
     }
 
-    /// Tells the scheduler of the end of a worker's instance, and finds what it does next.
+    /// Tells the scheduler that a worker's instance has ended, and finds the worker's next
+    /// instance.
     pub(crate) fn report(
         &self,
         me: Number,
@@ -423,7 +427,7 @@ impl Team {
         self.go_on(me, state, now_ns)
     }
 
-    /// Finds what a worker does after the end of its core's instance.
+    /// Finds a worker's next instance after the end of its core's instance.
     fn after_end(
         &self,
         (core, me): (CoreId, Number),
@@ -451,7 +455,7 @@ impl Team {
         self.go_on(me, state, end_ns)
     }
 
-    /// Ends a worker's step at an instant: finds what it does next, and calls others.
+    /// Ends a worker's step at an instant: finds the worker's next instance, and calls others.
     fn go_on(
         &self,
         me: Number,
@@ -475,7 +479,7 @@ impl Team {
         next
     }
 
-    /// Takes note of where a worker sits, and that it looks out there if it has no work.
+    /// Notes a worker's core. Without work, the worker looks out for that core.
     fn settle(&self, me: Number, state: &State, has_work: bool) {
         let seat = state.seats[me];
         self.workers[me].sit(seat);
@@ -484,8 +488,8 @@ impl Team {
         }
     }
 
-    /// Gives the lock back, and makes the workers of all cores that should run something
-    /// look for it.
+    /// Gives the lock back, and makes the workers of all cores that should run something look for
+    /// work.
     pub(crate) fn call<'a>(&'a self, mut state: Guard<'a, State>) {
         if self.polls && !state.calls_none() {
             state.give(&self.workers);
@@ -515,7 +519,7 @@ impl Team {
         }
     }
 
-    /// Sees to it that the release thread looks in time.
+    /// Makes sure that the release thread looks in time.
     #[inline]
     pub(crate) fn announce(&self, state: &State) {
         let next_ns = match state.engine.scheduler.next_event_ns() {
@@ -526,7 +530,7 @@ impl Team {
         self.announce_at(next_ns);
     }
 
-    /// Sees to it that the release thread looks in time for an event then.
+    /// Makes sure that the release thread looks in time for an event at `next_ns`.
     #[inline]
     pub(crate) fn announce_at(&self, next_ns: u64) {
         self.look_out.announce(next_ns);
@@ -537,11 +541,11 @@ impl Team {
     }
 }
 
-/// Why a worker does not sleep any more.
+/// Why a worker has stopped sleeping.
 enum Woken {
-    /// An instance was started for it.
+    /// An instance was started for the worker.
     WithWork(Box<SubtaskRunner>),
-    /// Its core may have work.
+    /// The worker's core may have work.
     ByCall,
     /// An event is due.
     ByTime,
@@ -549,13 +553,14 @@ enum Woken {
     ToEnd,
 }
 
-/// The worker that owns the scheduler's lock, where it can have an owner: that of the first core.
+/// The worker owning the scheduler's lock, where the lock can have an owner: the worker of the
+/// first core.
 const OWNER: Number = 0;
 
-/// The most workers that are called before the lock is taken once more.
+/// The most workers called before the lock is taken again.
 const AT_ONCE: usize = 16;
 
-/// The worker's instance was ended while it ran.
+/// The worker's instance was ended while running.
 pub(crate) struct Abandoned;
 
 impl Team {
@@ -564,7 +569,7 @@ impl Team {
         IS_OF_RUN.set(true);
         sys::make_timers_exact();
         if self.lock().engine.task_set.is_divided() {
-            // Were it woken on another cluster's processor, that would wait for it.
+            // If this thread were woken on another cluster's processor, that cluster would wait.
             let _ = sys::confine(sys::thread(), &self.lock().processors);
         }
         if let Some(levels) = self.levels {
@@ -585,8 +590,8 @@ impl Team {
         }
     }
 
-    /// Sleeps until it is rung for, or an event or the look at budgets is due. An event that a
-    /// worker has seen to is none.
+    /// Sleeps until another thread rings, or until an event or the look at budgets is due. An event
+    /// already handled by a worker does not count.
     fn sleep(&self, seen: u32, budgets_ns: u64) {
         let alarm = self.office.alarm(self.cluster);
         while alarm.load(Ordering::Acquire) == seen {
@@ -603,8 +608,9 @@ impl Team {
         }
     }
 
-    /// Settles when it looks next. A thread that makes the next event an earlier one writes that
-    /// first and then reads when we look; we do it the other way round, so one of us sees the other.
+    /// Settles when the release thread looks next. A thread moving the next event forward first
+    /// writes the event and then reads our look; we first write our look and then read the event.
+    /// So one of the two threads sees the other's write.
     pub(crate) fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {
             let next_ns = self.look_out.next_ns();
@@ -625,7 +631,7 @@ impl Team {
         rests: &mut bool,
     ) -> Option<u64> {
         if clock::now_ns() < state.port.time.epoch_ns {
-            // What is asked for before time 0 is done then.
+            // Requests made before time 0 are carried out at time 0.
             return Some(state.port.time.epoch_ns);
         }
         state.step(&self.workers, |_| ());
@@ -644,7 +650,7 @@ impl Team {
         let opened = std::mem::take(&mut state.port.opened);
         if !self.office.settle(rests, is_finished, opened) {
             if is_finished {
-                // This one rests.
+                // This cluster rests.
                 self.look_out.announce(u64::MAX);
             }
             return Some(look_ns);
@@ -653,8 +659,9 @@ impl Team {
         None
     }
 
-    /// Ends the instance of a worker whose thread goes on with nothing, and with it its DAG. Another
-    /// thread begins if need be; were the system to have none, the program would end by this panic.
+    /// Ends the instance of a worker whose thread has nothing more to do, and with the instance its
+    /// DAG. If necessary another thread begins; if the system has no thread left, the panic here
+    /// ends the program.
     fn strand(self: &Arc<Self>, me: Number, instance: Instance, cause: &str) {
         let workers = &self.workers;
         workers[me].report(self.levels);
@@ -674,23 +681,23 @@ impl Team {
         workers[me].bring(self.levels, Role::Abandoned);
     }
 
-    /// Ends a core's instance, which has exceeded its budget, and with it its DAG: its function
+    /// Ends a core's instance for exceeding its budget, and with the instance its DAG: its function
     /// cannot be taken back.
     pub(crate) fn abandon(&self, state: &mut Guard<'_, State>, core: CoreId) {
         let number = state.port.active[core.index()];
         let Some(vertex) = state.engine.placement.current(core.index()) else {
             return;
         };
-        // If it has just ended, it was in time after all.
+        // An instance that has just ended was in time after all.
         if !self.workers[number].demote(self.levels, Role::Abandoned) {
             return;
         }
         self.give_up(state, number, vertex, FaultCause::Overrun);
     }
 
-    /// Ends the instance of a worker that is never given another one. If it has a core, a spare
-    /// worker gets that, and is called, so that it knows: where idle workers watch, one that does not
-    /// know of its core would sleep, and none but workers see to events.
+    /// Ends the instance of a worker that never gets another one. If the worker has a core, a spare
+    /// worker takes the core and is called, so as to learn of the core. Where idle workers watch, a
+    /// worker unaware of its core would sleep, and only workers handle events.
     fn give_up(
         &self,
         state: &mut Guard<'_, State>,

@@ -1,25 +1,26 @@
-//! A thread that runs instances, as the others see it: its mode, and what it sleeps on.
+//! A thread running instances, as seen by other threads: its mode, and the words on which it
+//! sleeps.
 //!
-//! A worker that is preempted is *demoted*, never stopped: when its core has nothing more
-//! urgent it runs on, so a lock that it holds (the allocator's, an output stream's) is
-//! given back, and nobody waits for it forever.
+//! A preempted worker is *demoted*, never stopped. When its core has nothing more urgent, the
+//! worker runs on, so it gives back any locks it holds (the allocator's, an output stream's), and
+//! nobody waits for such a lock forever.
 //!
 //! # Demoted workers and the scheduler's lock
 //!
-//! A worker that is at a low level must not hold the scheduler's lock: its core would
-//! compute something more urgent, and all others wait. So no demoted worker takes it:
-//! one that has finished first says so in its mode. If it was demoted before, it
-//! raises itself above all that compute. If it is to be demoted just then, by the
-//! lock's owner, that one sees the mode and lets it be. The two may cross; then the owner
-//! raises it again, before it gives the lock back. On the way of an instance that is not
-//! preempted all that is one exchange of a word.
+//! A worker at a low level must not hold the scheduler's lock: its core would compute something
+//! more urgent, while all other threads wait. So no demoted worker takes the lock. A worker whose
+//! instance has finished first records the end in its mode. If it was demoted before, it raises
+//! itself above all computing threads. If the lock's owner is about to demote the worker just then,
+//! the owner sees the mode and leaves the worker alone. The two steps may cross; then the owner
+//! raises the worker again, before giving the lock back. For an instance that is not preempted, the
+//! whole protocol costs one exchange of a word.
 //!
 //! # Waking up in time
 //!
-//! From a timer's interrupt to the thread that waits for it Linux takes some tens of
-//! microseconds, in a virtual machine more, and most of it is the same each time. A thread that
-//! has nothing else to do can have it pass before the instant: it wakes up a little early, and
-//! watches the clock for the rest.
+//! Between a timer's interrupt and the waiting thread's first instruction, Linux takes some tens of
+//! microseconds, and more in a virtual machine. Most of this delay is the same each time. A thread
+//! without other work can let the delay pass before the instant: the thread wakes up a little
+//! early, and watches the clock for the rest.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -32,35 +33,36 @@ use crate::level::{Levels, Role};
 use crate::sys::ThreadId;
 use crate::{clock, section, sys};
 
-/// It runs no instance: it waits, or has the scheduler's lock, or is about to take it. Where none is
-/// ever demoted, always.
+/// The worker runs no instance: it waits, has the scheduler's lock, or is about to take the lock.
+/// Where workers are never demoted, the mode is always this.
 const REPORTS: u32 = 0;
-/// It runs an instance as its core should.
+/// The worker runs an instance as its core should.
 const RUNS: u32 = 1;
-/// It runs an instance that has lost its core.
+/// The worker runs an instance that has lost its core.
 const DEMOTED: u32 = 2;
 
 /// The part of a worker that other threads see.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 pub(crate) struct Worker {
-    /// Its thread, and that as sections know it.
+    /// The worker's thread, and the number of the same thread in sections.
     thread: OnceLock<(ThreadId, u32)>,
     mode: AtomicU32,
-    /// The number of the core of which it was the active one when it had the lock last, and 1.
+    /// 1 plus the number of the worker's core when it last had the lock; 0 if the worker was not
+    /// active.
     seat: AtomicU32,
-    /// Whether it sleeps until its mode changes.
+    /// Whether the worker sleeps until its mode changes.
     holds: AtomicBool,
-    /// 1 if it is to look for work.
+    /// 1 if the worker has to look for work.
     call: AtomicU32,
-    /// The runner of an instance that another thread has started for it, if it watches. Its own
-    /// thread takes no other lock meanwhile, so the giver waits for a moment at most.
+    /// The runner of an instance started by another thread, for a watching worker. The worker's own
+    /// thread takes no other lock meanwhile, so the giver waits only for a moment.
     given: Mutex<Option<Box<SubtaskRunner>>>,
-    /// Whether it watches for that instead of sleeping.
+    /// Whether the worker watches for calls instead of sleeping.
     polls: bool,
 }
 
-/// The stack of each worker. All of it is locked in memory, if memory is.
+/// The size of each worker's stack. If memory is locked, the whole stack is locked.
 const STACK_BYTES: usize = 512 * 1024;
 
 /// Begins the thread of a worker.
@@ -72,12 +74,12 @@ pub(crate) fn begin(number: usize, work: impl FnOnce() + Send + 'static) -> Join
         .expect("the system has a thread for each worker of a run")
 }
 
-/// How often a worker looks before it lets other threads have its processor, in case there are
-/// fewer processors than workers.
+/// How often a worker looks before yielding its processor to other threads, in case there are fewer
+/// processors than workers.
 const PATIENCE: u32 = 5_000;
 
 impl Worker {
-    /// Makes one that watches for calls, or sleeps until one comes.
+    /// Makes a worker that watches for calls, or sleeps until a call comes.
     pub(crate) fn new(polls: bool) -> Self {
         Self {
             polls,
@@ -85,51 +87,52 @@ impl Worker {
         }
     }
 
-    /// Says which thread it is. To be called by that thread, first of all.
+    /// Records the worker's thread. That thread must call this first of all.
     pub(crate) fn register_thread(&self) {
         let _ = self.thread.set((sys::thread(), section::own()));
     }
 
-    /// Returns its thread's number, once it has begun.
+    /// Returns the number of the worker's thread, once the thread has begun.
     pub(crate) fn thread(&self) -> Option<ThreadId> {
         self.thread.get().map(|of| of.0)
     }
 
-    /// Gives it up as one that enters sections, with the section that it is in.
+    /// Gives the worker's thread up for sections, including the section it is in.
     pub(crate) fn give_up_sections(&self) {
         if let Some((_, thread)) = self.thread.get() {
             section::give_up(*thread);
         }
     }
 
-    /// Brings its thread to a level, if there are levels.
+    /// Brings the worker's thread to a level, if there are levels.
     pub(crate) fn bring(&self, levels: Option<Levels>, role: Role) {
         if let (Some(levels), Some(thread)) = (levels, self.thread()) {
             levels.bring(thread, role);
         }
     }
 
-    /// Takes note of the core of which it is the active one. By itself, under the lock.
+    /// Notes the core for which the worker is active. Called by the worker itself, under the lock.
     pub(crate) fn sit(&self, core: Option<CoreId>) {
         let place = core.map_or(0, |core| core.0 + 1);
         self.seat.store(place, Ordering::Relaxed);
         if core.is_none() {
-            // With that of `call`: from now on it sleeps while it waits, so it sees the call before,
-            // or the caller that it has no seat.
+            // Pairs with the fence in `call`. From now on the worker sleeps while it waits, so
+            // either the worker sees the call first, or the caller sees that the worker has no
+            // seat.
             fence(Ordering::SeqCst);
         }
     }
 
-    /// Returns that core. While it waits, nobody takes that from it.
+    /// Returns the worker's core. While the worker waits, nobody takes the core from it.
     pub(crate) fn seat(&self) -> Option<CoreId> {
         self.seat.load(Ordering::Relaxed).checked_sub(1).map(CoreId)
     }
 
-    /// Makes it look for work.
+    /// Makes the worker look for work.
     pub(crate) fn call(&self) {
         self.call.store(1, Ordering::Release);
         if self.polls {
-            // With that of `sit`.
+            // Pairs with the fence in `sit`.
             fence(Ordering::SeqCst);
         }
         if !self.watches() {
@@ -137,20 +140,20 @@ impl Worker {
         }
     }
 
-    /// Leaves it, while it watches, the runner of an instance that was started for it.
+    /// Hands a watching worker the runner of an instance started for the worker.
     pub(crate) fn give(&self, runner: Box<SubtaskRunner>) {
         *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(runner);
         self.call.store(1, Ordering::Release);
     }
 
-    /// Takes the runner, if there is one. By itself.
+    /// Takes the given runner, if there is one. Called by the worker itself.
     pub(crate) fn take_given(&self) -> Option<Box<SubtaskRunner>> {
         let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
         given.take()
     }
 
-    /// Sleeps until it is called, or until an instant, for which it wakes up a little early. By
-    /// itself. Reports whether it was called.
+    /// Sleeps until the worker is called, or until an instant, waking up a little early for the
+    /// instant. Called by the worker itself. Reports whether the worker was called.
     pub(crate) fn wait_for_call(&self, until_ns: u64, lead: &mut Lead) -> bool {
         if self.watches() {
             return self.poll(until_ns);
@@ -173,13 +176,14 @@ impl Worker {
         true
     }
 
-    /// Reports whether it watches while it waits: one without a core sleeps in any case.
+    /// Reports whether the worker watches while waiting. A worker without a core sleeps in any
+    /// case.
     pub(crate) fn watches(&self) -> bool {
         self.polls && self.seat().is_some()
     }
 
-    /// Watches for a call, and for an instant. Reports whether there is a call; it may also return
-    /// for nothing, so that its caller sees what has changed else.
+    /// Watches for a call, and for an instant. Reports whether there is a call. May also return
+    /// early for no reason, so the caller sees other changes.
     fn poll(&self, until_ns: u64) -> bool {
         for _ in 0..PATIENCE {
             if self.call.load(Ordering::Relaxed) != 0 {
@@ -194,7 +198,7 @@ impl Worker {
         false
     }
 
-    /// Watches the clock until an instant, or until it is called, and reports whether it was.
+    /// Watches the clock until an instant, or until a call comes, and reports whether a call came.
     fn watch(&self, until_ns: u64) -> bool {
         while clock::now_ns() < until_ns {
             if self.call.swap(0, Ordering::Acquire) != 0 {
@@ -205,13 +209,14 @@ impl Worker {
         false
     }
 
-    /// Takes note that it runs an instance from now on. Under the lock.
+    /// Notes that the worker runs an instance from now on. Called under the lock.
     pub(crate) fn run(&self) {
         self.mode.store(RUNS, Ordering::Relaxed);
     }
 
-    /// Gets ready to take the lock, after an instance has ended. By itself. Reports
-    /// whether it has raised itself for that; then it is to lower itself under the lock.
+    /// Prepares the worker to take the lock after an instance has ended. Called by the worker
+    /// itself. Reports whether the worker has raised itself for the lock; then it has to lower
+    /// itself under the lock.
     pub(crate) fn report(&self, levels: Option<Levels>) -> bool {
         let was_demoted = self.mode.swap(REPORTS, Ordering::AcqRel) == DEMOTED;
         if was_demoted {
@@ -220,39 +225,39 @@ impl Worker {
         was_demoted
     }
 
-    /// Reports whether the instance that its core has with it is over: it is about to take the
-    /// lock, or has been told to. Under the lock.
+    /// Reports whether the instance on the worker's core is over: the worker is about to take the
+    /// lock, or has been told to. Called under the lock.
     pub(crate) fn has_returned(&self) -> bool {
         self.mode.load(Ordering::Acquire) == REPORTS
     }
 
-    /// Demotes it to a role, and reports whether it has: not if its instance has just
-    /// ended. Under the lock.
+    /// Demotes the worker to a role, and reports whether it did: not if the worker's instance has
+    /// just ended. Called under the lock.
     pub(crate) fn demote(&self, levels: Option<Levels>, role: Role) -> bool {
         if !self.exchange(RUNS, DEMOTED) {
             return false;
         }
         self.bring(levels, role);
         if self.mode.load(Ordering::Acquire) != DEMOTED {
-            // It has raised itself, perhaps before we lowered it.
+            // The worker has raised itself, perhaps before we lowered it.
             self.bring(levels, Role::Report);
         }
         self.tell_holder();
         true
     }
 
-    /// Lets it run again what it ran when it was demoted. Under the lock.
+    /// Lets the worker resume the instance it ran when it was demoted. Called under the lock.
     pub(crate) fn promote(&self, levels: Option<Levels>) {
-        // If its instance has ended meanwhile, it is about to report that.
+        // If the instance has ended meanwhile, the worker is about to report the end.
         self.exchange(DEMOTED, RUNS);
         self.bring(levels, Role::Run);
         self.tell_holder();
     }
 
-    /// Changes the mode if it is the expected one, and reports whether it was.
+    /// Changes the mode if the mode is the expected one, and reports whether it was.
     ///
-    /// In one order with the look at `holds` behind it: a holder says that it holds, and then looks
-    /// at the mode, so one of both sees the other.
+    /// Sequentially consistent with the later look at `holds`: a holder first stores `holds` and
+    /// then looks at the mode, so one of the two threads sees the other's store.
     fn exchange(&self, expected: u32, mode: u32) -> bool {
         let (won, lost) = (Ordering::SeqCst, Ordering::Acquire);
         let exchanged = self.mode.compare_exchange(expected, mode, won, lost);
@@ -265,11 +270,12 @@ impl Worker {
         }
     }
 
-    /// Sleeps for so long of the time in which it is not demoted. By itself.
+    /// Sleeps for `left_ns` of the time in which the worker is not demoted. Called by the worker
+    /// itself.
     pub(crate) fn hold(&self, mut left_ns: u64) {
         self.holds.store(true, Ordering::SeqCst);
         while left_ns > 0 {
-            // Where nothing is ever demoted, nobody keeps a mode.
+            // Where workers are never demoted, nobody maintains the mode.
             let mode = self.mode.load(Ordering::SeqCst);
             if mode == DEMOTED {
                 sys::wait(&self.mode, DEMOTED, None);
@@ -283,26 +289,27 @@ impl Worker {
     }
 }
 
-/// The lead that a thread gives itself, learnt from how late it woke up.
+/// The lead of a thread's alarm before an instant, learnt from the delays of earlier wake-ups.
 ///
-/// It follows the delay that 19 of 20 do not exceed: a step up after a longer one, a nineteenth
-/// of it down after a shorter one. So a rare long delay moves it no further than a usual one.
+/// The lead follows the 95th percentile of the delays: a step up after a longer delay, a nineteenth
+/// of the step down after a shorter delay. So a rare long delay moves the lead no further than a
+/// usual one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lead {
     ns: u64,
 }
 
 impl Default for Lead {
-    /// Begins with what it takes where it takes long, so that the first wake-ups are in time, too.
+    /// Begins with the delay of slow systems, so the first wake-ups are in time, too.
     fn default() -> Self {
         Self { ns: 60_000 }
     }
 }
 
 impl Lead {
-    /// By how much a shorter delay changes it, and a longer one nineteen times.
+    /// The change after a shorter delay; a longer delay changes the lead by nineteen times as much.
     const STEP_NS: u64 = 250;
-    /// How much of each period a thread watches the clock at most.
+    /// The most time of each period for which a thread watches the clock.
     const MOST_NS: u64 = 100_000;
 
     /// Returns when to set the alarm for an instant.
@@ -310,7 +317,7 @@ impl Lead {
         instant_ns.saturating_sub(self.ns)
     }
 
-    /// Notes when a thread woke up, and when its alarm was due.
+    /// Learns from a wake-up: when the thread woke up, and when its alarm was due.
     fn learn(&mut self, alarm_ns: u64, woke_ns: u64) {
         let late_ns = woke_ns.saturating_sub(alarm_ns);
         self.ns = match late_ns > self.ns {

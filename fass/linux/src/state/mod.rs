@@ -1,45 +1,47 @@
-//! The state under the scheduler's lock, and one step of it.
+//! The state under the scheduler's lock, and a single step of the scheduler.
 //!
-//! The scheduler decides at one instant what each core runs;
-//! [`Placement`](sched_dag::placement::Placement) keeps what
-//! each core has, and what it should have. A core that has too much loses it here, by
-//! the thread that makes the step; a core that has nothing and should have something is *called*:
-//! its worker comes and looks.
+//! The scheduler decides at one instant which instance each core runs.
+//! [`Placement`](sched_dag::placement::Placement) keeps each core's present instance, and the
+//! instance the core should have. The thread making the step takes unwanted instances from their
+//! cores here. A core without an instance that should have one is *called*: its worker comes and
+//! looks.
 //!
-//! # What has lost its core and ends all the same
+//! # Instances ending after the loss of their core
 //!
 //! A demoted worker runs on while its core's processor has nothing better to do (`worker`): before
-//! the one in its place has begun, while that one waits in mid-function, or when that one has
-//! returned and waits for the scheduler's lock. So an instance may end that is *parked*. It ends
-//! where it ran last, and the journal must tell of a core that has one instance at a time:
+//! the new active worker has begun, while the new worker waits in mid-function, or while the new
+//! worker has returned and waits for the scheduler's lock. So a *parked* instance may end. The end
+//! counts on the core where the instance ran last, and in the journal a core has only one instance
+//! at a time. By the core's present occupant:
 //!
-//! - Nothing is there yet: it goes on and ends.
-//! - There is one that may lose its core: that one loses it, for as long as the scheduler's step
-//!   takes.
-//! - There is one that keeps its core, or one that has returned and will say so as soon as it gets
-//!   the lock. That one has not lost anything, so the end is *left*: it is reported when that one
-//!   has ended, by the thread that reports that, or, if the scheduler gives the parked one a core
-//!   before, by its own thread, there. For the model it was suspended so long.
-//! - A fault takes an instance away wherever it is: no core is asked for.
+//! - No occupant: the parked instance resumes and ends.
+//! - A preemptable occupant: the occupant loses the core for the duration of the scheduler's step.
+//! - An occupant that is non-preemptive, or has returned and will report its end as soon as it gets
+//!   the lock: the occupant loses nothing, and the parked end is *left*. The thread reporting the
+//!   occupant's end then reports the left end, too. If the scheduler gives the parked instance a
+//!   core earlier, its own thread reports the end there. In the model, the instance was suspended
+//!   until then.
+//! - Any occupant, but the parked instance ends by a fault: a fault takes an instance away wherever
+//!   it is, and needs no core.
 //!
-//! # How many workers there are
+//! # The number of workers
 //!
-//! At any instant each core has one, its active worker. A cluster has more for two reasons:
+//! At any instant each core has one active worker. A cluster has more workers for two reasons:
 //!
-//! - A suspended instance keeps its worker. [`most_suspended`](sched_dag::Dag::most_suspended) bounds
-//!   the instances of a DAG that have started, have not ended and may be suspended, those with a core
-//!   among them. So it holds here, too, where suspensions and resumptions come later than the
-//!   scheduler's decisions. The worker of a parked instance that reports its end is no spare one before
-//!   the step is over, in which others may be suspended; but no successor has started yet, so the
-//!   ended instance's place in the bound is free for so long.
-//! - An instance that is given up keeps its worker for ever. The first of a DAG ends the DAG, and with
-//!   it all instances that are ready or wait. So those that can follow have a core or are suspended: a
-//!   DAG loses no more workers than there are cores and suspended instances of it, nor more than it has
-//!   subtasks.
+//! - A suspended instance keeps its worker. [`most_suspended`](sched_dag::Dag::most_suspended)
+//!   bounds the instances of a DAG that have started, have not ended and may be suspended,
+//!   including instances with a core. So the bound holds here, too, although suspensions and
+//!   resumptions come later than the scheduler's decisions. When a parked instance reports its end,
+//!   its worker becomes spare only after the step, in which other instances may be suspended. But
+//!   no successor has started yet, so the ended instance's place in the bound is free until then.
+//! - An instance given up keeps its worker for ever. The first such instance of a DAG ends the DAG,
+//!   and with it all ready or waiting instances. So any further instances given up have a core or
+//!   are suspended: a DAG loses no more workers than there are cores and suspended instances of the
+//!   DAG, and no more than it has subtasks.
 //!
-//! An instance that waits between two turns has no worker. Without preemption nothing is suspended.
-//! Workers are lost by exceeded budgets, and by panics that cannot unwind. Where a DAG has no budget,
-//! the latter alone can be: so many threads begin only when a panic takes one away.
+//! An instance waiting between two turns has no worker. Without preemption nothing is suspended.
+//! Exceeded budgets and panics that cannot unwind cost workers. In a DAG without budgets only such
+//! panics can, so the threads replacing those workers begin only when a panic takes one away.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -58,11 +60,11 @@ use crate::office::Office;
 use crate::worker::Worker;
 use crate::{clock, edge, sys};
 
-/// An instance that has finished, and is not reported yet.
+/// An instance that has finished but is not reported yet.
 pub(crate) struct Left {
     pub(crate) worker: Number,
     pub(crate) runner: Box<SubtaskRunner>,
-    /// When its function returned, on the clock.
+    /// The instant on the clock at which its function returned.
     pub(crate) finish_ns: u64,
 }
 
@@ -73,90 +75,93 @@ pub(crate) type Number = usize;
 pub(crate) enum FaultCause {
     /// A panic, with its message.
     Panic(String),
-    /// The budget.
+    /// An exceeded budget.
     Overrun,
 }
 
 /// A fault of an instance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The instance that failed.
+    /// The failed instance.
     pub instance: Instance,
     /// The core, counted within its cluster.
     pub core: CoreId,
-    /// Why.
+    /// The cause, in words.
     pub cause: Cow<'static, str>,
-    /// Where, if it has panicked: `file:line:column`.
+    /// The place of a panic: `file:line:column`.
     pub place: Option<String>,
-    /// Whether it has exceeded its budget. Unless it has returned, its function runs on then, in
-    /// nobody's way, so that nothing can take over: the cost is the DAG.
+    /// Whether the instance has exceeded its budget. Unless its function has returned, the function
+    /// runs on, delaying nobody, and no other thread can take over: the cost is the DAG.
     pub is_overrun: bool,
     /// The cost.
     pub cost: FaultCost,
 }
 
-/// The scheduler of a cluster, its bodies, and which worker runs what.
+/// The scheduler of a cluster, the bodies of its subtasks, and the assignment of instances to
+/// workers.
 pub(crate) struct State {
     pub(crate) port: PortState,
     pub(crate) engine: Engine<Box<SubtaskRunner>, Number>,
-    /// By worker, the core of which it is the active one.
+    /// By worker: the core for which the worker is active.
     pub(crate) seats: Box<[Option<CoreId>]>,
-    /// By worker, the core to whose processor it is pinned.
+    /// By worker: the core on whose processor the worker is pinned.
     pinned: Box<[Option<CoreId>]>,
-    /// By worker, the time before which its instance does not end: its latest start or resumption,
-    /// or a step of another thread that was written down as of the core.
+    /// By worker: the earliest end of its instance, namely its latest start or resumption, or the
+    /// latest step that another thread wrote down under the same core.
     resumed_ns: Box<[u64]>,
-    /// The core and vertex from which a worker that reports an end has just taken the processor.
+    /// The core and vertex whose processor a worker reporting an end has just taken.
     interrupted: Option<(CoreId, Vertex)>,
-    /// Instances that finished after they had lost their core, and are not reported yet.
+    /// Instances that finished after losing their core, and are not reported yet.
     pub(crate) left: Vec<Left>,
     /// Workers without a core and without an instance.
     pub(crate) spare: Vec<Number>,
-    /// Workers whose threads have not begun. One begins where a panic has taken another one away.
+    /// Workers whose threads have not begun. A thread begins when a panic has taken another worker
+    /// away.
     pub(crate) later: Range<Number>,
     /// Workers whose instance has exceeded its budget, or cannot unwind. They are never used again.
     pub(crate) abandoned: Vec<Number>,
     pub(crate) faults: Vec<Fault>,
-    /// The cores that have to look for work.
+    /// The cores whose workers have to look for work.
     called: Vec<CoreId>,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
     pub(crate) preemptions: u64,
-    /// How often a completion gave its own core the next instance.
+    /// How many completions gave their own core the next instance.
     pub(crate) hand_offs: u64,
-    /// How often a worker was called, or left an instance. Where workers sleep, a wake of the
-    /// kernel's each.
+    /// How many times a worker was called, or was left an instance. Where workers sleep, each time
+    /// costs a wake-up by the kernel.
     pub(crate) calls: u64,
 }
 
-/// The part of a cluster's state that its engine's port needs.
+/// The part of a cluster's state needed by the engine's port.
 pub(crate) struct PortState {
     office: Arc<Office>,
     cluster: ClusterId,
-    /// By core, the worker that runs what the core should.
+    /// By core: the active worker, running the instance the core should run.
     pub(crate) active: Box<[Number]>,
     pub(crate) time: RunTime,
-    /// How many letters were taken that the release thread has not settled yet.
+    /// How many letters were taken but not settled by the release thread yet.
     pub(crate) opened: u64,
-    /// The words on which threads of drivers may sleep that a question was just posted for.
+    /// Words on which driver threads may sleep: a question was just posted for each of these
+    /// threads.
     pub(crate) rung: Vec<Arc<AtomicU32>>,
     /// Whether a worker can be demoted: instances can be preempted, or have budgets.
     pub(crate) demotes: bool,
 }
 
-/// The time of a cluster's run, as it follows from the clock.
+/// The time of a cluster's run, derived from the clock.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunTime {
     /// Time 0 on the clock; `u64::MAX` until the run has begun.
     pub(crate) epoch_ns: u64,
-    /// The time skipped since, because nothing ran.
+    /// The idle time skipped so far.
     skipped_ns: u64,
 }
 
 impl RunTime {
     const NOT_BEGUN: Self = Self::beginning(u64::MAX);
 
-    /// Makes that of a run that begins then.
+    /// Makes the time of a run that begins at `epoch_ns` on the clock.
     pub(crate) const fn beginning(epoch_ns: u64) -> Self {
         let skipped_ns = 0;
         Self {
@@ -165,12 +170,12 @@ impl RunTime {
         }
     }
 
-    /// Converts a time on the clock; one before time 0 becomes that.
+    /// Converts a time on the clock into a time of the run. Times before time 0 become 0.
     const fn of_run(self, clock_ns: u64) -> u64 {
         clock_ns.saturating_sub(self.epoch_ns) + self.skipped_ns
     }
 
-    /// Converts a time of the run.
+    /// Converts a time of the run into a time on the clock.
     pub(crate) const fn on_clock(self, time_ns: u64) -> u64 {
         (time_ns.saturating_sub(self.skipped_ns)).saturating_add(self.epoch_ns)
     }
@@ -183,7 +188,7 @@ pub(crate) struct ThreadPort<'s> {
 }
 
 impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
-    /// The edge tells of these, where a topic is recorded.
+    /// The events passed on to the edge, for recorded topics.
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
     fn hear(&mut self, notice: &DriverNotice) {
@@ -206,7 +211,8 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
         instant_ns
     }
 
-    /// A thread that sleeps is woken when the lock has been given back.
+    /// Notes the bell of a sleeping driver thread. The thread is woken after the lock has been
+    /// given back.
     fn wait(&mut self, _: CoreId, runner: &mut Box<SubtaskRunner>, _: u64) {
         self.state.rung.extend(runner.body.bell());
     }
@@ -228,7 +234,7 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
 }
 
 impl State {
-    /// Makes that of a cluster, for its DAGs' bodies and its processors.
+    /// Makes the state of a cluster, for its DAGs' bodies and its processors.
     pub(crate) fn new(
         mut engine: Engine<Box<SubtaskRunner>, Number>,
         office: &Arc<Office>,
@@ -268,7 +274,7 @@ impl State {
             spare,
             later,
             abandoned: Vec::with_capacity(workers),
-            // Each subtask's, if no fault is survived.
+            // If no fault is survived, each subtask has one fault at most.
             faults: Vec::with_capacity(subtasks),
             called: Vec::with_capacity(2 * cores),
             processors,
@@ -279,25 +285,25 @@ impl State {
         }
     }
 
-    /// Returns a time of the clock on the run's time.
+    /// Converts a time on the clock into a time of the run.
     pub(crate) const fn since_epoch(&self, time_ns: u64) -> u64 {
         self.port.time.of_run(time_ns)
     }
 
-    /// Begins the instant at which the clock is, and returns that, or the latest instant that was
-    /// written down: another thread may have read the clock later.
+    /// Begins the instant of the clock's present time, and returns that instant, or the latest
+    /// instant written down if it is later: another thread may have read the clock later.
     pub(crate) fn now_ns(&mut self) -> u64 {
         let now_ns = self.since_epoch(clock::now_ns());
         self.begin(now_ns)
     }
 
-    /// Begins the instant of a time that was read, likewise.
+    /// Begins the instant of a time already read, like [`now_ns`](Self::now_ns).
     pub(crate) fn begin(&mut self, read_ns: u64) -> u64 {
         let _ = self.engine.scheduler.at(read_ns);
         self.engine.scheduler.now_ns()
     }
 
-    /// If nothing runs, lets the next event be due now, and returns when that is.
+    /// If nothing runs, makes the next event due now, and returns its instant.
     pub(crate) fn skip_to_next_event(&mut self, now_ns: u64) -> Option<u64> {
         let mut cores = 0..self.port.active.len();
         let is_idle = |core| {
@@ -312,14 +318,14 @@ impl State {
         Some(next_ns.max(now_ns))
     }
 
-    /// Writes down what has happened now to an instance, and returns when.
+    /// Writes down an event of an instance as happening now, and returns the instant.
     pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) -> u64 {
         let now_ns = self.now_ns();
         self.engine.note(what, core, vertex, now_ns);
         now_ns
     }
 
-    /// Returns the engine, and the port for a step of it.
+    /// Returns the engine, and the port for a step of the engine.
     #[inline]
     pub(crate) fn parts<'s>(
         &'s mut self,
@@ -346,13 +352,13 @@ impl State {
         next
     }
 
-    /// Lets the scheduler see what happens now, and decide.
+    /// Shows the scheduler an event that happens now, and lets the scheduler decide.
     pub(crate) fn step(&mut self, workers: &[Worker], event: impl FnOnce(&mut Moment<'_>)) {
         let now_ns = self.now_ns();
         self.step_at(now_ns, workers, event);
     }
 
-    /// Lets the scheduler see what happens at an instant, and decide.
+    /// Shows the scheduler an event at an instant, and lets the scheduler decide.
     pub(crate) fn step_at(
         &mut self,
         now_ns: u64,
@@ -366,8 +372,8 @@ impl State {
         self.carry_out(workers);
     }
 
-    /// Ends an instance because of a fault, and with it its job, or its DAG. The latter if the
-    /// worker that ran it has not given its runner back.
+    /// Ends an instance because of a fault, and with the instance its job or its DAG. The DAG ends
+    /// if the worker has not given the instance's runner back.
     pub(crate) fn fail(
         &mut self,
         workers: &[Worker],
@@ -384,7 +390,8 @@ impl State {
         let now_ns = self.now_ns();
         let (engine, mut port) = self.parts(workers);
         let cost = engine.fail((now_ns, core), vertex, runner, &mut port);
-        // What the core has may have returned already, as this one may have lost the core.
+        // The core's present instance may have returned already, as the failed instance may have
+        // lost the core.
         self.resumed_ns[self.port.active[core.index()]] = self.engine.scheduler.now_ns();
         self.faults.push(Fault {
             instance,
@@ -399,7 +406,7 @@ impl State {
 
     pub(crate) fn carry_out(&mut self, workers: &[Worker]) {
         if let Some((core, occupant)) = self.interrupted.take() {
-            // It may have returned already, and wait for the lock.
+            // The occupant may have returned already, and wait for the lock.
             let now_ns = self.note(EventKind::Resume, core, occupant);
             self.resumed_ns[self.port.active[core.index()]] = now_ns;
         }
@@ -414,7 +421,7 @@ impl State {
         }
     }
 
-    /// Takes its instance away from a core, unless it has just ended.
+    /// Takes a core's instance away, unless the instance has just ended.
     fn suspend(&mut self, core: CoreId, workers: &[Worker]) {
         let demoted = self.port.active[core.index()];
         if !workers[demoted].demote(self.levels, Role::Demoted) {
@@ -436,7 +443,7 @@ impl State {
     /// Gives a core a spare worker.
     pub(crate) fn replace(&mut self, core: CoreId, workers: &[Worker]) {
         let spare = self.spare.pop();
-        // There are as many as the module's head counts.
+        // The module's head derives that the spare workers suffice.
         self.seat(spare.expect("a spare worker"), core, workers);
     }
 
@@ -446,14 +453,15 @@ impl State {
         self.pin(worker, core, workers);
     }
 
-    /// Sees to it that a worker runs on a core's processor.
+    /// Pins a worker to a core's processor.
     pub(crate) fn pin(&mut self, worker: Number, core: CoreId, workers: &[Worker]) {
         let processor = self.processors[core.index()];
         if self.pinned[worker] != Some(core)
             && let Some(thread) = workers[worker].thread()
         {
-            // The processor was ours at the start; if it was taken away since, the kernel
-            // has chosen another one, and all still holds but for which thread delays which.
+            // The processor was ours at the start. If it was taken away since, the kernel has
+            // chosen another processor, and everything still holds except which thread delays
+            // which.
             let _ = sys::pin(thread, processor);
             self.pinned[worker] = Some(core);
         }
@@ -465,8 +473,8 @@ impl State {
         }
     }
 
-    /// Starts the instances of cores whose workers watch, and leaves these their runners: so they
-    /// need no look at the state.
+    /// Starts instances on the cores of watching workers, and hands these workers their runners. So
+    /// the workers need not look at the state.
     pub(crate) fn give(&mut self, workers: &[Worker]) {
         let now_ns = self.engine.scheduler.now_ns();
         let mut called = std::mem::take(&mut self.called);
@@ -485,23 +493,24 @@ impl State {
         self.called = called;
     }
 
-    /// Reports whether no worker is to look for work, and no bell to be rung.
+    /// Reports whether no worker has to look for work, and no bell has to be rung.
     pub(crate) fn calls_none(&self) -> bool {
         self.called.is_empty() && self.port.rung.is_empty()
     }
 
-    /// Reports whether a hop that has just been made is all: the next event stays what it was.
+    /// Reports whether the latest hop changes nothing else: the next event stays the same, and no
+    /// bell rings.
     #[inline]
     pub(crate) fn changes_nothing_else(&mut self) -> bool {
         !self.engine.scheduler.log.take_job_event() && self.port.rung.is_empty()
     }
 
-    /// Returns workers that are to look for work, `most` at a time, and forgets them.
+    /// Returns workers that have to look for work, at most `most` at a time, and forgets them.
     pub(crate) fn take_called(&mut self, most: usize) -> impl Iterator<Item = Number> + '_ {
         let (active, placement) = (&self.port.active, &self.engine.placement);
         let left = self.called.len().saturating_sub(most);
         let called = self.called.drain(left..);
-        // The one that makes the step has looked already.
+        // The thread making the step has looked already.
         let called = called.filter(|core| placement.is_wanted(core.index()));
         let calls = &mut self.calls;
         called
@@ -509,12 +518,13 @@ impl State {
             .map(|core| active[core.index()])
     }
 
-    /// Returns the core that a worker is pinned to.
+    /// Returns the core to which a worker is pinned.
     pub(crate) fn core_of(&self, worker: Number) -> CoreId {
         self.pinned[worker].unwrap_or(CoreId(0))
     }
 
-    /// Finds what a worker without an instance does next, at an instant: run this, or nothing.
+    /// Finds the next instance for a worker without an instance, at an instant; `None` if there is
+    /// nothing to run.
     pub(crate) fn find_work(
         &mut self,
         me: Number,
@@ -525,7 +535,7 @@ impl State {
             self.spare.push(me);
             return None;
         };
-        // Another thread may have started something for it just before.
+        // Another thread may just have started an instance for this core.
         if self.engine.placement.current(core.index()).is_some() {
             return None;
         }
@@ -554,8 +564,8 @@ impl State {
     }
 }
 
-/// Counts the workers of a cluster: up to the start of the range those with which a run begins, in it
-/// those that begin later.
+/// Counts the workers of a cluster. The run begins with the workers up to the start of the range;
+/// the threads of the workers within the range begin later.
 fn workers(
     engine: &Engine<Box<SubtaskRunner>, Number>,
     cores: usize,
@@ -578,14 +588,15 @@ fn workers(
 }
 
 impl State {
-    /// Returns when the instance of a worker has ended whose function returned at a time on the
-    /// clock. If it lost its core and got it back before it could say so, it ends there; or with a
-    /// step that was taken before.
+    /// Returns the instant of an instance's end, for a worker whose function returned at
+    /// `returned_ns` on the clock. If the instance lost its core and got the core back before
+    /// reporting, it ends at the resumption; or at the step taken before its report, if that step
+    /// is later.
     pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
         self.since_epoch(returned_ns).max(self.resumed_ns[worker])
     }
 
-    /// Reports whether a worker whose instance has finished has to leave the report of that.
+    /// Reports whether a worker with a finished instance has to leave the report to another thread.
     #[inline]
     pub(crate) fn must_leave(&self, worker: Number, workers: &[Worker]) -> bool {
         if self.seats[worker].is_some() {
@@ -601,12 +612,13 @@ impl State {
         })
     }
 
-    /// Reports whether a worker has left the end of its instance.
+    /// Reports whether a worker has left its instance's end to another thread.
     fn has_left(&self, worker: Number) -> bool {
         self.left.iter().any(|left| left.worker == worker)
     }
 
-    /// Returns what a worker has left, if it has a core now and so reports it itself.
+    /// Takes the left end of a worker's instance if the worker has a core now, and so reports the
+    /// end itself.
     pub(crate) fn take_left(&mut self, worker: Number) -> Option<Left> {
         self.seats[worker]?;
         let mut left = self.left.iter();
@@ -614,7 +626,7 @@ impl State {
         Some(self.left.swap_remove(place))
     }
 
-    /// Reports what was left by workers that ran on a core, which has nothing with it now.
+    /// Reports the left ends of workers that ran on a core. The core has no instance now.
     pub(crate) fn report_left(&mut self, core: CoreId, workers: &[Worker]) {
         let is_due = |state: &Self, worker: Number| {
             state.seats[worker].is_none() && state.core_of(worker).index() == core.index()
@@ -626,8 +638,8 @@ impl State {
         }
     }
 
-    /// Tells the scheduler that a parked instance has ended, on the core where it ran. Right now
-    /// that core's processor is with the worker that says so, and what should run there is not.
+    /// Tells the scheduler that a parked instance has ended, on the core where the instance ran. At
+    /// this moment the core's processor runs the reporting worker, and not the core's occupant.
     pub(crate) fn end_parked(
         &mut self,
         worker: Number,
@@ -641,7 +653,8 @@ impl State {
             self.note(EventKind::Suspend, core, occupant);
         }
         self.note(EventKind::Resume, core, vertex);
-        // It goes on after the step that the end brings about, and within it nothing does.
+        // The occupant goes on after the step caused by the end; during the step the core runs no
+        // instance.
         self.interrupted = occupant.map(|occupant| (core, occupant));
         let times_ns = (self.since_epoch(finish_ns), self.now_ns());
         let (engine, mut port) = self.parts(workers);
