@@ -1,9 +1,9 @@
-//! Calls that may block, for subtasks that wait: a device that is a thread of the host.
+//! Calls that may block, for subtasks that wait: a device served by a thread of the host.
 //!
-//! A function that reads a file, or asks another program, would keep its core from whatever needs
-//! it. An async one asks a device instead, whose driver makes the call in a thread of its own, of no
-//! level. So it may be late where the cores are busy, and delays nobody; and the wait ends at its
-//! limit, whatever the call does.
+//! A function reading a file, or asking another program, would keep its core from more urgent work.
+//! An async function asks a device instead, and the device's driver makes the call in its own
+//! thread, without a real-time level. So the call may be late while the cores are busy, but delays
+//! nobody. The wait ends at its limit, whatever the call does.
 
 use std::sync::atomic::Ordering;
 use std::thread;
@@ -13,16 +13,16 @@ use fass::shared::{Device, DeviceDriver, Ticket, create_device};
 
 use crate::{clock, sys};
 
-/// How long the thread waits at most until it looks whether the device is still used.
+/// The longest wait of the thread before checking whether the device is still used.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Makes a device of a call that may block: each question is answered by `call`, one after the other,
-/// in a thread that lasts as long as the device is used. Of what is asked while a call goes on, the
-/// latest question counts.
+/// Makes a device from a call that may block. `call` answers the questions one after the other, in
+/// a thread lasting as long as the device is used. Among questions asked during a call, only the
+/// latest counts.
 ///
 /// # Panics
 ///
-/// If the system has no thread for it.
+/// If the system has no thread left.
 ///
 /// ```
 /// use std::time::Duration;
@@ -54,7 +54,7 @@ where
     let serve = move || {
         while driver.is_used() {
             if let Some((ticket, question)) = next_question(&mut driver, LOOK) {
-                // One that comes too late is of no use to anybody.
+                // An answer that comes too late is of no use to anybody.
                 drop(driver.answer(ticket, call(question)));
             }
         }
@@ -66,8 +66,8 @@ where
     device
 }
 
-/// Waits for the next question of a device, for so long at the most, in a thread of the driver's own.
-/// The worker whose instance asks wakes that, once it has given the scheduler's lock back.
+/// Waits for the next question of a device, for at most `most`, in a thread of the driver. The
+/// worker running the asking instance wakes the thread after giving back the scheduler's lock.
 ///
 /// ```
 /// use std::time::Duration;
@@ -79,7 +79,7 @@ pub fn next_question<Q, A>(driver: &mut DeviceDriver<Q, A>, most: Duration) -> O
     let most_ns = u64::try_from(most.as_nanos()).unwrap_or(u64::MAX);
     let until_ns = clock::now_ns().saturating_add(most_ns);
     loop {
-        // Before the look: a question that comes after that changes it.
+        // Read before the look: a later question changes the word.
         let seen = bell.load(Ordering::Acquire);
         let found = driver.question();
         if found.is_some() || clock::now_ns() >= until_ns {

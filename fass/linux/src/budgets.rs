@@ -1,15 +1,14 @@
-//! Budgets: how long instances may execute, and who looks.
+//! Budgets: how long instances may execute, and which thread checks.
 //!
-//! A budget is in processor time, which a thread takes only while it has a processor.
-//! Reading that clock is a system call, so no instance does it at its start: the release thread
-//! looks often enough, as often as the shortest budget, and begins to count when it
-//! first sees the instance. So an instance ends after its budget, and no later than the
-//! shortest budget of all, and 20 us, after that. The instance's thread cannot be ended: it is
-//! demoted for good.
+//! A budget is processor time, and a thread uses processor time only while running on a processor.
+//! Reading the processor-time clock is a system call, so instances do not read it at their start.
+//! Instead, the release thread looks at least once per shortest budget, and begins counting at its
+//! first sight of an instance. So an instance ends after its budget, and at most the shortest
+//! budget of all, plus 20 us, later. The instance's thread cannot be ended: it is demoted for good.
 //!
-//! An instance that waits may go on in another thread. So, of subtasks that wait, each worker reads
-//! its clock at both ends of a turn, and adds up what the instance has taken; at the end of a turn
-//! it sees for itself whether that is too much.
+//! An instance that waits may go on in another thread. So, for waiting subtasks, each worker reads
+//! its clock at both ends of a turn, and adds up the instance's time. At the end of a turn the
+//! worker itself checks the sum against the budget.
 
 use sched_dag::{CoreId, Vertex};
 
@@ -17,16 +16,16 @@ use crate::state::State;
 use crate::sys;
 use crate::worker::Worker;
 
-/// The latest look at an instance that has a budget.
+/// The latest look at an instance with a budget.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// The subtask, the job, and what its earlier turns have taken.
+    /// The subtask, the job, and the time taken by its earlier turns.
     what: Option<(Vertex, u64, u64)>,
-    /// The processor time of its thread then.
+    /// The processor time of the instance's thread at that look.
     processor_ns: u64,
 }
 
-/// The budgets of a run's subtasks, and what was seen of the instances on each core.
+/// The budgets of a run's subtasks, and the latest looks at the instances on each core.
 #[derive(Debug)]
 pub(crate) struct Budgets {
     by_vertex: Box<[u64]>,
@@ -35,7 +34,8 @@ pub(crate) struct Budgets {
 }
 
 impl Budgets {
-    /// Takes each subtask's budget, or so many of its WCETs; 0: then it has none.
+    /// Takes each subtask's budget, or `wcets` times its WCET; with 0, subtasks without a stated
+    /// budget have none.
     pub(crate) fn new(state: &State, wcets: u64) -> Self {
         let dags = state.engine.task_set.dags().iter();
         let subtasks = dags.flat_map(|dag| dag.subtasks());
@@ -47,8 +47,9 @@ impl Budgets {
         }
     }
 
-    /// Looks at what runs. Returns a core whose instance has exceeded its budget, or when
-    /// to look again. `taken_ns` tells of a vertex how much earlier turns have taken.
+    /// Looks at the running instances. Returns the time of the next look. The error is a core whose
+    /// instance has exceeded its budget. `taken_ns` returns the time taken by a vertex's earlier
+    /// turns.
     pub(crate) fn look(
         &mut self,
         (state, workers): (&State, &[Worker]),
@@ -86,9 +87,10 @@ impl Budgets {
     }
 }
 
-/// Returns how long to sleep between two looks at an instance that has so much of its budget
-/// left: not before it can have used that up, and for a while in any case. This thread may stand
-/// on the instance's own core, and then that uses nothing up until we sleep.
+/// Returns how long to sleep between two looks at an instance with `rest_ns` of its budget left.
+/// The sleep ends when the instance can have used up the rest, and lasts at least 20 us: this
+/// thread may occupy the instance's own core, and then the instance makes no progress until we
+/// sleep.
 fn pause_ns(rest_ns: u64) -> u64 {
     const LEAST_NS: u64 = 20_000;
     rest_ns.saturating_add(1).max(LEAST_NS)

@@ -1,22 +1,22 @@
 //! The clock of all threads, read from the processor's counter.
 //!
-//! A *base* is a reading of the counter, the time of CLOCK_MONOTONIC then, and the rate of both.
-//! The time is that of the latest base, and so many ticks more. A thread that finds the base older
-//! than some 100 us asks the system's clock, and makes a new base unless another thread does so
-//! just then: no thread waits for another.
+//! A *base* is a reading of the counter, the time of CLOCK_MONOTONIC at that reading, and the rate
+//! between both. The present time is the latest base's time, plus the ticks since. A thread finding
+//! the base older than some 100 us asks the system's clock, and makes a new base unless another
+//! thread is just making one: no thread waits for another.
 //!
 //! # Bounds
 //!
-//! - The time of a base never goes back: a base begins where the base before can have come to, at
-//!   the least. A thread that has asked the system beside a new base may come 0.5 us before that
-//!   in the first millisecond of the program, and later by some nanoseconds.
-//! - A reading is ahead of CLOCK_MONOTONIC by the duration of that call, mostly 20 ns and 8,192
-//!   ticks at most, and differs by the slew of two bases: 0.5 us at first, then 0.1 us at most. A
-//!   base that is ahead runs slower, so that the next ones are not. A jump of the system's clock is
-//!   taken with the next base.
+//! - The time of a base never goes back: a new base begins at or after the latest reading possible
+//!   with the old base. In the first millisecond of the program, a thread asking the system while
+//!   another makes a base may read 0.5 us earlier than the base; later, some nanoseconds earlier.
+//! - A reading is ahead of CLOCK_MONOTONIC by the duration of the clock's system call, mostly 20 ns
+//!   and 8,192 ticks at most, and differs by the slew of two bases: 0.5 us at first, then 0.1 us at
+//!   most. A base that is ahead runs slower, so the next bases are not ahead. The next base takes
+//!   over a jump of the system's clock.
 //! - A processor may read its counter some tens of nanoseconds ahead of the program's order. So a
-//!   reading after another thread's may be lower by so much: events of different threads are put
-//!   in order where they are written down (`State::now_ns`).
+//!   reading after another thread's may be lower by as much: events of different threads are put in
+//!   order when written down (`State::now_ns`).
 //! - Where the counter is not the system's own clock, each reading asks the system.
 
 #![allow(unsafe_code, reason = "the processor's counter")]
@@ -29,10 +29,10 @@ use crate::sys;
 /// How many ticks a base is good for.
 const FRESH: u64 = 1 << 18;
 
-/// How many ticks the call of the system's clock may take, for a base to be made of it.
+/// The most ticks of a system call whose result may become a base.
 const PROMPT: u64 = 1 << 13;
 
-/// From this much on, the system's clock has jumped, or the counter has.
+/// From this difference on, the system's clock or the counter has jumped.
 const JUMP_NS: u64 = 1_000_000;
 
 /// The counter and the time at an instant.
@@ -40,7 +40,7 @@ const JUMP_NS: u64 = 1_000_000;
 struct Base {
     ticks: u64,
     ns: u64,
-    /// Nanoseconds a tick, times 2^32.
+    /// Nanoseconds per tick, times 2^32.
     rate: u64,
 }
 
@@ -57,10 +57,11 @@ impl Base {
     }
 }
 
-/// The latest two bases, on lines of their own. While the next is written, the latest stays.
+/// The latest two bases, on their own cache lines. While a thread writes the next base, the latest
+/// stays intact.
 #[repr(align(128))]
 struct Bases {
-    /// How many bases there were.
+    /// How many bases there have been.
     made: AtomicU64,
     places: [[AtomicU64; 3]; 2],
 }
@@ -71,7 +72,7 @@ static BASES: Bases = Bases {
 };
 
 impl Bases {
-    /// Returns the latest base, and how many ticks ago it was.
+    /// Returns the latest base, and its age in ticks.
     #[inline]
     fn latest(&self) -> (Base, u64) {
         loop {
@@ -79,7 +80,7 @@ impl Bases {
             let place = &self.places[(made & 1) as usize];
             let [ticks, ns, rate] = [0, 1, 2].map(|word| place[word].load(Ordering::Relaxed));
             let since = counter().wrapping_sub(ticks);
-            // If any word is of a later base, so is the number.
+            // If any word belongs to a later base, so does the number.
             fence(Ordering::Acquire);
             if self.made.load(Ordering::Relaxed) == made {
                 return (Base { ticks, ns, rate }, since);
@@ -87,7 +88,7 @@ impl Bases {
         }
     }
 
-    /// Puts a base in the place of the older. By one thread at a time.
+    /// Replaces the older base. Called by one thread at a time.
     fn put(&self, base: Base) {
         let made = self.made.load(Ordering::Relaxed) + 1;
         fence(Ordering::Release);
@@ -109,19 +110,19 @@ pub(crate) fn now_ns() -> u64 {
     }
 }
 
-/// Asks the system's clock, and makes a base of that if it can.
+/// Asks the system's clock, and makes a base from the answer if possible.
 #[cold]
 #[inline(never)]
 fn renew(latest: Base, since: u64) -> u64 {
     static RATE: Mutex<Rate> = Mutex::new(Rate(Base::NONE));
-    // The counter was read ahead of the load that has found a base made just then.
+    // The counter was read before the load of a base made just then.
     if since > FRESH.wrapping_neg() && latest.rate > 0 {
         return latest.ns;
     }
     let ticks = counter();
     let system_ns = sys::monotonic_ns();
     let is_prompt = counter().wrapping_sub(ticks) < PROMPT;
-    // No reading of the latest base was above that.
+    // No reading of the latest base was above this.
     let ns = system_ns.max(latest.after(FRESH));
     if is_prompt
         && has_counter()
@@ -136,12 +137,12 @@ fn renew(latest: Base, since: u64) -> u64 {
     ns
 }
 
-/// The rate of the counter, and the instant from which it is measured.
+/// The rate of the counter, and the instant from which the rate is measured.
 struct Rate(Base);
 
 impl Rate {
-    /// Takes an instant, and returns the rate up to it; `None` at first, and where another thread
-    /// has been here with a later instant.
+    /// Learns from an instant, and returns the rate up to that instant; `None` at first, and where
+    /// another thread has been here with a later instant.
     fn learn(&mut self, ticks: u64, ns: u64) -> Option<u64> {
         let Self(from) = self;
         let since = ticks.checked_sub(from.ticks)?;
@@ -152,7 +153,8 @@ impl Rate {
             (from.ticks, from.ns) = (ticks, ns);
         } else if since > 8 * FRESH {
             let rate = u64::try_from((passed_ns << 32) / u128::from(since)).unwrap_or(0);
-            // From some 60 MHz to 16 GHz; else the system's clock has jumped in the first window.
+            // From some 60 MHz to 16 GHz; otherwise the system's clock has jumped in the first
+            // window.
             match (1 << 28..1 << 36).contains(&rate) {
                 true => from.rate = rate,
                 false => *from = Base { ticks, ns, rate: 0 },
@@ -163,7 +165,7 @@ impl Rate {
 }
 
 /// Reports whether the counter runs alike on all processors, at any speed of theirs, as far as the
-/// system relies on that.
+/// system relies on the counter.
 fn has_counter() -> bool {
     static HAS: OnceLock<bool> = OnceLock::new();
     *HAS.get_or_init(|| {
@@ -173,8 +175,8 @@ fn has_counter() -> bool {
     })
 }
 
-/// Reports whether the processor says that its counter always runs at one rate (AMD manual 3,
-/// CPUID function 8000_0007h).
+/// Reports whether the processor declares a constant rate of its counter (AMD manual 3, CPUID
+/// function 8000_0007h).
 #[cfg(all(target_arch = "x86_64", not(miri)))]
 fn is_counter_invariant() -> bool {
     use std::arch::x86_64::__cpuid;
@@ -195,7 +197,7 @@ fn counter() -> u64 {
     unsafe { std::arch::x86_64::_rdtsc() }
 }
 
-/// Without one each reading asks the system.
+/// Returns a value that makes each reading ask the system, as there is no counter.
 #[cfg(any(not(target_arch = "x86_64"), miri))]
 const fn counter() -> u64 {
     u64::MAX

@@ -1,4 +1,4 @@
-//! The handle of a run: what changes it while it goes on, from any thread, and shows it to people.
+//! The handle of a run: changes the run from any thread while it goes on, and shows it to people.
 
 use std::sync::{Arc, Barrier, PoisonError, RwLock};
 use std::time::Duration;
@@ -13,8 +13,8 @@ use crate::office::Office;
 use crate::team::Team;
 use crate::{clock, sys};
 
-/// The handle of a committed run. Its requests are carried out by the release thread of the DAG's
-/// cluster, at once; after the run it does nothing.
+/// The handle of a committed run. The release thread of the DAG's cluster carries out requests at
+/// once. After the run, requests do nothing.
 ///
 /// ```
 /// use std::time::Duration;
@@ -36,8 +36,8 @@ use crate::{clock, sys};
 /// assert_eq!(run.violations().count(), 0);
 /// ```
 ///
-/// A thread that asks it how the run does takes a cluster's lock for a moment, so it has to be one
-/// that nobody preempts meanwhile: [`raise`](Self::raise). Nothing of the caller's runs under it:
+/// A thread asking for the run's state takes a cluster's lock for a moment, so nobody must preempt
+/// that thread meanwhile: see [`raise`](Self::raise). No code of the caller runs under the lock:
 ///
 /// ```compile_fail,E0624
 /// linux::Control::get().unwrap().with_scheduler(0, |_| panic!("under a lock"));
@@ -45,11 +45,11 @@ use crate::{clock, sys};
 #[derive(Clone)]
 pub struct Control {
     pub(crate) office: Arc<Office>,
-    /// By cluster.
+    /// The teams, by cluster.
     pub(crate) teams: Arc<[Arc<Team>]>,
 }
 
-/// The run that was committed last, until it has ended.
+/// The latest committed run, until the run has ended.
 static LATEST: RwLock<Option<Control>> = RwLock::new(None);
 
 pub(crate) fn latest() -> Option<Control> {
@@ -61,7 +61,7 @@ pub(crate) fn set(control: Option<Control>) {
     let older = std::mem::replace(&mut *latest, control);
     LATEST.clear_poison();
     drop(latest);
-    // It may be the last one of what the app's functions own.
+    // Dropping this may drop the values owned by the app's functions.
     drop(older);
 }
 
@@ -72,7 +72,7 @@ impl std::fmt::Debug for Control {
 }
 
 impl Control {
-    /// Returns the handle of the run that is committed, unless it is over.
+    /// Returns the handle of the committed run, unless the run is over.
     ///
     /// ```
     /// assert!(linux::Control::get().is_none()); // nothing is committed
@@ -81,7 +81,7 @@ impl Control {
         latest().filter(|control| !control.office.is_over())
     }
 
-    /// Has a DAG's due jobs skipped until it is resumed.
+    /// Skips a DAG's due jobs until the DAG is resumed.
     ///
     /// # Panics
     ///
@@ -91,7 +91,7 @@ impl Control {
         self.change(dag, Request::Pause);
     }
 
-    /// Has a paused DAG's jobs released again.
+    /// Releases a paused DAG's jobs again.
     ///
     /// # Panics
     ///
@@ -101,7 +101,7 @@ impl Control {
         self.change(dag, Request::Resume);
     }
 
-    /// Ends a DAG for good: it starts no further instance.
+    /// Ends a DAG for good: the DAG starts no further instance.
     ///
     /// # Panics
     ///
@@ -111,12 +111,12 @@ impl Control {
         self.change(dag, Request::End);
     }
 
-    /// Has a DAG paused, resumed, closed or ended.
+    /// Pauses, resumes, closes or ends a DAG.
     ///
     /// # Panics
     ///
-    /// If there is no such DAG, the request is another one, which a DAG may not take, or a certificate
-    /// fixes the set.
+    /// If there is no such DAG, if the request is of another kind, not permitted for a DAG, or if a
+    /// certificate fixes the set.
     #[track_caller]
     pub fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
         let dag = self.office.task_set.find(dag);
@@ -133,8 +133,8 @@ impl Control {
         self.office.send(None, request);
     }
 
-    /// Waits until the requests that were left for a DAG's cluster are taken, the run is over, or a
-    /// second has passed. No instance may wait so.
+    /// Waits until the requests left for a DAG's cluster are taken, the run is over, or a second
+    /// has passed. Instances must not wait in this way.
     pub fn wait_for_letters(&self, dag: DagId) {
         let cluster = self.office.task_set.dag(dag).cluster();
         for _ in 0..20_000 {
@@ -143,23 +143,23 @@ impl Control {
             }
             thread::sleep(Duration::from_micros(50));
         }
-        // They are taken in a step, under the lock.
+        // A step takes the requests, under the lock.
         let _ = self.with_scheduler(cluster.index(), |_| ());
     }
 
-    /// Has nothing more released, and what is in flight go on to its end.
+    /// Stops all releases, and lets jobs in flight go on to their end.
     pub fn close(&self) {
         self.office.send_of_all(Request::Close);
     }
 
-    /// Puts the calling thread before all that compute.
+    /// Puts the calling thread before all computing threads.
     pub fn raise(&self) {
         if let Some(levels) = self.office.levels {
             levels.bring(sys::thread(), Role::Release);
         }
     }
 
-    /// Puts it behind them again.
+    /// Puts the calling thread behind all computing threads again.
     pub(crate) fn lower(&self) {
         if let Some(levels) = self.office.levels {
             levels.bring(sys::thread(), Role::Abandoned);
@@ -171,17 +171,18 @@ impl Control {
         &self.office.task_set
     }
 
-    /// Has the scheduler of a cluster answer a question; `None` if there is no such cluster or DAG.
+    /// Asks the scheduler of a cluster a question; returns `None` if there is no such cluster or
+    /// DAG.
     pub fn ask(&self, cluster: usize, query: SchedulerQuery<'_>) -> Option<u64> {
-        // Asked here: a panic under the lock would call the app's hook there.
+        // Checked here: a panic under the lock would call the app's hook under the lock.
         if let SchedulerQuery::Dag(dag, _) = &query {
             self.office.task_set.dags().get(dag.index())?;
         }
         self.with_scheduler(cluster, |scheduler| scheduler.show(query))
     }
 
-    /// Looks at the scheduler of a cluster, shortly. What it calls is under the cluster's lock, so
-    /// none but this crate says what.
+    /// Looks at the scheduler of a cluster, briefly. `look` runs under the cluster's lock, so only
+    /// this crate may pass one.
     pub(crate) fn with_scheduler<T>(
         &self,
         cluster: usize,
@@ -191,8 +192,8 @@ impl Control {
         Some(look(&mut state.engine.scheduler))
     }
 
-    /// Has the run end in order when a signal that is caught asks for it, or has: nothing more is
-    /// released, and what is in flight goes on to its end.
+    /// Ends the run in order when a caught signal asks for its end, or has asked already: releases
+    /// stop, and jobs in flight go on to their end.
     ///
     /// # Errors
     ///
@@ -220,8 +221,9 @@ impl Control {
         })
     }
 
-    /// Starts a thread that waits for something outside, again and again while there is a run and
-    /// `look` wants more. It has allocated all it needs when this returns.
+    /// Starts a thread waiting for something outside, again and again as long as the run goes on
+    /// and `look` returns true. When this function returns, the thread has allocated all its
+    /// memory.
     fn watch(self, name: &str, look: impl Fn(&Self) -> bool + Send + 'static) -> io::Result<()> {
         let has_begun = Arc::new(Barrier::new(2));
         let begun = Arc::clone(&has_begun);

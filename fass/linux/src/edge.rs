@@ -1,8 +1,8 @@
-//! The edge of runs: what crosses it is recorded into a file, or replayed.
+//! The edge of runs: data crossing the edge is recorded into a file, or replayed.
 //!
-//! The edge has a lock of its own, which is taken under a cluster's lock, and for a moment by a
-//! function that is told the time or a source that is replayed. A thread of no level sends what
-//! waits, so that no instance waits for a file.
+//! The edge has a lock of its own. Threads take the edge's lock under a cluster's lock; functions
+//! asking for the time and replayed sources take it briefly. A thread without a real-time level
+//! sends the waiting data, so no instance waits for a file.
 
 use std::cell::Cell;
 use std::io::{self, Write};
@@ -18,30 +18,30 @@ use sched_dag::engine::Run;
 
 use crate::clock;
 
-/// The time between two looks for what waits.
+/// The time between two looks for waiting data.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// Events are looked for each so many times.
+/// The number of looks for data between two looks for events.
 const EVENTS: u64 = 10;
 
 static EDGE: Mutex<Edge> = Mutex::new(Edge::new());
 
-/// When the run's time begins, on the clock.
+/// The beginning of the run's time, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// The record, if one is kept.
 pub(crate) static FILE: Mutex<Option<BootRecord<File>>> = Mutex::new(None);
 
-/// Whether it is written during a run, too, so that it is there if the program dies.
+/// Whether the record is also written during a run, and so survives the program's death.
 pub(crate) static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
-/// The part of the latest run's recording that is still to be sent.
+/// The part of the latest run's recording still to be sent.
 pub(crate) static LEFT: Mutex<Outgoing> = Mutex::new(None);
 
 thread_local! {
-    /// The instance that this thread runs.
+    /// The instance running on this thread.
     static RUNNING: Cell<Option<Instance>> = const { Cell::new(None) };
-    /// The latest instance that has panicked in it, and where.
+    /// The latest instance to panic on this thread, and the place of the panic.
     static PANICKED: Cell<Option<(Instance, String)>> = const { Cell::new(None) };
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn note_place(place: &Location<'_>) {
     }
 }
 
-/// Takes the place at which an instance of this thread has panicked, if it has.
+/// Takes the place at which an instance of this thread has panicked, if there is one.
 pub(crate) fn place_of(instance: Instance) -> Option<String> {
     let (panicked, place) = PANICKED.take()?;
     (panicked == instance).then_some(place)
@@ -60,12 +60,12 @@ pub(crate) fn place_of(instance: Instance) -> Option<String> {
 
 pub(crate) struct File {
     pub(crate) writer: Box<dyn Write + Send>,
-    /// Why it could not be written, if it could not.
+    /// The reason for the first failed write, if any.
     pub(crate) failure: Option<io::Error>,
 }
 
 impl File {
-    /// Leaves nothing in memory, so that it is there if the program dies.
+    /// Leaves nothing in memory, in case the program dies.
     pub(crate) fn flush(&mut self) {
         if self.failure.is_none() {
             self.failure = self.writer.flush().err();
@@ -90,29 +90,30 @@ pub(crate) fn get() -> MutexGuard<'static, Edge> {
     unpoisoned(&EDGE)
 }
 
-/// Takes note of what this thread runs from now on.
+/// Notes the instance running on this thread from now on.
 pub(crate) fn note_running(instance: Option<Instance>) {
     RUNNING.set(instance);
 }
 
-/// Returns what this thread runs.
+/// Returns the instance running on this thread.
 pub(crate) fn running() -> Option<Instance> {
     RUNNING.get()
 }
 
-/// Returns what this thread runs, and the time of the run.
+/// Returns the instance running on this thread, and the time of the run.
 pub(crate) fn here() -> (Option<Instance>, u64) {
     let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
     (running(), clock::now_ns().saturating_sub(epoch_ns))
 }
 
-/// A thread that sends what waits, as long as a run goes on.
+/// A thread sending waiting data as long as a run goes on.
 pub(crate) struct Sending {
     is_over: Arc<AtomicBool>,
     thread: JoinHandle<Outgoing>,
 }
 
-/// Begins to send, if there is anything. `take_events` adds the events that there are.
+/// Begins to send, if there is anything to send. `take_events` adds the events so far to the
+/// record.
 pub(crate) fn begin_run(
     epoch_ns: u64,
     take_events: impl Fn(&mut BootRecord<File>) + Send + 'static,
@@ -150,12 +151,12 @@ pub(crate) fn begin_run(
     };
     let thread = thread::Builder::new().name("fass-recording".into());
     let thread = thread.spawn(work).expect("the system has a thread to send");
-    // What it allocates it has by now.
+    // By now the thread has allocated its memory.
     has_begun.wait();
     Some(Sending { is_over, thread })
 }
 
-/// Writes how a run has ended.
+/// Writes the end of a run.
 pub(crate) fn end_run(run: &Run) {
     if let Some(file) = &mut *unpoisoned(&FILE) {
         file.end_run(run);
@@ -163,7 +164,7 @@ pub(crate) fn end_run(run: &Run) {
 }
 
 impl Sending {
-    /// Leaves the rest to who ends the recording.
+    /// Stops sending, and leaves the rest to the end of the recording.
     pub(crate) fn leave(self) {
         self.is_over.store(true, Ordering::Release);
         *unpoisoned(&LEFT) = self.thread.join().unwrap_or(None);

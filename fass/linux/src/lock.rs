@@ -2,16 +2,16 @@
 //!
 //! # The owner
 //!
-//! Where a cluster has one core, nothing has a level, and nothing is preempted or has a budget, one
-//! thread takes nearly every step. As the lock's *owner* that thread enters by plain stores: it says
-//! "inside", and looks whether the lock is wanted. Any other thread takes the *word* of the lock,
-//! says that the lock is wanted, and has Linux make each running thread pass a barrier
-//! (`membarrier`).
-//! Either the owner was inside before its barrier: then the other thread sees that, and waits. Or
-//! the owner looks after its barrier, sees that the lock is wanted, and takes the word, too.
+//! If a cluster has one core, nothing has a level, and nothing is preempted or has a budget, one
+//! thread takes nearly every step. As the lock's *owner*, that thread enters by plain stores: the
+//! owner says "inside", and looks whether the lock is wanted. Any other thread takes the *word* of
+//! the lock, says that the lock is wanted, and lets Linux make each running thread pass a barrier
+//! (`membarrier`). Either the owner was inside before its barrier: then the other thread sees the
+//! owner inside, and waits. Or the owner looks after its barrier, sees that the lock is wanted, and
+//! takes the word, too.
 //!
-//! Where threads have levels there is no owner: a thread would wait for an owner from whom it has
-//! the processor. An owner that is lost to a panic only leaves the others the cost of the barrier.
+//! Where threads have levels there is no owner: a thread would wait for an owner whose processor it
+//! has taken. If a panic takes the owner away, the other threads only keep paying for the barrier.
 //!
 //! # Waiting
 //!
@@ -28,48 +28,49 @@ use std::time::Duration;
 
 use crate::sys;
 
-/// How often a thread looks before it sleeps.
+/// How often a thread looks before sleeping.
 const LOOKS: u32 = 100;
 
-/// How often it looks where threads poll.
+/// How often a thread looks before a nap, where threads poll.
 const LOOKS_POLLING: u32 = 2_000;
 
-/// How long it sleeps where threads poll.
+/// How long a thread sleeps, where threads poll.
 const NAP: Duration = Duration::from_micros(20);
 
 const FREE: u32 = 0;
 const TAKEN: u32 = 1;
-/// Taken, and a thread may sleep for it.
+/// Taken, and a thread may sleep for the lock.
 const AWAITED: u32 = 2;
 
-/// A value that one thread at a time has.
+/// A value for one thread at a time.
 #[repr(align(128))]
 pub(crate) struct Lock<T> {
     word: AtomicU32,
-    /// Whether the owner has the lock without the word. Written by the owner alone.
+    /// Whether the owner has the lock without the word. Written only by the owner.
     is_inside: AtomicBool,
-    /// Whether the owner has to take the word. Written by the thread that has the word.
+    /// Whether the owner has to take the word. Written by the thread with the word.
     is_wanted: AtomicBool,
-    /// Whether there is an owner. If not, the lock is always wanted.
+    /// Whether there is an owner. Without an owner, the lock is always wanted.
     is_owned: bool,
     polls: bool,
     value: UnsafeCell<T>,
 }
 
-// SAFETY: the value is reached by a guard alone, and one thread at a time has a guard: the thread
-// that has the word, while the owner is not inside, or the owner inside, while no thread has the
-// word and has seen the owner outside.
+// SAFETY: only a guard reaches the value, and one thread at a time has a guard: the thread with the
+// word, while the owner is not inside, or the owner inside, while no thread has the word and has
+// seen the owner outside.
 unsafe impl<T: Send> Sync for Lock<T> {}
 
-/// The right to the value, until it is dropped.
+/// The right to the value, until the guard is dropped.
 pub(crate) struct Guard<'l, T> {
     lock: &'l Lock<T>,
-    /// Whether the thread has the word. The owner may be inside without.
+    /// Whether the thread has the word. The owner may be inside without the word.
     has_word: bool,
 }
 
 impl<T> Lock<T> {
-    /// Makes one for threads that poll, or do not, and with an owner if there is to be one.
+    /// Makes a lock, for threads that poll or sleep, with an owner if wanted and supported by the
+    /// kernel.
     pub(crate) fn new(value: T, polls: bool, is_owned: bool) -> Self {
         let is_owned = is_owned && sys::register_barrier();
         Self {
@@ -82,13 +83,13 @@ impl<T> Lock<T> {
         }
     }
 
-    /// Waits for the value, as the owner. One thread alone may call this.
+    /// Waits for the value, as the owner. Only one thread may ever call this.
     #[inline]
     pub(crate) fn enter_as_owner(&self) -> Guard<'_, T> {
         self.is_inside.store(true, Ordering::Relaxed);
-        // The processor may still look first; the other thread's barrier sees to that.
+        // The processor may still look first; the other thread's barrier prevents harm.
         compiler_fence(Ordering::SeqCst);
-        // Acquires what a thread that wanted the lock has written.
+        // Acquires the writes of a thread that wanted the lock.
         if !self.is_wanted.load(Ordering::Acquire) {
             return self.guard(false);
         }
@@ -112,7 +113,7 @@ impl<T> Lock<T> {
         Guard { lock, has_word }
     }
 
-    /// Sees to it that the owner is not inside, nor will be. With the word.
+    /// Makes sure that the owner is not inside, and will not enter. Called with the word.
     #[cold]
     #[inline(never)]
     fn keep_owner_out(&self) {
@@ -122,7 +123,7 @@ impl<T> Lock<T> {
         while self.is_inside.load(Ordering::Acquire) {
             looks += 1;
             match looks % LOOKS_POLLING {
-                // It may have lost its processor to this thread.
+                // The owner may have lost its processor to this thread.
                 0 => thread::sleep(NAP),
                 _ => std::hint::spin_loop(),
             }
@@ -159,7 +160,7 @@ impl<T> Lock<T> {
                 thread::sleep(NAP);
                 continue;
             }
-            // From its first sleep on it cannot know whether another thread sleeps, too.
+            // After its first sleep the thread cannot know whether another thread sleeps, too.
             taken = AWAITED;
             if self.word.swap(AWAITED, Ordering::Acquire) == FREE {
                 return;

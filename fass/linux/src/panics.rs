@@ -1,13 +1,15 @@
-//! Panics of instances: one that unwinds, and one that cannot.
+//! Panics of instances: those that unwind, and those that cannot.
 //!
-//! A panic unwinds to the worker that has called the function, and costs the instance its DAG or its
-//! job. If a destructor on the way panics, too, nothing can be unwound any more: Rust calls the panic
-//! hook for the last time, and then aborts the program. Our hook does not return from that. It ends
-//! the instance as one whose budget is exceeded: its DAG is ended, a spare worker has its place, and
-//! its thread, with all that is on its stack, sleeps to the end of the program.
+//! A panic unwinds to the worker that called the function, and costs the instance its DAG or its
+//! job. If a destructor on the way panics, too, unwinding is impossible: Rust calls the panic hook
+//! for the last time, and then aborts the program. Our hook does not return from such a call.
+//! Instead, the hook ends the instance like one whose budget is exceeded: its DAG is ended, and a
+//! spare worker takes its place. Its thread, with everything on its stack, sleeps until the end of
+//! the program.
 //!
-//! Such a panic in no instance still ends the program, and so does any in a program that replaces
-//! the hook. From such a fault on nobody can replace it: `set_hook` waits for the thread in the hook.
+//! Outside of instances, such a panic still ends the program, and so does any in a program that
+//! replaces the hook. After such a fault nobody can replace the hook: `set_hook` waits for the
+//! thread inside.
 
 use std::any::Any;
 use std::panic::{self, AssertUnwindSafe, catch_unwind};
@@ -16,18 +18,20 @@ use std::thread;
 
 use crate::edge;
 
-/// The messages of panics that the standard library lets nothing survive.
+/// The messages of panics after which the standard library lets nothing survive.
 const LAST: [&str; 2] = [
     "panic in a destructor during cleanup",
     "panic in a function that cannot unwind",
 ];
 
-/// Adds to the hook that is there, once: places are noted, and a panic that cannot unwind is kept to
-/// its DAG. `strand` gives the calling thread's instance up, and reports whether it has one.
+/// Extends the present panic hook, once: notes the places of panics, and confines a panic that
+/// cannot unwind to its DAG. `strand` gives up the calling thread's instance, and reports whether
+/// there is one.
 pub(crate) fn contain(strand: fn(&str) -> bool) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // It has told of the panics before the last one, and may take that for the program's end.
+        // The hook before ours has reported the earlier panics, and may take the last one for the
+        // program's end.
         let before = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
             let text = info.payload().downcast_ref::<&str>();
@@ -44,20 +48,21 @@ pub(crate) fn contain(strand: fn(&str) -> bool) {
     });
 }
 
-/// Calls a function of the app; the error is its panic's message.
+/// Calls a function of the app. The error is the message of a panic.
 #[inline]
 pub(crate) fn caught<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(call)).map_err(message)
 }
 
-/// Returns a panic's message, and drops what it was raised with: that is the app's, and may panic.
+/// Returns a panic's message, and drops the panic's payload. The payload is the app's, so dropping
+/// may panic.
 #[cold]
 fn message(panic: Box<dyn Any + Send>) -> String {
     let text = panic.downcast_ref::<&str>().copied();
     let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     let text = text.unwrap_or("a panic without a message").to_owned();
     if let Err(another) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
-        // It may go on like that.
+        // Dropping the second payload may panic again.
         std::mem::forget(another);
     }
     text

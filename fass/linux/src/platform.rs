@@ -1,6 +1,6 @@
-//! Linux as the platform that `fass` runs on: one for the program.
+//! Linux as the platform of `fass`, one for the program.
 //!
-//! A run is there, too: its threads while it goes on, and what it leaves behind.
+//! The module also contains a run: its threads while the run goes on, and its results afterwards.
 
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -38,16 +38,16 @@ pub(crate) static HOST: Host = Host {
     launched: Mutex::new(None),
 };
 
-/// How much memory a journal may take its quarter of.
+/// The memory of which a journal may take a quarter, in bytes.
 const JOURNAL_BYTES: usize = 1 << 30;
 
 impl Host {
-    /// Returns what the next commit runs on; `None` before there is a machine.
+    /// Returns the platform of the next commit; `None` before there is a machine.
     pub(crate) fn threads(&self) -> MutexGuard<'_, Option<Threads>> {
         self.threads.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes what was committed last.
+    /// Takes the latest committed plan.
     pub(crate) fn take_launched(&self) -> Option<Launched> {
         let mut launched = self.launched.lock();
         let launched = launched.as_deref_mut();
@@ -58,7 +58,7 @@ impl Host {
 impl Platform for Host {
     fn terms(&self) -> RunConfig {
         let threads = self.threads();
-        // Without a machine, those of none.
+        // Without a machine, the terms of a single core.
         threads
             .as_ref()
             .map_or(RunConfig::of_cores(1), |of| of.terms.clone())
@@ -142,7 +142,7 @@ impl Platform for Host {
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
         }
-        // Values that are restored are decoded by code of the app, which runs under no lock.
+        // The app's code decodes restored values, so no lock may be held here.
         let mut file = unpoisoned(&FILE).take();
         let is_launched = at_edge::launch(self, &mut plan, file.as_mut());
         *unpoisoned(&FILE) = file;
@@ -168,7 +168,7 @@ impl Platform for Host {
     }
 }
 
-/// Makes what the threads of each cluster share.
+/// Makes the state shared by the threads of each cluster.
 fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> Arc<[Arc<Team>]> {
     let (task_set, options) = (&plan.task_set, threads.terms.scheduler);
     let mut runners: Vec<Vec<SubtaskRunner>> = task_set.clusters().map(|_| Vec::new()).collect();
@@ -196,7 +196,7 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
 /// Time between the start of a run and its first release.
 const LEAD_NS: u64 = 1_000_000;
 
-/// The platform on which the next commits run.
+/// The platform of the next commits.
 #[derive(Clone, Debug)]
 pub(crate) struct Threads {
     /// The terms of the commits to come.
@@ -205,32 +205,33 @@ pub(crate) struct Threads {
     pub(crate) levels: Option<Levels>,
     /// Whether idle threads watch instead of sleeping.
     pub(crate) polls: bool,
-    /// Whether the run's time skips what would pass idly.
+    /// Whether the run's time skips idle intervals.
     pub(crate) skips_idle: bool,
-    /// Counts what the program has allocated so far.
+    /// Counts the program's allocations so far.
     pub(crate) allocations: fn() -> u64,
 }
 
-/// A plan that was committed.
+/// A committed plan.
 pub(crate) struct Launched {
     pub(crate) control: Control,
     pub(crate) proven: ProvenBounds,
     pub(crate) threads: Threads,
 }
 
-/// How often the run's threads did what.
+/// Counts of the run's hand-offs, calls and preemptions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Completions that handed their core the next instance: same thread, no wake.
+    /// Completions that handed their core the next instance: same thread, no wake-up.
     pub hand_offs: u64,
-    /// Calls of workers, and instances left to them: where workers sleep, a wake of the kernel's each.
+    /// Calls of workers, and instances handed to them. Where workers sleep, each costs a wake-up by
+    /// the kernel.
     pub calls: u64,
-    /// Instances that lost their core to a more urgent one.
+    /// Instances that lost their core to a more urgent instance.
     pub preemptions: u64,
 }
 
-/// A run that has ended: what [every platform](engine::Run) tells of it, its faults, and the counts
-/// of its threads.
+/// The results of a finished run: the [report of every platform](engine::Run), its faults, and the
+/// counts of its threads.
 ///
 /// See [`Linux`](crate::Linux).
 #[derive(Debug)]
@@ -248,8 +249,8 @@ impl Deref for Run {
     }
 }
 
-/// Starts the threads of a committed plan, waits for the end of all its jobs, and
-/// returns what happened. Releases count from `epoch_ns`, or from right now.
+/// Starts the threads of a committed plan, waits until all its jobs have ended, and returns the
+/// results. Releases count from `epoch_ns`, or from 1 ms after the threads are ready.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
     section::make_room(teams.iter().map(|team| team.workers.len()).sum());
@@ -279,7 +280,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let mut parts = states.iter_mut().map(|state| &mut state.engine);
     let first = parts.next().expect("there is a cluster at least");
     let mut run = engine::Run::from_engine(first, launched.proven, threads.terms.scheduler.cores);
-    // Nobody writes any more: those that were abandoned see that they were.
+    // Nobody writes any more: abandoned workers see that they are abandoned.
     parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();
     let mut faults = Vec::new();
@@ -310,8 +311,8 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     }
 }
 
-/// Copies events into the record, with the level of who releases jobs, so that nobody who waits for
-/// the lock waits for those that compute.
+/// Copies events into the record at the level of the release thread. So threads waiting for the
+/// lock do not wait for computing threads.
 fn events(control: Control) -> impl Fn(&mut BootRecord<File>) {
     move |record| {
         control.raise();
@@ -338,19 +339,19 @@ fn join(thread: JoinHandle<()>) {
 }
 
 impl Run {
-    /// Returns the faults, of each cluster in their order.
+    /// Returns the faults, in order within each cluster.
     #[must_use]
     pub fn faults(&self) -> &[Fault] {
         &self.faults
     }
 
-    /// Returns what every platform tells of it.
+    /// Returns the part of the results common to every platform.
     #[must_use]
     pub fn into_run(self) -> engine::Run {
         self.run
     }
 
-    /// Returns how often the threads did what.
+    /// Returns the counts of hand-offs, calls and preemptions.
     pub const fn counts(&self) -> Counts {
         self.counts
     }

@@ -1,9 +1,9 @@
-//! Sections of locks, which exclude each other by a mutex and a condition variable.
+//! Lock sections, made mutually exclusive by a mutex and a condition variable.
 //!
-//! Their holder can be preempted. It then has its core when nothing else has, and gives the lock back.
-//! A thread whose instance is ended in a section may never do so, and is *given up*: nobody waits for
-//! it any more. As it keeps the claim of the data until it returns, what enters sees that the lock is
-//! lost.
+//! A section's holder can be preempted. The holder then gets its core back when nothing else has
+//! the core, and gives the lock back. A thread whose instance is ended in a section may never do
+//! so, and is *given up*: nobody waits for the thread any more. Since it keeps the claim on the
+//! data until it returns, the next thread entering sees that the lock is lost.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -13,13 +13,13 @@ use fass::platform::LockWords;
 
 use crate::clock;
 
-/// The threads that are given up. Taken by a thread that reads or changes a lock's words.
+/// The threads given up. Locked by any thread reading or changing a lock's words.
 static GIVEN_UP: Mutex<Vec<u32>> = Mutex::new(Vec::new());
 static RELEASED: Condvar = Condvar::new();
 
 thread_local! {
     static IS_IN_SECTION: Cell<bool> = const { Cell::new(false) };
-    /// The number of this thread, which no other one ever has, nor 0.
+    /// The number of this thread, never 0 and never used by another thread.
     static OWN: u32 = {
         static LATEST: AtomicU32 = AtomicU32::new(0);
         LATEST.fetch_add(1, Relaxed) + 1
@@ -31,24 +31,25 @@ pub(crate) fn own() -> u32 {
     OWN.with(|own| *own)
 }
 
-/// Makes room for so many threads that are given up.
+/// Makes room for so many given-up threads.
 pub(crate) fn make_room(threads: usize) {
     given_up().reserve(threads);
 }
 
-/// Gives a thread up: nobody waits for the section that it is in, and it enters no further one.
+/// Gives a thread up: nobody waits for the thread's present section, and the thread enters no
+/// further one.
 pub(crate) fn give_up(thread: u32) {
     given_up().push(thread);
     RELEASED.notify_all();
 }
 
-/// Takes note that the calling thread, which may have been given up, is about to end.
+/// Notes that the calling thread, perhaps given up, is about to end.
 pub(crate) fn forget() {
     given_up().retain(|thread| *thread != own());
 }
 
-/// Waits for a lock, and calls `section` in it. Returns how long that took; `None`, without a call,
-/// if the caller is in a section.
+/// Waits for a lock, and calls `section` under the lock. Returns the duration of the call in
+/// nanoseconds; `None`, without a call, if the caller is in a section already.
 pub(crate) fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     if IS_IN_SECTION.replace(true) {
         return None;
@@ -83,7 +84,7 @@ struct Held<'l>(&'l LockWords);
 impl Drop for Held<'_> {
     fn drop(&mut self) {
         let words = given_up();
-        // If this one was given up, it may be another one's by now.
+        // If this thread was given up, the lock may belong to another thread by now.
         let _ = (self.0.state).compare_exchange(own(), 0, Relaxed, Relaxed);
         drop(words);
         RELEASED.notify_all();

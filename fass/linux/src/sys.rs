@@ -1,7 +1,8 @@
-//! Linux's system calls that the standard library lacks: the only `unsafe` code of the crate.
+//! Linux's system calls missing from the standard library: the crate's only module for system
+//! calls.
 //!
-//! The symbols are those of the C library, which the standard library links anyway. Each
-//! function checks what it gets back and is safe to call with any arguments.
+//! The symbols belong to the C library, linked by the standard library anyway. Each function checks
+//! the results of its calls and is safe to call with any arguments.
 
 use std::ffi::{CStr, c_char};
 use std::io;
@@ -60,7 +61,7 @@ const SYS_BPF: i64 = 280;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ThreadId(pub(crate) i32);
 
-/// A set of processors, as many as Linux has at most.
+/// A set of processors, with room for Linux's maximum.
 type Mask = [u64; 128];
 
 /// Returns the calling thread's number.
@@ -83,20 +84,20 @@ pub(crate) fn monotonic_ns() -> u64 {
     time_of(CLOCK_MONOTONIC).expect("every Linux has this clock")
 }
 
-/// Returns the processor time that the calling thread has taken.
+/// Returns the processor time taken by the calling thread, in nanoseconds.
 pub(crate) fn own_processor_time_ns() -> u64 {
     time_of(CLOCK_THREAD).expect("every thread has this clock")
 }
 
-/// Returns the processor time that a thread of this program has taken; `None` if there is
-/// none of that number.
+/// Returns the processor time taken by a thread of this program, in nanoseconds; `None` if there is
+/// no thread with that number.
 pub(crate) fn processor_time_ns(thread: ThreadId) -> Option<u64> {
-    // How the kernel numbers threads' clocks, clock_getcpuclockid(3): bit 2 is for a
-    // thread, 2 for the time that the scheduler counts.
+    // The kernel's numbers of threads' clocks, clock_getcpuclockid(3): bit 2 marks a thread, and 2
+    // selects the time counted by the scheduler.
     time_of(!thread.0 << 3 | 4 | 2)
 }
 
-/// Returns the processors that this program may use.
+/// Returns the processors available to this program.
 pub(crate) fn processors() -> Vec<u32> {
     let mut mask: Mask = [0; 128];
     // SAFETY: the kernel writes at most as many bytes as the mask has.
@@ -123,7 +124,7 @@ pub(crate) fn confine(thread: ThreadId, processors: &[u32]) -> io::Result<()> {
     checked(result)
 }
 
-/// Puts a thread of this program at a level of SCHED_FIFO. Threads that it starts are not there.
+/// Puts a thread of this program at a level of SCHED_FIFO. Its child threads begin without a level.
 pub(crate) fn set_level(thread: ThreadId, level: i32) -> io::Result<()> {
     const FIFO: i32 = 1;
     const RESET_ON_FORK: i32 = 0x4000_0000;
@@ -132,7 +133,7 @@ pub(crate) fn set_level(thread: ThreadId, level: i32) -> io::Result<()> {
     checked(result)
 }
 
-/// Puts a thread of this program into the class that all programs begin in.
+/// Puts a thread of this program into the default class of all programs.
 pub(crate) fn set_normal(thread: ThreadId) -> io::Result<()> {
     let level = 0;
     // SAFETY: the kernel reads one `sched_param`, which is a number.
@@ -140,22 +141,22 @@ pub(crate) fn set_normal(thread: ThreadId) -> io::Result<()> {
     checked(result)
 }
 
-/// Lets the calling thread's timers be exact, where real-time levels do not do that.
+/// Makes the calling thread's timers exact, in case its class does not.
 pub(crate) fn make_timers_exact() {
     const TIMER_SLACK: i32 = 29;
     // SAFETY: the option takes a number.
     unsafe { prctl(TIMER_SLACK, 1_u64) };
 }
 
-/// Prepares for [`barrier`], and reports whether that can be called.
+/// Prepares for [`barrier`], and reports whether the barrier can be used.
 pub(crate) fn register_barrier() -> bool {
     const REGISTER_PRIVATE_EXPEDITED: i32 = 1 << 4;
     // SAFETY: the call takes numbers.
     !cfg!(miri) && unsafe { syscall(SYS_MEMBARRIER, REGISTER_PRIVATE_EXPEDITED, 0, 0) == 0 }
 }
 
-/// Makes each running thread of the program pass a full barrier. What they have done before is seen
-/// after the call, and what was done before the call is seen by what they do next.
+/// Makes each running thread of the program pass a full barrier. Their earlier writes are visible
+/// after the call, and writes before the call are visible to their later reads.
 pub(crate) fn barrier() {
     const PRIVATE_EXPEDITED: i32 = 1 << 3;
     // SAFETY: the call takes numbers.
@@ -163,15 +164,15 @@ pub(crate) fn barrier() {
     assert!(result == 0, "a program that has registered may call this");
 }
 
-/// Keeps all memory of the program, also what it will have, from being paged out.
+/// Keeps all present and future memory of the program from being paged out.
 pub(crate) fn lock_memory() -> io::Result<()> {
     const CURRENT_AND_FUTURE: i32 = 3;
     // SAFETY: the call takes flags and changes no contents of memory.
     checked(unsafe { mlockall(CURRENT_AND_FUTURE) })
 }
 
-/// Lets the kernel end the program when one of its threads has been at a real-time level
-/// for so long without ever waiting.
+/// Makes the kernel end the program when one of its threads has run at a real-time level for so
+/// long without ever waiting.
 pub(crate) fn limit_real_time(microseconds: u64) -> io::Result<()> {
     const RLIMIT_RTTIME: i32 = 15;
     let limits = [microseconds; 2];
@@ -179,8 +180,8 @@ pub(crate) fn limit_real_time(microseconds: u64) -> io::Result<()> {
     checked(unsafe { setrlimit(RLIMIT_RTTIME, &raw const limits) })
 }
 
-/// Returns the memory of a table of BPF's that is pinned at a place and of at least so many bytes,
-/// for as long as the program lasts.
+/// Returns the memory of a BPF table pinned at a place, of at least so many bytes. The memory stays
+/// valid until the program ends.
 pub(crate) fn pinned_table(place: &CStr, bytes: usize) -> io::Result<&'static [AtomicU32]> {
     /// `union bpf_attr` for this command.
     #[repr(C)]
@@ -201,21 +202,20 @@ pub(crate) fn pinned_table(place: &CStr, bytes: usize) -> io::Result<&'static [A
     let file = unsafe { syscall(SYS_BPF, GET_PINNED, &raw const pinned, size_of::<Pinned>()) };
     let file = i32::try_from(file).unwrap_or(-1);
     checked(file)?;
-    // SAFETY: the kernel has just opened it for us, and nobody else has its number.
+    // SAFETY: the kernel has just opened the file for us, and nobody else has its number.
     let file = unsafe { OwnedFd::from_raw_fd(file) };
     let none = std::ptr::null_mut();
-    // SAFETY: the kernel chooses an address at which nothing is, and refuses more bytes than there
-    // are.
+    // SAFETY: the kernel chooses an unused address, and refuses more bytes than the table has.
     let table = unsafe { mmap(none, bytes, READ_AND_WRITE, SHARED, file.as_raw_fd(), 0) };
     if table.addr() == usize::MAX {
         return Err(io::Error::last_os_error());
     }
-    // SAFETY: the memory is on pages of its own and never given back; whatever bits it has are
-    // numbers, and what the kernel does to them meanwhile is atomic, too.
+    // SAFETY: the memory is on pages of its own and never given back. Any bits are valid numbers,
+    // and the kernel's concurrent accesses are atomic, too.
     Ok(unsafe { std::slice::from_raw_parts(table.cast(), bytes / size_of::<AtomicU32>()) })
 }
 
-/// A descriptor that waits for something new in a file.
+/// A descriptor waiting for new input in a file.
 pub(crate) struct Arrivals(OwnedFd);
 
 impl Arrivals {
@@ -227,7 +227,7 @@ impl Arrivals {
         // SAFETY: the call takes flags.
         let epoll = unsafe { epoll_create1(CLOSE_ON_EXEC) };
         checked(epoll)?;
-        // SAFETY: the kernel has just opened it for us, and nobody else has its number.
+        // SAFETY: the kernel has just opened the descriptor for us, and nobody else has its number.
         let arrivals = Self(unsafe { OwnedFd::from_raw_fd(epoll) });
         let interest = Interest {
             events: INPUT_ARRIVES,
@@ -238,7 +238,7 @@ impl Arrivals {
         Ok(arrivals)
     }
 
-    /// Waits, and reports whether anything has arrived since the last time.
+    /// Waits, and reports whether anything has arrived since the last wait.
     pub(crate) fn wait(&self, most_ms: i32) -> bool {
         let mut event = Interest { events: 0, data: 0 };
         // SAFETY: the kernel writes at most one `epoll_event`.

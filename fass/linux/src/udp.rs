@@ -1,9 +1,9 @@
-//! Datagrams: packets of a wire go to a peer, and those of peers to its port arrive.
+//! Datagrams: packets of a wire go to a peer, and packets of peers arrive at the wire's port.
 //!
 //! Each wire has a socket, bound to all addresses of this computer, and a thread waiting for
-//! datagrams. Another thread sends for all wires. A completion wakes the sender, by an exchange and,
-//! while the sender sleeps, a call of the kernel. Neither thread has a level, as with bytes. A
-//! [protocol](Protocol) stands in the place of a wire, before wires of its own.
+//! datagrams. Another thread sends for all wires. A completion wakes the sender, by an exchange
+//! and, while the sender sleeps, by a system call. Neither thread has a real-time level, as with
+//! bytes. A [protocol](Protocol) takes the place of a wire, in front of its own wires.
 
 use std::fmt;
 use std::io;
@@ -42,7 +42,7 @@ pub struct UdpConnection {
 }
 
 struct UdpPlace {
-    /// The wires: of a protocol, or one.
+    /// The wires: those of a protocol, or one.
     ends: Box<[Arc<DeviceEnd>]>,
     protocol: Option<Mutex<Box<dyn Protocol>>>,
     socket: UdpSocket,
@@ -60,11 +60,11 @@ static SENDER: OnceLock<Thread> = OnceLock::new();
 
 impl Linux {
     /// Connects a wire to UDP, from a port of this computer; 0 is any free port. A wire with a peer
-    /// hears nobody else. Without a peer the wire hears everyone, and answers whom an instance
-    /// [says](fass::shared::Sender::to), or else the latest peer. To be called after the commit and
-    /// once a wire.
+    /// hears nobody else. Without a peer the wire hears everyone, and answers the address [given by
+    /// an instance](fass::shared::Sender::to), or else the latest peer. To be called after the
+    /// commit and once a wire.
     ///
-    /// A packet goes with 1,472 bytes at most. The wire's link is up during the connection.
+    /// A packet carries 1,472 bytes at most. The wire's link is up during the connection.
     ///
     /// ```
     /// use std::time::Duration;
@@ -101,20 +101,21 @@ impl Linux {
         connect(Box::new([Arc::new(end)]), None, socket, peer)
     }
 
-    /// Connects a protocol to its peer, from port 49,152 of this computer if that is free, or another.
-    /// To be called before the commit of its wires' DAGs, and once a run.
+    /// Connects a protocol to its peer, from port 49,152 of this computer, or from another port if
+    /// that is taken. To be called before the commit of the DAGs using the protocol's wires, and
+    /// once a run.
     ///
     /// See [`connect_udp`](Self::connect_udp).
     ///
     /// # Errors
     ///
-    /// A wire of the protocol's is connected already, or the system has no more threads.
+    /// A wire of the protocol is connected already, or the system has no more threads.
     pub fn connect_protocol(
         &self,
         mut protocol: Box<dyn Protocol>,
         peer: SocketAddrV4,
     ) -> io::Result<UdpConnection> {
-        // From the same port a node that begins again ends the session of the one before at once.
+        // With the same port, a node that begins again ends the session of the node before at once.
         let socket = bind(FIRST_OWN_PORT).or_else(|_| bind(0))?;
         let ends = protocol.begin(MOST_BYTES, wake_sender);
         let ends = ends.map_err(io::Error::other)?;
@@ -128,7 +129,7 @@ fn bind(port: u16) -> io::Result<UdpSocket> {
         let line = format!("UDP port {port} cannot be had ({why}); {remedy}");
         io::Error::new(why.kind(), line)
     })?;
-    // The end of a run wakes the receiver by a datagram, which a firewall may stop.
+    // The end of a run wakes the receiver by a datagram, and a firewall may stop that.
     socket.set_read_timeout(Some(Duration::from_secs(1)))?;
     Ok(socket)
 }
@@ -167,7 +168,7 @@ fn connect(
     Ok(UdpConnection { place, receiver })
 }
 
-/// Sends what is to go, again and again.
+/// Sends waiting packets, again and again.
 fn send() {
     loop {
         let places = unpoisoned(&PLACES);
@@ -185,8 +186,8 @@ impl UdpPlace {
     /// Sends all packets.
     fn send(&self) {
         let say = |packet: &mut Buffer, to: Option<SocketAddrV4>| {
-            // Without a peer the packet is for nobody. If the kernel refuses a packet, that is lost, as
-            // on any way.
+            // Without a peer the packet is for nobody. If the kernel refuses a packet, the packet
+            // is lost, as on any way.
             let _ = to.map(|to| self.socket.send_to(packet.content(), to));
             true
         };
@@ -228,15 +229,15 @@ impl UdpPlace {
             }
         }
         if come == 0 {
-            // It may be a question of a protocol's peer.
+            // The packet may be a question of a protocol's peer.
             wake_sender();
         }
     }
 
     /// Lets datagrams arrive, until the end.
     fn receive(&self) {
-        // Behind the headroom each buffer has room for the wire's longest packet. With a byte more, a
-        // longer datagram, though cut, is too long all the same, and counted.
+        // Behind the headroom each buffer has room for the wire's longest packet, and a byte more.
+        // So a longer datagram, though cut, is still too long, and is counted.
         const START: usize = Buffer::HEADROOM - 1;
         let mut buffer = Buffer::new(START + MOST_RECEIVED);
         loop {
@@ -263,7 +264,8 @@ impl UdpConnection {
         address.map_or(0, |address| address.port())
     }
 
-    /// Sends the rest, says goodbye by a protocol, and ends the connection. A second time does nothing.
+    /// Sends the rest, says goodbye by a protocol, and ends the connection. A second call does
+    /// nothing.
     ///
     /// See [`Linux::connect_udp`].
     pub fn close(&mut self) {
@@ -282,11 +284,11 @@ impl UdpConnection {
         place.set_link(false);
         place.has_ended.store(true, Ordering::Release);
         let _ = (place.socket).send_to(&[], (Ipv4Addr::LOCALHOST, self.port()));
-        // Then the port is free. The thread does not panic.
+        // After the join the port is free. The thread does not panic.
         let _ = receiver.join();
     }
 
-    /// Shows the protocol, if it is the connection of one, and its wires.
+    /// Shows the protocol and its wires, if the connection has a protocol.
     ///
     /// See [`Linux::connect_protocol`].
     pub fn with_protocol(&self, look: impl FnOnce(&dyn Protocol, &[Arc<DeviceEnd>])) {

@@ -33,8 +33,8 @@ use crate::level::{Levels, Role};
 use crate::sys::ThreadId;
 use crate::{clock, section, sys};
 
-/// The worker runs no instance: it waits, has the scheduler's lock, or is about to take the lock.
-/// Where workers are never demoted, the mode is always this.
+/// The worker runs no instance: it waits, or has the scheduler's lock or is about to take it.
+/// Without demotions, the mode is always this.
 const REPORTS: u32 = 0;
 /// The worker runs an instance as its core should.
 const RUNS: u32 = 1;
@@ -97,7 +97,7 @@ impl Worker {
         self.thread.get().map(|of| of.0)
     }
 
-    /// Gives the worker's thread up for sections, including the section it is in.
+    /// Gives the worker's thread up, with the section it is in.
     pub(crate) fn give_up_sections(&self) {
         if let Some((_, thread)) = self.thread.get() {
             section::give_up(*thread);
@@ -182,8 +182,8 @@ impl Worker {
         self.polls && self.seat().is_some()
     }
 
-    /// Watches for a call, and for an instant. Reports whether there is a call. May also return
-    /// early for no reason, so the caller sees other changes.
+    /// Watches for a call, and for an instant. Reports whether there is a call. May return early,
+    /// so the caller sees other changes.
     fn poll(&self, until_ns: u64) -> bool {
         for _ in 0..PATIENCE {
             if self.call.load(Ordering::Relaxed) != 0 {

@@ -1,13 +1,14 @@
 //! The cost of large typed chains in virtual time: of their commit, and of an instance.
 //!
-//! Chains of 100 to 100,000 subtasks have a `u64` on each edge. Of the commit the whole is
-//! measured, from the registered functions to bodies that can run: verification, answer,
-//! slots. Of the instances, what a job takes from the source's function to the sink's: the
-//! scheduler, the journal, the values and the surroundings of a function. The
-//! first job is also the first to touch what the commit has made.
+//! Chains of 100 to 100,000 subtasks have a `u64` on each edge. The commit is measured as a whole,
+//! from the registered functions to bodies that can run: verification, answer, slots. For
+//! instances, a job is measured from the source's function to the sink's: scheduler, journal,
+//! values and the surroundings of a function. The first job is also the first to touch the memory
+//! made by the commit.
 //!
-//! A host that does other work takes its processor away from each of the large ones, and from
-//! hardly one of the small ones; so on such a host the former seem to be dearer. With
+//! A busy host takes its processor away from each of the large chains, and from hardly any of the
+//! small ones; so on such a host large chains seem to cost more.
+//! `cargo run --release -p virtual-time --example large 1000` measures a single size.
 //! `cargo run --release -p virtual-time --example large 1000` one size is measured alone.
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,7 +19,7 @@ use virtual_time::VirtualTime;
 
 const SUBTASKS: [u32; 4] = [100, 1_000, 10_000, 100_000];
 
-/// How many instances are run, at least.
+/// The least number of instances to run.
 const INSTANCES: u32 = 200_000;
 
 fn main() {
@@ -59,7 +60,7 @@ fn each(time: Duration, count: u32) -> f64 {
     time.as_secs_f64() * 1e9 / f64::from(count)
 }
 
-/// Makes a chain whose source and sink note when they are called.
+/// Makes a chain whose source and sink note the times of their calls.
 fn chain(subtasks: u32, jobs: u32, ends: &Arc<Mutex<Vec<Instant>>>) -> Dag {
     let end = || {
         let ends = Arc::clone(ends);

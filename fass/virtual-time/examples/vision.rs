@@ -16,8 +16,8 @@ fn main() -> Result<(), CommitError> {
     Ok(())
 }
 
-/// Commits the DAG, runs three jobs of it on two cores, and says what was known before
-/// and what happened then.
+/// Commits the DAG, runs three jobs of it on two cores, and returns the commit's answer and the
+/// events of the run.
 pub(crate) fn run() -> Result<String, CommitError> {
     let machine = VirtualTime::new().cores(2);
     let ms = Duration::from_millis;

@@ -1,4 +1,4 @@
-//! The command by which an app replays its recordings on the host.
+//! The host command with which an app replays its recordings.
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -24,7 +24,7 @@ first job is shown in which a function panics, if one does.
 exit codes: 0 nothing differs; 1 something does, a function panics in a job that the recorded run has
 not survived, or there is no such job; 2 a refused command line or file";
 
-/// The command line, parsed.
+/// The parsed command line.
 struct Words {
     file: OsString,
     from: Option<(String, u64)>,
@@ -33,11 +33,10 @@ struct Words {
     policy: Policy,
 }
 
-/// Replays the recording that the command line names, in the `main` of an app's example;
-/// `--until DAG/JOB` stops at a job and shows what its subtasks got and gave, `--from DAG/JOB`
-/// begins
-/// late, and `--help` says the rest. `commit` gets the file's bytes, builds the app's DAGs and
-/// commits them.
+/// Replays the recording named on the command line, in the `main` of an app's example.
+/// `--until DAG/JOB` stops at a job and shows its subtasks' inputs and outputs, `--from DAG/JOB`
+/// begins late, and `--help` explains the rest. `commit` gets the file's bytes, builds the app's
+/// DAGs and commits them.
 ///
 /// ```no_run
 /// use std::process::ExitCode;
@@ -116,14 +115,14 @@ fn replay(
 ) -> Result<ExitCode, String> {
     let place = words.file.to_string_lossy();
     let bytes = fs::read(&words.file).map_err(|error| format!("{place}: {error}"))?;
-    // An app keeps what it reads for as long as it runs, as on its machine.
+    // An app keeps its input for its whole run, as on its machine.
     let bytes = recording::completed(bytes).map_err(|malformed| format!("{place}: {malformed}"))?;
     let bytes: &'static [u8] = bytes.into_owned().leak();
     let machine = VirtualTime::new().cores(words.cores).policy(words.policy);
     if cfg!(panic = "abort") {
         name_remedy();
     }
-    // Mostly the panic is what is looked for: contained, its job can be shown.
+    // Users mostly look for the panic itself: once contained, its job can be shown.
     let machine = machine.contain_panics().replay(bytes);
     let machine = machine.map_err(|malformed| format!("{place}: {malformed}"))?;
     let machine = match &words.from {
@@ -154,7 +153,8 @@ fn replay(
     Ok(ExitCode::FAILURE)
 }
 
-/// Says, after a panic that ends the command, how it is built so that it shows the job instead.
+/// After a panic that ends the command, explains how to build the command for showing the job
+/// instead.
 fn name_remedy() {
     let show = panic::take_hook();
     panic::set_hook(Box::new(move |info| {

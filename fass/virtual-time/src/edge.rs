@@ -1,10 +1,10 @@
-//! The edge of a run: values are written down, or taken from a recording.
+//! The edge of a run: records values, or takes them from a recording.
 //!
-//! A *replay* does not call sources that are recorded, and takes their values; it gives subtasks
-//! what they sampled and the time that they were told; signals come when they came. No job is
-//! lost on the way: releases queue, and a fault cuts what it cut. A job that the recording has no
-//! values of, and an instance that was cut, is passed over: its function is not called. All
-//! other recorded values are compared.
+//! A *replay* does not call recorded sources, but takes their recorded values. Subtasks get their
+//! recorded samples and clock readings, and signals come at their recorded times. No job is lost on
+//! the way: releases queue, and a fault cuts the same instances as in the recorded run. A job
+//! without recorded values and a cut instance are passed over, without calls of their functions.
+//! All other recorded values are compared.
 
 use std::cell::RefCell;
 
@@ -25,18 +25,18 @@ use crate::VirtualTime;
 pub(crate) struct Edge {
     /// The header of this machine's recordings.
     header: RefCell<Header>,
-    /// The values so far, in the order in which they were complete.
+    /// The values so far, in the order of their completion.
     values: RefCell<Vec<Kept>>,
-    /// The times that the running instance was told in its turn, if they are recorded.
+    /// The clock readings given to the running instance in its turn, if they are recorded.
     told: RefCell<Vec<u64>>,
-    /// The inputs of the last jobs, if not all is kept.
+    /// The inputs of the last jobs, unless everything is kept.
     latest: RefCell<Option<LatestJobs>>,
     replay: RefCell<Option<Replay>>,
-    /// The begin of the record: what was committed.
+    /// The beginning of the record: the commit.
     pub(crate) committed: RefCell<Option<edge::BootRecord<Vec<u8>>>>,
 }
 
-/// An entry of the recording to be, without its value, and the value.
+/// An entry of the future recording, without its value, and the value.
 #[derive(Debug)]
 struct Kept {
     entry: Entry<'static>,
@@ -69,21 +69,21 @@ impl Kept {
 }
 
 impl VirtualTime {
-    /// Replays a recording: what [`Dag::record`](fass::Dag::record) says of sources is taken
-    /// from it in place of calling them, and so are samples and times; jobs of which it has no
-    /// values are passed over, and signals come when they came, from nowhere else. To be called
-    /// before the commit, which is refused if the recording is of another graph or of other types,
-    /// has a source that is not recorded now, or has lost a source's value.
+    /// Replays a recording. The values of recorded sources ([`Dag::record`](fass::Dag::record))
+    /// come from the recording instead of calls, and so do samples and clock readings. Jobs without
+    /// recorded values are passed over, and only recorded signals come, at their times. To be
+    /// called before the commit. The commit is refused if the recording has another graph or other
+    /// types, contains a source not recorded now, or has lost a source's value.
     ///
-    /// Values that other subtasks write to recorded topics are compared, as are recorded states:
-    /// [`Report::compared`](crate::Report::compared) says how many values were,
-    /// [`Report::uncompared`](crate::Report::uncompared) how many not, as the run is not over or
-    /// the topic is recorded no more, and [`Report::divergence`](crate::Report::divergence) which
-    /// is the first that differs.
+    /// Values written by other subtasks to recorded topics are compared, and so are recorded
+    /// states: [`Report::compared`](crate::Report::compared) counts the compared values,
+    /// [`Report::uncompared`](crate::Report::uncompared) the values not compared, as the run is not
+    /// over or the topic is not recorded any more.
+    /// [`Report::divergence`](crate::Report::divergence) is the first difference.
     ///
     /// # Errors
     ///
-    /// The bytes are no recording, or are not those that were written.
+    /// The bytes are not a recording, or have been altered.
     ///
     /// See [`Dag::record`](fass::Dag::record) for an example.
     pub fn replay(self, recording: &[u8]) -> Result<Self, Malformed> {
@@ -91,11 +91,11 @@ impl VirtualTime {
         Ok(self)
     }
 
-    /// Has the replay begin as late as may be, so that this job is computed of what was recorded:
-    /// with the last job up to it of which all states of its DAG are
-    /// ([`State::record`](fass::shared::State::record)), or, of a DAG without recorded states, with the job
-    /// itself. Other DAGs begin with what they did then. To be called before the commit, which is
-    /// refused if no inputs of such a DAG are recorded.
+    /// Begins the replay as late as possible for computing this job from recorded data: with the
+    /// last job, up to this one, of which all states of the DAG are recorded
+    /// ([`State::record`](fass::shared::State::record)), or, for a DAG without recorded states,
+    /// with the job itself. Other DAGs begin with their jobs of the same time. To be called before
+    /// the commit. The commit is refused if no inputs of such a DAG are recorded.
     ///
     /// See [`State::record`](fass::shared::State::record) for an example.
     pub fn from(self, dag: &str, job: u64) -> Self {
@@ -104,11 +104,10 @@ impl VirtualTime {
         self
     }
 
-    /// Keeps no more than the inputs of each DAG's last jobs, in memory that is made at the
-    /// commit, as a machine does that records nothing else; so
-    /// [`recording`](Self::recording) has what led to a fault, and no results. Of what a
-    /// function remembers of earlier jobs it says nothing, but in recorded states, which are
-    /// written down twice in so many jobs at least.
+    /// Keeps only the inputs of each DAG's last jobs, in memory allocated at the commit, like a
+    /// machine that records nothing else. So [`recording`](Self::recording) has the inputs leading
+    /// to a fault, but no results. The recording contains nothing a function remembers of earlier
+    /// jobs, except in recorded states. Each state is written down at least twice in so many jobs.
     ///
     /// ```
     /// use virtual_time::VirtualTime;
@@ -135,13 +134,13 @@ impl Edge {
         self.replay.borrow().is_some()
     }
 
-    /// Asks the replay, if this is one.
+    /// Asks the replay, if there is one.
     pub(crate) fn of_replay<T: Default>(&self, ask: impl FnOnce(&mut Replay) -> T) -> T {
         let mut replay = self.replay.borrow_mut();
         replay.as_mut().map(ask).unwrap_or_default()
     }
 
-    /// Reports whether faults of a DAG are those of a replay: what they cut is recorded.
+    /// Reports whether faults of a DAG come from a replay: their cuts are recorded.
     pub(crate) fn is_replayed(&self, dag: DagId) -> bool {
         self.of_replay(|replay| replay.is_of(dag))
     }
@@ -151,8 +150,8 @@ impl Edge {
         edge::open(&mut self.header.borrow_mut(), dag, graph, channels);
     }
 
-    /// Takes a plan, which has to fit to what is replayed, and keeps the inputs of so many jobs, or
-    /// all.
+    /// Takes a plan, checking that it fits the replayed recording. Keeps the inputs of `most_jobs`
+    /// jobs, or of all jobs.
     pub(crate) fn launch(&self, plan: &mut Plan, most_jobs: Option<u32>) -> Result<(), String> {
         let mut header = self.header.borrow_mut();
         edge::name(&mut header, "virtual time", &plan.task_set);
@@ -169,11 +168,11 @@ impl Edge {
         Ok(())
     }
 
-    /// Answers a function that asks for the time: with what was answered in the recorded run, if
-    /// that is recorded.
+    /// Answers a function asking for the time. In a replay, returns the recorded answer, if there
+    /// is one.
     pub(crate) fn answer_ns(&self, instance: Option<Instance>, now_ns: u64) -> u64 {
         let header = self.header.borrow();
-        // Only for DAGs of which something is recorded: the others are never replayed.
+        // Only for DAGs with recorded channels: the others are never replayed.
         let is_noted = |of: &Instance| {
             let mut channels = header.channels.iter();
             channels.any(|channel| usize::from(channel.dag) == of.dag.index())
@@ -187,7 +186,7 @@ impl Edge {
         answer_ns
     }
 
-    /// Ends a turn of an instance, which began then.
+    /// Ends an instance's turn that began at `start_ns`.
     pub(crate) fn finish_turn(&self, instance: Instance, start_ns: u64) {
         let answers = self.told.take();
         if answers.is_empty() {
@@ -195,8 +194,8 @@ impl Edge {
         }
         let mut values = self.values.borrow_mut();
         if let Some(latest) = self.latest.borrow().as_ref() {
-            // Times are kept as long as the inputs of their jobs, so memory does not grow with the
-            // run.
+            // Clock readings are kept as long as the inputs of their jobs, so memory does not grow
+            // with the run.
             values.retain(|Kept { entry, .. }| latest.has(entry.dag.into(), entry.job));
         }
         let of = [instance.dag.0, instance.subtask.0].map(narrow);
@@ -206,7 +205,7 @@ impl Edge {
         });
     }
 
-    /// Takes a value of this run, and compares it with the recorded one.
+    /// Takes a value of this run, and compares the value with the recorded one.
     pub(crate) fn record(&self, value: &RecordedValue<'_>) {
         self.of_replay(|replay| replay.compare(value));
         match self.latest.borrow_mut().as_mut() {
@@ -220,7 +219,7 @@ impl Edge {
 
     /// Lends the recorded value of a channel of the plan.
     pub(crate) fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        // Copied, as what takes it may be the app's, and ask for the time.
+        // Copied, as `take` may be the app's code, and ask for the time.
         let value = self.of_replay(|replay| replay.value(channel, job).map(<[u8]>::to_vec));
         value.as_deref().into_iter().for_each(take);
     }
@@ -248,7 +247,7 @@ impl Edge {
         for entry in &mut entries {
             let job = run.record().job(DagId(entry.dag.into()), entry.job);
             let release_ns = job.and_then(|job| job.release_ns);
-            // A job that was never released, such as a skipped one, has the time of its event.
+            // A job never released, such as a skipped job, has the time of its event.
             entry.release_ns = release_ns.unwrap_or(entry.at_ns);
         }
         let replay = self.replay.borrow();
@@ -261,18 +260,18 @@ impl Edge {
         };
         record.file().header(&header);
         entries.iter().for_each(|entry| record.file().write(entry));
-        // A machine that keeps no more than the latest jobs keeps no events, either.
+        // A machine keeping only the latest jobs keeps no events, either.
         if self.latest.borrow().is_none() {
             record.end_run(run);
         }
         record.finish()
     }
 
-    /// Returns what a recording says of an event, if anything; what was skipped or cut in the
-    /// recorded run is not so here.
+    /// Returns a recording's entry for an event, if there is one. Skips and cuts of the recorded
+    /// run do not appear here.
     fn recorded(&self, event: &Event, task_set: &TaskSet) -> Option<Entry<'static>> {
         let what = match event.what {
-            // A signal is one at the instant of the release.
+            // A signal counts at the instant of the release.
             journal::EventKind::Due => return None,
             journal::EventKind::Released if task_set.dag(event.dag).is_sporadic() => {
                 journal::EventKind::Due

@@ -1,4 +1,4 @@
-//! A job as a person looks at it: what each of its subtasks got and gave.
+//! A job as a person looks at it: the inputs and outputs of each of its subtasks.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use crate::edge::Divergence;
 use crate::report::Report;
 use crate::report::{InstanceRecord, JobRecord};
 
-/// A job and all that is known of its subtasks. Shown, it is text with a line for each value.
+/// A job and all known data of its subtasks. Displayed as text with a line for each value.
 ///
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,11 +18,11 @@ pub struct JobShown {
     pub dag: String,
     /// The job.
     pub job: u64,
-    /// Its times, if it was released.
+    /// The job's times, if the job was released.
     pub times: Option<JobRecord>,
-    /// Its subtasks, in an order in which they may run.
+    /// The subtasks, in a possible order of execution.
     pub subtasks: Vec<SubtaskShown>,
-    /// A fault that the job had in the recorded run, and has not had in this one.
+    /// A fault of the job in the recorded run, missing in this run.
     pub unmet_fault: Option<Divergence>,
 }
 
@@ -31,24 +31,24 @@ pub struct JobShown {
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubtaskShown {
-    /// Its name.
+    /// The subtask's name.
     pub name: String,
-    /// Its times, if it became ready.
+    /// The times of the instance, if it became ready.
     pub times: Option<InstanceRecord>,
-    /// The message of its panic, if it ended by one.
+    /// The message of a panic that ended the instance.
     pub panic: Option<String>,
-    /// Its inputs: values of topics that it reads or samples, and times that it asked for.
+    /// The inputs: values read or sampled from topics, and answers to requests for the time.
     pub takes: Vec<Passed>,
-    /// Its outputs.
+    /// The outputs.
     pub gives: Vec<Passed>,
 }
 
-/// A value that passed between subtasks.
+/// A value passed between subtasks.
 ///
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Passed {
-    /// The topic; or `the time`, with all answers that it got.
+    /// The topic; or `the time`, for all clock readings of the subtask.
     pub what: String,
     /// The value.
     pub value: Value,
@@ -59,22 +59,22 @@ pub struct Passed {
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Value {
-    /// It is recorded: this is it, as JSON.
+    /// The recorded value, as JSON.
     Json(String),
-    /// Its topic is not recorded, and is of this type.
+    /// A value of this type, on a topic that is not recorded.
     NotRecorded(&'static str),
-    /// There is none: what writes it has not come to its end.
+    /// No value: the writer has not come to its end.
     None,
 }
 
 impl JobShown {
-    /// Shows a job of a run, of which the recording so far says what is known of values.
+    /// Shows a job of a run. The recording so far supplies the known values.
     #[allow(clippy::too_many_lines, reason = "all that is known of one job")]
     pub(crate) fn new(report: &Report, recording: &[u8], dag: DagId, job: u64) -> Self {
         let recording = Recording::read(recording).expect("it is what this machine has written");
         let channels = &recording.header().channels;
         let times = Vec::<u64>::schema();
-        // What passed on a channel, or, without one, what the subtask was told that asked.
+        // The entries passed on a channel; or, without a channel, the times told to the subtask.
         let passed = |entry: Entry<'_>| {
             let is_of_job = (u32::from(entry.dag), entry.job) == (dag.0, job);
             let channel = match entry.what {
@@ -104,7 +104,7 @@ impl JobShown {
             let mut crossed = crossed.iter();
             let value = match crossed.find(|(channel, ..)| channel.is_some_and(is_it)) {
                 Some((.., value)) => value.clone(),
-                // Recorded, but not in this job: its writer was cut, or is not complete yet.
+                // Recorded, but not in this job: the writer was cut, or is not complete yet.
                 None if channels.iter().any(is_it) => Value::None,
                 None => Value::NotRecorded(topic.type_name),
             };

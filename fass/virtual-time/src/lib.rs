@@ -1,34 +1,33 @@
 //! Runs DAGs built with `fass` on the host, in virtual time.
+//! For our purposes *virtual time* is a clock jumping from one event to the next (other terms are
+//! in `docs/glossary.md`). The real functions run, with real values on real topics, under the
+//! kernel's own scheduler. Only the passing of time is made up: a function takes the time it states
+//! with `fass::execute_for`, else its subtask's WCET, or the time set by [`VirtualTime::silent`]
+//! instead. Without any of these a call takes no time. Simulating a second of a DAG's life takes
+//! about a millisecond, and every run of the same DAGs gives the same events at the same
+//! nanosecond.
 //!
-//! For our purposes *virtual time* is a clock that jumps from one event to the next (other
-//! words are in `docs/glossary.md`). The real functions run, with real values on real topics,
-//! under the very scheduler that the kernel uses; only the passing of time is made up: a
-//! function takes as long as it says with `fass::execute_for`, else its subtask's WCET, or what
-//! [`VirtualTime::silent`] says in place of that. Where neither says anything it takes no time. A
-//! second of a DAG's life takes about a millisecond, and every run of the same DAGs gives the same
-//! events at the same nanosecond.
+//! Virtual time is the place to test an app: build the DAGs with the app's own code, commit them,
+//! [`run`](VirtualTime::run), and look into the [`Report`].
 //!
-//! It is the place to test an app: build the DAGs with the app's own code,
-//! commit them, [`run`](VirtualTime::run), and look into the [`Report`].
+//! # Guarantees
 //!
-//! # What is guaranteed
+//! - The schedule follows rules R1-R5 of the task model. [`Report::violations`] checks the rules
+//!   over the recorded events.
+//! - A panic in a function fails the run, and so the test. With [`VirtualTime::contain_panics`] the
+//!   panic ends its DAG instead, and is reported.
+//! - Machines belong to threads: tests running in parallel, each with its own [`VirtualTime`], do
+//!   not disturb one another.
 //!
-//! - The schedule is the one that rules R1-R5 of the task model prescribe.
-//!   [`Report::violations`] checks them over what was recorded.
-//! - A panic in a function fails the run, so that a test fails with it. With
-//!   [`VirtualTime::contain_panics`] it ends its DAG instead, and is reported.
-//! - Machines belong to threads: tests that run in parallel, each with its own
-//!   [`VirtualTime`], do not disturb one another.
+//! # Limits
 //!
-//! # What is not
-//!
-//! - Functions run one after another, on one thread. Races between functions
-//!   that share data behind the scheduler's back do not show here.
-//! - An instance's function runs at the instant of its start, and all at once.
-//!   If the instance is preempted in virtual time, its function has long
-//!   returned; `fass::now_ns` inside it counts as if it were not preempted.
-//! - The kernel's own overheads are zero. (The commit's answers can include
-//!   them: [`VirtualTime::overheads`]. Interrupts can be [late](VirtualTime::late).)
+//! - Functions run one after another, on one thread. Races between functions that share data behind
+//!   the scheduler's back do not show here.
+//! - An instance's function runs at the instant of its start, and all at once. If the instance is
+//!   preempted in virtual time, its function has long returned; `fass::now_ns` inside the function
+//!   counts as if there were no preemption.
+//! - The kernel's own overheads are zero. (The commit's answers can include overheads:
+//!   [`VirtualTime::overheads`]. Interrupts can be [late](VirtualTime::late).)
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
@@ -66,9 +65,10 @@ pub use settings::Silent;
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///
-/// Made with the machine's defaults, static priorities and preemption, but one core; the
-/// builder's methods change that and are to be called before the commit. A thread's newest machine
-/// is the one that `fass::finish_create_dags` commits to; dropping it removes it.
+/// A new machine has the machine's defaults, static priorities and preemption, but one core. The
+/// builder's methods change the settings and are to be called before the commit.
+/// `fass::finish_create_dags` commits to the thread's newest machine; dropping the machine removes
+/// it.
 ///
 /// # Examples
 ///
@@ -109,21 +109,21 @@ pub struct VirtualTime {
     machine: Rc<Machine>,
 }
 
-/// Ends the run, which has the machine, too.
+/// Ends the run. The run refers back to the machine, so the machine would never be freed otherwise.
 impl Drop for VirtualTime {
     fn drop(&mut self) {
         drop(self.machine.session.take());
     }
 }
 
-/// Returns a duration as a number, the last one if it is beyond that.
+/// Converts a duration into nanoseconds, saturating at `u64::MAX`.
 fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
 impl VirtualTime {
-    /// Makes a machine for this thread, and installs virtual time as the
-    /// program's platform if that has not happened yet.
+    /// Makes a machine for this thread, and installs virtual time as the program's platform unless
+    /// it is installed already.
     ///
     /// # Panics
     ///
@@ -145,14 +145,15 @@ impl VirtualTime {
         self.set(|settings| settings.terms.scheduler.cores = cores)
     }
 
-    /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
-    /// DAGs; all have one clock. See [`fass::Dag::cluster`].
+    /// Divides the cores into clusters of the given sizes, from core 0 on. Each cluster schedules
+    /// its own DAGs; all clusters have one clock. See [`fass::Dag::cluster`].
     pub fn clusters(self, sizes: &[u32]) -> Self {
         self.set(|settings| settings.terms.divide(sizes))
     }
 
-    /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
-    /// others share clusters of one core each. All subtasks need WCETs. See [`fass::commit::ClusterPlacement`].
+    /// Lets the commit divide the cores: a DAG needing several cores gets a cluster of its own, and
+    /// the others share clusters of one core each. All subtasks need WCETs. See
+    /// [`fass::commit::ClusterPlacement`].
     pub fn assign_clusters(self) -> Self {
         self.set(|settings| settings.terms.divide_by_commit())
     }
@@ -167,15 +168,14 @@ impl VirtualTime {
         self.set(|settings| settings.terms.scheduler.preemption = preemption)
     }
 
-    /// Sets the costs that the commit adds to each WCET before it answers about
-    /// deadlines: those of the machine that the DAGs are meant for. The run
-    /// itself stays without overheads. See [`VirtualTime`].
+    /// Sets the costs added to each WCET by the commit before it answers about deadlines: the costs
+    /// of the DAGs' intended machine. The run itself stays without overheads. See [`VirtualTime`].
     pub fn overheads(self, overheads: Overheads) -> Self {
         self.set(|settings| settings.terms.overheads = overheads)
     }
 
-    /// Gives the commit a file of WCETs that were observed, as `./scripts/recording --observe`
-    /// writes it; what it has for the DAGs counts in place of what they state.
+    /// Gives the commit a file of observed WCETs, in the format of `./scripts/recording --observe`.
+    /// For the DAGs in the file, observed WCETs replace stated ones.
     ///
     /// ```
     /// use std::time::Duration;
@@ -198,15 +198,14 @@ impl VirtualTime {
         self.set(|settings| settings.terms.wcets = Some(file.into()))
     }
 
-    /// Contains panics: one in a function ends its DAG only, or costs a job of it
-    /// (`Dag::survive_faults`), as on the kernel's machine, instead of failing the run.
+    /// Contains panics, instead of failing the run: a panic in a function ends only its DAG, or
+    /// costs one of its jobs (`Dag::survive_faults`), as on the kernel's machine.
     ///
-    /// The instance fails when it has executed what it had executed up to the
-    /// panic; then its DAG starts nothing, or goes on with the next job, and the other
-    /// DAGs go on.
-    /// [`Report::panics`] has every panic: a test that means none has to look
-    /// there, because an assertion inside a function panics, too. A call that takes longer
-    /// than its subtask's budget counts as a panic when the budget is used up.
+    /// The instance fails after executing as long as it had executed up to the panic. Then its DAG
+    /// starts nothing more, or goes on with the next job; the other DAGs go on. [`Report::panics`]
+    /// has every panic. A test expecting no panic has to look there, because an assertion inside a
+    /// function panics, too. A call taking longer than its subtask's budget counts as a panic at
+    /// the end of the budget.
     ///
     /// ```
     /// use std::time::Duration;
@@ -236,8 +235,8 @@ impl VirtualTime {
         self.set(|settings| settings.contains_panics = true)
     }
 
-    /// Raises a signal from outside at a time of the run, counted from the start of
-    /// scheduling; at once if that is past. To be called after the commit.
+    /// Raises a signal from outside at a time of the run, counted from the start of scheduling; at
+    /// once if the time has passed. To be called after the commit.
     ///
     /// ```
     /// use std::time::Duration;
@@ -269,10 +268,9 @@ impl VirtualTime {
         self.machine.raise_at(nanoseconds(time), target);
     }
 
-    /// Runs until every job of every DAG has ended, and reports all that
-    /// happened since the commit. (Where DAGs have no last job, that is when a function shuts
-    /// the run down, or never.) If no call has taken any time, it says so on standard error
-    /// ([`Report::took_no_time`]).
+    /// Runs until every job of every DAG has ended, and reports everything since the commit. (If
+    /// DAGs have no last job, the run ends when a function shuts it down, or never.) If no call has
+    /// taken any time, prints a warning on standard error ([`Report::took_no_time`]).
     ///
     /// # Panics
     ///
@@ -285,9 +283,8 @@ impl VirtualTime {
         report
     }
 
-    /// Runs for `duration` of virtual time, including events at its very end,
-    /// and reports all that happened since the commit. May be called again to
-    /// go on.
+    /// Runs for `duration` of virtual time, including events at its very end, and reports
+    /// everything since the commit. May be called again to go on.
     ///
     /// # Panics
     ///
@@ -312,8 +309,9 @@ impl VirtualTime {
         result.unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Runs until a job has ended, or one after it, and returns what its subtasks got and gave:
-    /// what is [recorded](fass::Dag::record) of that. May be called again to go on.
+    /// Runs until a job has ended, or a later job of the DAG, and returns the recorded inputs and
+    /// outputs of the job's subtasks (see [`Dag::record`](fass::Dag::record)). May be called again
+    /// to go on.
     ///
     /// # Errors
     ///
@@ -327,7 +325,7 @@ impl VirtualTime {
     ///
     /// # Errors
     ///
-    /// See [`RunError`]. The run is over then.
+    /// See [`RunError`]. After an error the run is over.
     pub fn try_run(&self) -> Result<Report, RunError> {
         self.run_until(None, None)
     }
@@ -336,7 +334,7 @@ impl VirtualTime {
     ///
     /// # Errors
     ///
-    /// See [`RunError`]. The run is over then.
+    /// See [`RunError`]. After an error the run is over.
     pub fn try_run_for(&self, duration: Duration) -> Result<Report, RunError> {
         self.run_until(Some(duration), None)
     }

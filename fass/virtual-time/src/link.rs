@@ -1,7 +1,7 @@
-//! Links: two machines in virtual time, each of which hears what the other one sends.
+//! Links: two machines in virtual time, each receiving the other's packets.
 //!
-//! The machines run in turns, in steps not longer than the least delay: what one sends in a step
-//! arrives at the other one behind the step, so at its exact nanosecond.
+//! The machines run in turns, in steps shorter than the least delay. Packets sent by one machine in
+//! a step arrive at the other after the step, and so at their exact nanosecond.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Duration;
@@ -13,7 +13,7 @@ use crate::machine::Arrival;
 use crate::report::Report;
 use crate::{VirtualTime, nanoseconds};
 
-/// A link between two machines, which carries packets from wires of one to wires of the other.
+/// A link between two machines, carrying packets from wires of one machine to wires of the other.
 ///
 /// # Examples
 ///
@@ -55,7 +55,7 @@ pub struct Link<'m> {
     ways: Vec<Way>,
     is_up: bool,
     random: Random,
-    /// How far both have run, on the first one's time.
+    /// How far both machines have run, on the first machine's time.
     reached_ns: u64,
 }
 
@@ -64,27 +64,28 @@ pub struct Link<'m> {
 /// See [`Link`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LinkOptions {
-    /// How long each packet takes at least, 2 ns or more.
+    /// The shortest travel time of a packet, 2 ns or more.
     pub delay: Duration,
-    /// How much longer a packet may take, by draws. So it may be overtaken.
+    /// The largest additional travel time of a packet, drawn at random. So packets may be
+    /// overtaken.
     pub jitter: Duration,
-    /// Lets no packet be overtaken: it arrives with the one before, at the earliest.
+    /// Prevents overtaking: each packet arrives with the packet before, at the earliest.
     pub keeps_order: bool,
-    /// One packet of so many is lost, by draws; of 0, none.
+    /// One packet in so many is lost, by random draws; with 0, none.
     pub lost_of: u64,
-    /// How much later the time of the second machine begins. What would arrive before is lost.
+    /// How much later the second machine's time begins. Packets that would arrive earlier are lost.
     pub offset: Duration,
     /// The seed of the draws.
     pub seed: u64,
 }
 
-/// From a wire of one machine to a wire of the other.
+/// A way from a wire of one machine to a wire of the other.
 #[derive(Debug)]
 struct Way {
-    /// The machine that sends, and the places of its wire and of the other one's.
+    /// The sending machine, and the places of its wire and of the other machine's wire.
     from: usize,
     places: [usize; 2],
-    /// How many packets were taken, and when the latest one arrives.
+    /// How many packets were taken, and when the latest packet arrives.
     taken: usize,
     latest_ns: u64,
 }
@@ -94,7 +95,7 @@ impl<'m> Link<'m> {
     ///
     /// # Panics
     ///
-    /// If it takes no time: then nothing could be ordered.
+    /// If the delay is shorter than 2 ns: then the machines' steps could not be ordered.
     #[must_use]
     pub fn new(machines: [&'m VirtualTime; 2], options: LinkOptions) -> Self {
         let takes_time = options.delay > Duration::from_nanos(1);
@@ -112,8 +113,8 @@ impl<'m> Link<'m> {
         }
     }
 
-    /// Carries what this machine, the first (0) or the second (1), sends on a wire to a wire of the
-    /// other one.
+    /// Carries packets sent by machine `from`, the first (0) or the second (1), on a wire, to a
+    /// wire of the other machine.
     ///
     /// # Panics
     ///
@@ -130,8 +131,8 @@ impl<'m> Link<'m> {
         });
     }
 
-    /// Cuts the link, or mends it: meanwhile what is sent is lost, and
-    /// [`Wire::link`] says so at either end.
+    /// Cuts or mends the link. While the link is cut, sent packets are lost, and [`Wire::link`]
+    /// reports the cut at either end.
     pub fn set_up(&mut self, is_up: bool) {
         self.is_up = is_up;
         for way in &self.ways {
@@ -142,16 +143,16 @@ impl<'m> Link<'m> {
         }
     }
 
-    /// Runs both for a time, and reports as [`VirtualTime::run_for`] does.
+    /// Runs both machines for a time, and reports as [`VirtualTime::run_for`] does.
     ///
     /// # Panics
     ///
-    /// As that does.
+    /// As [`VirtualTime::run_for`].
     pub fn run_for(&mut self, duration: Duration) -> [Report; 2] {
         let end_ns = self.reached_ns.saturating_add(nanoseconds(duration));
         let begins_ns = [0, nanoseconds(self.options.offset)];
         while self.reached_ns < end_ns {
-            // So what is sent at the step's start, too, arrives behind its end.
+            // So packets sent at the step's start, too, arrive behind its end.
             let step_ns = nanoseconds(self.options.delay) - 1;
             self.reached_ns = self.reached_ns.saturating_add(step_ns).min(end_ns);
             for (machine, begin_ns) in self.machines.iter().zip(begins_ns) {
@@ -167,7 +168,7 @@ impl<'m> Link<'m> {
         self.machines.map(|machine| machine.run_for(Duration::ZERO))
     }
 
-    /// Takes what was sent on a way in the latest step, and has it arrive.
+    /// Takes the packets sent on a way in the latest step, and lets them arrive.
     fn take(&mut self, way: &mut Way, begins_ns: [u64; 2]) {
         let (from, to, options) = (way.from, 1 - way.from, &self.options);
         let [sender, hearer] = [from, to].map(|machine| &self.machines[machine].machine);

@@ -1,18 +1,19 @@
-//! A virtual machine: the time, the edge of a run, what is to come, and the plan that runs.
+//! A virtual machine: the time, the edge of a run, future arrivals, and the running plan.
 //!
-//! A machine keeps its session; while that runs, it is taken out of there, so that a function's
-//! calls into the platform meet nothing borrowed but the settings, which no function changes.
+//! A machine keeps its session. While the session runs, it is taken out of the machine, so a
+//! function's calls into the platform meet no borrowed cell except the settings, and no function
+//! changes the settings.
 //!
-//! Bytes arrive at their times, between the completions and the releases of that instant, as
-//! signals do. Bytes that an instance sends are gone at its completion: no device is slow here, so
-//! only an instance that sends more than its wire has room for loses bytes.
+//! Bytes arrive at their times, between the completions and the releases of the same instant, as
+//! signals do. Bytes sent by an instance are gone at its completion. No device is slow here, so an
+//! instance loses bytes only by sending more than its wire has room for.
 //!
-//! # A plan while it runs
+//! # Running a plan
 //!
-//! The driver is `sched_dag::virtual_time`, the one loop in virtual time, which has the engine
-//! with the bodies and the journal; it asks for the execution time of each instance at its start.
-//! [`Calls`] answers by running the instance's real body and adding up what it executed. Why a run
-//! could not go on is a [`RunError`].
+//! The driver is `sched_dag::virtual_time`, the only loop in virtual time. The driver owns the
+//! engine with the bodies and the journal, and asks for the execution time of each instance at its
+//! start. [`Calls`] answers by running the instance's real body and adding up the executed time. A
+//! [`RunError`] says why a run could not go on.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -41,28 +42,26 @@ use crate::nanoseconds;
 use crate::report::{PanicRecord, Report};
 use crate::settings::Settings;
 
-/// One thread's virtual machine: the time, the edge of the run, and
-/// what is to come.
+/// The virtual machine of one thread: the time, the edge of the run, and future arrivals.
 #[derive(Default)]
 pub(crate) struct Machine {
     pub(crate) settings: RefCell<Settings>,
-    /// The edge, which records and replays.
+    /// The edge, recording and replaying.
     pub(crate) edge: Edge,
     pub(crate) wires: RefCell<Vec<WireEnd>>,
-    /// The time that functions are told: the start of the instance and what it
-    /// has executed.
+    /// The time told to functions: the start of the instance plus its executed time.
     pub(crate) now_ns: Cell<u64>,
-    /// The time that the running function has executed; `None` outside functions.
+    /// The time executed by the running function; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
     /// The instance of the running function.
     pub(crate) running: Cell<Option<Instance>>,
     /// The lines of the log so far.
     pub(crate) logs: RefCell<Vec<LogLine>>,
-    /// The devices that answer.
+    /// The answering devices.
     pub(crate) devices: RefCell<Vec<Answering>>,
-    /// Arrivals to come, by time and in the order in which they were made.
+    /// Future arrivals, by time and in the order of their creation.
     arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
-    /// How much of that there has been.
+    /// The number of arrivals created so far.
     count: Cell<u64>,
     pub(crate) session: RefCell<Option<Session>>,
     /// The number of the launched plan.
@@ -76,42 +75,42 @@ impl fmt::Debug for Machine {
     }
 }
 
-/// Something that comes from outside of the scheduler at an instant.
+/// An event from outside of the scheduler at an instant.
 pub(crate) enum Arrival {
     Request(Request),
-    /// Bytes, or a packet of a peer's.
+    /// Bytes, or a peer's packet.
     Bytes(Rc<DeviceEnd>, Vec<u8>, Option<SocketAddrV4>),
     /// A device gives an answer.
     Answer(Box<dyn FnOnce()>),
 }
 
-/// The device's end of a wire, and what has been sent, and when, if the wire is connected.
+/// The device's end of a wire, and, if the wire is connected, the sent packets with their times.
 pub(crate) type WireEnd = (Rc<DeviceEnd>, Option<Vec<(u64, SentPacket)>>);
 
-/// A packet that was sent, and whom it is to, if that is stated.
+/// A sent packet, and its addressee, if stated.
 pub type SentPacket = (Vec<u8>, Option<SocketAddrV4>);
 
-/// Looks for a question of a device, and notes the answers to it.
+/// Looks for a question of a device, and notes the answers.
 type Answering = Box<dyn FnMut(&Machine, u64)>;
 
 impl Machine {
-    /// Notes a signal of a plan; one of another plan does nothing.
+    /// Notes a signal of a plan. A signal of another plan does nothing.
     pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
         if self.plan.get() == Some(plan) {
             self.signal_at(time_ns, dag);
         }
     }
 
-    /// Notes a signal to a DAG of the launched plan; in a replay all signals are recorded ones.
+    /// Notes a signal to a DAG of the launched plan. In a replay all signals are recorded ones.
     pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
         if !self.edge.is_replay() {
             self.keep(time_ns, Arrival::Request(Request::Signal(dag)));
         }
     }
 
-    /// Notes the next signal of a replay, which comes not before `now_ns`. One follows when the one
-    /// before it has led to something, for else it would be dropped where functions take longer
-    /// than they took.
+    /// Notes the next signal of a replay, not earlier than `now_ns`. A signal follows only after
+    /// the signal before has led to a release or a skip. Otherwise, signals would be dropped where
+    /// functions take longer than in the recorded run.
     pub(crate) fn follow_signal(&self, dag: DagId, now_ns: u64) {
         let next_ns = self.edge.of_replay(|replay| replay.next_signal_ns(dag));
         if let Some(time_ns) = next_ns {
@@ -119,7 +118,7 @@ impl Machine {
         }
     }
 
-    /// Notes what comes at a time.
+    /// Notes an arrival at a time.
     pub(crate) fn keep(&self, time_ns: u64, arrival: Arrival) {
         let place = self.count.get();
         self.count.set(place + 1);
@@ -132,7 +131,7 @@ impl Machine {
         arrivals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
     }
 
-    /// Takes the next request that is due by `now_ns`.
+    /// Takes the next request due by `now_ns`.
     fn take_request(&self, now_ns: u64) -> Option<Request> {
         loop {
             self.next_request_ns().filter(|&at_ns| at_ns <= now_ns)?;
@@ -140,7 +139,7 @@ impl Machine {
             match arrival {
                 Arrival::Request(request) => return Some(request),
                 Arrival::Bytes(wire, bytes, from) => {
-                    // An answer to a wait, if it is one, comes now.
+                    // If the bytes answer a wait, the answer comes now.
                     self.now_ns.set(now_ns);
                     let signal = match from {
                         None => wire.arrive(&bytes, at_ns),
@@ -150,8 +149,8 @@ impl Machine {
                         }
                     };
                     if let Some((_, dag)) = signal {
-                        // As an arrival of this instant, which a later round takes, behind those
-                        // that are due already.
+                        // As an arrival of this instant: a later round takes the signal, behind
+                        // arrivals already due.
                         self.signal_at(now_ns, dag);
                     }
                 }
@@ -163,7 +162,7 @@ impl Machine {
         }
     }
 
-    /// Takes what has been sent on wires by now.
+    /// Takes the packets sent on wires by now.
     pub(crate) fn collect(&self, now_ns: u64) {
         for (end, sent) in self.wires.borrow_mut().iter_mut() {
             if let Some(sent) = sent {
@@ -177,8 +176,8 @@ impl Machine {
         }
     }
 
-    /// Returns the place of the device's end of a wire, which this machine takes if it has not
-    /// got it.
+    /// Returns the place of the device's end of a wire. Takes the end if this machine does not have
+    /// it.
     pub(crate) fn place_of(&self, wire: &Wire) -> usize {
         let mut wires = self.wires.borrow_mut();
         wires
@@ -202,7 +201,7 @@ pub(crate) struct Session {
     calls: Calls,
     /// Whether a function may end the run.
     may_shut_down: bool,
-    /// Up to when it has run.
+    /// The time up to which the session has run.
     until_ns: u64,
     proven: ProvenBounds,
 }
@@ -218,7 +217,7 @@ impl Session {
         machine: &Rc<Machine>,
     ) -> Result<Self, &'static str> {
         let task_set: Arc<TaskSet> = plan.task_set;
-        // In a replay, the first signal of each; the others follow one by one.
+        // In a replay, the first signal of each DAG; the others follow one by one.
         for (dag, _) in dags(&task_set).filter(|(_, model)| model.is_sporadic()) {
             machine.follow_signal(dag, 0);
         }
@@ -238,7 +237,7 @@ impl Session {
         run.with_proven(self.proven.clone())
     }
 
-    /// Returns the number of the DAG of this name.
+    /// Returns the number of the DAG with this name.
     fn find(&self, name: &str) -> Result<DagId, RunError> {
         let dags = dags(&self.calls.task_set);
         let mut of_name = dags.clone().filter(|(_, dag)| dag.name() == name);
@@ -251,7 +250,7 @@ impl Session {
         })
     }
 
-    /// Runs for a duration, or to the end; in either case not beyond the end of a job.
+    /// Runs for a duration, or to the end; in either case not beyond the end of job `until`.
     pub(crate) fn run(
         &mut self,
         duration: Option<Duration>,
@@ -267,7 +266,7 @@ impl Session {
         let until = until.map(|(dag, job)| Ok((self.find(dag)?, job)));
         let until = until.transpose()?;
         self.calls.until = until;
-        // An earlier call may have come beyond that job: then nothing is left to be run.
+        // An earlier call may have gone beyond that job: then nothing is left to be run.
         self.calls.has_arrived = until.is_some_and(|(dag, last)| {
             let run = self.driver.run_so_far();
             let mut jobs = run.record().numbered(dag);
@@ -281,19 +280,19 @@ impl Session {
     fn go_on(&mut self, until_ns: u64) -> RunOutcome {
         let end = self.driver.run_until(until_ns, &mut self.calls);
         let now_ns = self.driver.now_ns();
-        // What has no event any more has run as far as it was asked to.
+        // A run without further events counts as having reached the requested time.
         let (clock_ns, reached_ns) = match end {
             RunOutcome::TimeReached => (until_ns, until_ns),
             RunOutcome::Finished | RunOutcome::TimeOverflow(_) => (now_ns, until_ns),
             RunOutcome::Stopped => (now_ns, now_ns),
         };
-        // Between two calls the clock stands here: an arrival at an earlier time comes at once.
+        // Between two calls the clock stays here: an arrival at an earlier time comes at once.
         self.calls.machine.now_ns.set(clock_ns);
         self.until_ns = reached_ns;
         end
     }
 
-    /// Runs up to a time, and reports what the run cannot go on from.
+    /// Runs up to a time, and reports why the run cannot go on, if so.
     pub(crate) fn run_up_to(&mut self, until_ns: u64) -> Result<(), RunError> {
         let end = self.go_on(until_ns);
         match end {
@@ -302,7 +301,7 @@ impl Session {
         }
     }
 
-    /// Reports on a run that has ended so.
+    /// Reports on a run with the given outcome.
     fn report(&mut self, end: RunOutcome) -> Result<Report, RunError> {
         let machine = Rc::clone(&self.calls.machine);
         let now_ns = self.driver.now_ns();
@@ -361,28 +360,28 @@ impl Session {
     }
 }
 
-/// The message of a fault that a test asked for.
+/// The message of a fault injected by a test.
 const FAULT: &str = "a fault that was asked for";
 
-/// The workload of the driver: the functions of the bodies, and what is known of their calls
-/// besides the events.
+/// The workload of the driver: the functions of the bodies, and facts about their calls beyond the
+/// events.
 #[derive(Debug)]
 struct Calls {
     pub(crate) task_set: Arc<TaskSet>,
     pub(crate) machine: Rc<Machine>,
     /// How long each instance has executed so far.
     pub(crate) executed_ns: BTreeMap<Instance, u64>,
-    /// The instances that have waited, with the segment that each executes next.
+    /// The instances that have waited, with each instance's next segment.
     segments: BTreeMap<Instance, usize>,
     /// The contained panics.
     pub(crate) panics: Vec<PanicRecord>,
-    /// For each DAG whether a subtask of it has fallen back.
+    /// By DAG, whether one of its subtasks has fallen back.
     pub(crate) degraded: Vec<bool>,
-    /// The panic that fails the run and stops it.
+    /// The panic that fails and stops the run.
     pub(crate) panic: Option<PanicRecord>,
-    /// The job with whose end the run stops.
+    /// The job whose end stops the run.
     pub(crate) until: Option<(DagId, u64)>,
-    /// Whether it has ended.
+    /// Whether that job has ended.
     pub(crate) has_arrived: bool,
 }
 
@@ -403,8 +402,8 @@ impl Calls {
 
     /// Calls a function, or fails in its place. The error is the message of its panic.
     fn call(&self, runner: &mut SubtaskRunner, fails: bool) -> Result<(), String> {
-        // Unwind safety: a body that panicked is never run again, and the
-        // machine's cells hold plain numbers.
+        // Unwind safety: a panicked body never runs again, and the machine's cells hold plain
+        // numbers.
         let result = catch_unwind(AssertUnwindSafe(|| {
             if fails {
                 runner.body.discard(runner.instance.job);
@@ -439,14 +438,14 @@ impl Workload<SubtaskRunner> for Calls {
         machine.running.set(None);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
-        // A function that panics has executed what it said until then. One that is to fail was not
+        // A panicking function has executed the time stated so far. A function made to fail was not
         // called, so the time of a silent call passes before its fault.
         let segment = self.segments.remove(&instance).unwrap_or(0);
         if executed_ns == 0 && (result.is_ok() || fails) {
             executed_ns = settings.silent.of_call_ns(instance, segment, subtask);
         }
         let before_ns = self.executed_ns.get(&instance).copied().unwrap_or(0);
-        // The function has run to its end, but nobody may see what it did beyond its budget.
+        // The function has run to its end, but nobody may see its effects beyond its budget.
         let budget_ns = subtask.most_execution_ns(0).saturating_sub(before_ns);
         if executed_ns > budget_ns {
             executed_ns = budget_ns;
@@ -463,7 +462,8 @@ impl Workload<SubtaskRunner> for Calls {
             }
             self.panics.push(panic);
             if machine.edge.is_replayed(instance.dag) {
-                // What it cuts is recorded, and is passed over.
+                // The recording contains the cuts of this fault, and the replay passes the cut
+                // instances over.
                 if let Some(next) = runner.body.replacement().filter(Alternate::is_there) {
                     self.degraded[instance.dag.index()] |= next.is_fallback();
                     runner.body.replace();
@@ -480,8 +480,8 @@ impl Workload<SubtaskRunner> for Calls {
 
     fn fails(&mut self, instance: Instance) -> bool {
         let mut panics = self.panics.iter();
-        // Of a DAG in a replay, recorded cuts say what a fault cost; to the scheduler none has
-        // failed.
+        // In a replay, recorded cuts state the cost of a DAG's fault; to the scheduler no instance
+        // has failed.
         !self.machine.edge.is_replayed(instance.dag)
             && panics.any(|panic| panic.instance == instance)
     }
@@ -505,14 +505,14 @@ impl Workload<SubtaskRunner> for Calls {
         let event = &notice.event;
         let ended = match event.what {
             EventKind::Released => None,
-            // All jobs of it.
+            // All jobs of the DAG.
             EventKind::DagEnded => Some(u64::MAX),
             _ => Some(event.job),
         };
         self.has_arrived |=
             // A release ends no job: `None` is less than any number.
             (self.until).is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
-        // In a replay, a signal follows when the one before it has led to something.
+        // In a replay, a signal follows when the signal before has led to a release or a skip.
         if let EventKind::Released | EventKind::Skipped = event.what {
             self.machine.follow_signal(event.dag, event.time_ns);
         }
@@ -553,17 +553,16 @@ impl Workload<SubtaskRunner> for Calls {
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum RunError {
-    /// Nothing has been committed on this thread since the machine was made, or
-    /// an earlier run has failed.
+    /// Nothing has been committed on this thread since the machine was made, or an earlier run has
+    /// failed.
     NothingToRun,
-    /// A run to the end was asked for, but this DAG has no end.
+    /// A run to the end was requested, but this DAG has no end.
     Endless {
         /// The DAG.
         dag: DagLabel,
     },
     /// A subtask's function panicked, and the machine was not told to
-    /// [contain](crate::VirtualTime::contain_panics) that. No function runs
-    /// after it.
+    /// [contain](crate::VirtualTime::contain_panics) panics. No function runs afterwards.
     Panicked {
         /// The DAG.
         dag: DagLabel,
@@ -576,11 +575,11 @@ pub enum RunError {
         /// The report of the run up to the panic.
         report: Box<Report>,
     },
-    /// A job of a DAG was asked for that is not in the commit.
+    /// A job was requested for a DAG that is not in the commit.
     NoSuchDag {
         /// The name.
         name: String,
-        /// Those that are there.
+        /// The existing DAGs' names.
         there: String,
     },
     /// An instance would finish after `u64::MAX` nanoseconds.

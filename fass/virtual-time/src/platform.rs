@@ -1,7 +1,7 @@
-//! The platform that `fass` sees: one for the program, one machine a thread.
+//! The platform as seen by `fass`: one for the program, one machine a thread.
 //!
-//! The installed platform itself has no state. Everything it is asked, it asks the calling
-//! thread's current machine.
+//! The installed platform itself has no state. It passes every request on to the calling thread's
+//! current machine.
 
 use std::cell::{Cell, RefCell};
 use std::net::SocketAddrV4;
@@ -30,7 +30,7 @@ thread_local! {
     static IS_IN_SECTION: Cell<bool> = const { Cell::new(false) };
 }
 
-/// A section, which a panic ends, too.
+/// A lock section; a panic ends the section, too.
 struct Held<'l>(&'l LockWords);
 
 impl Drop for Held<'_> {
@@ -40,14 +40,14 @@ impl Drop for Held<'_> {
     }
 }
 
-/// The clock of functions, whose answers are recorded.
+/// The clock of functions. Its answers are recorded.
 static TOLD: Clock = || {
     let machine = expect_current();
     let running = machine.running.get();
     machine.edge.answer_ns(running, machine.now_ns.get())
 };
 
-/// Makes a machine and makes it this thread's.
+/// Makes a machine and installs it as this thread's current machine.
 pub(crate) fn make_current() -> Rc<Machine> {
     static IS_OURS: OnceLock<bool> = OnceLock::new();
     assert!(
@@ -61,9 +61,9 @@ pub(crate) fn make_current() -> Rc<Machine> {
 }
 
 impl VirtualTime {
-    /// Returns the record of all that was run since the commit: the model, the values of the
-    /// topics that [`Dag::record`](fass::Dag::record) names, signals, jobs that were skipped or
-    /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
+    /// Returns the record of everything run since the commit: the model, the values of the topics
+    /// named by [`Dag::record`](fass::Dag::record), signals, skipped or cut jobs, and the events of
+    /// the schedule with their times. Empty if nothing was committed.
     ///
     /// See [`Dag::record`](fass::Dag::record).
     pub fn recording(&self) -> Vec<u8> {
@@ -71,14 +71,14 @@ impl VirtualTime {
         session.as_ref().map_or(Vec::new(), Session::recording)
     }
 
-    /// Returns what the subtasks of a job got and gave.
+    /// Returns the inputs and outputs of a job's subtasks.
     pub(crate) fn show(&self, report: &Report, dag: DagId, job: u64) -> JobShown {
         let edge = &self.machine.edge;
         let mut shown = JobShown {
             unmet_fault: edge.of_replay(|replay| replay.unmet_fault(Some((dag, job)))),
             ..JobShown::new(report, &self.recording(), dag, job)
         };
-        // A replay goes on behind a fault, as what that cut is recorded; the job was lost.
+        // A replay goes on behind a fault, as the fault's cuts are recorded; the job was lost.
         let is_lost = self.has_failed(dag, job) && shown.unmet_fault.is_none();
         if let Some(times) = shown.times.as_mut().filter(|_| is_lost) {
             times.times.outcome = Some(JobOutcome::Failed);
@@ -86,7 +86,7 @@ impl VirtualTime {
         shown
     }
 
-    /// Reports whether a job has failed in the run that is replayed.
+    /// Reports whether a job has failed in the replayed run.
     pub(crate) fn has_failed(&self, dag: DagId, job: u64) -> bool {
         let is_it = |entry: Entry<'_>| {
             entry.what == EntryKind::Fault && (entry.dag.into(), entry.job) == (dag.0, job)
@@ -96,7 +96,7 @@ impl VirtualTime {
     }
 
     /// Runs to the end, for a duration, or until a job has ended. Meanwhile this machine is the
-    /// thread's, whichever was made last.
+    /// thread's current machine, even if another was made later.
     pub(crate) fn run_until(
         &self,
         duration: Option<Duration>,
@@ -122,7 +122,7 @@ impl VirtualTime {
         result
     }
 
-    /// Connects a wire: what is sent on it can be had by [`sent`](Self::sent).
+    /// Connects a wire: [`sent`](Self::sent) returns the bytes sent on the wire.
     ///
     /// See [`Wire`].
     ///
@@ -135,15 +135,16 @@ impl VirtualTime {
         self
     }
 
-    /// Lets bytes arrive on a wire at a time of the run, counted from the start of scheduling;
-    /// at once if that is past.
+    /// Lets bytes arrive on a wire at a time of the run, counted from the start of scheduling; at
+    /// once if the time has passed.
     ///
     /// See [`Wire`].
     pub fn arrive_at(&self, wire: &Wire, time: Duration, bytes: &[u8]) {
         self.keep_bytes(wire, time, bytes, None);
     }
 
-    /// Lets a packet arrive, as from a network, from a peer; else like [`arrive_at`](Self::arrive_at).
+    /// Lets a peer's packet arrive, as from a network; otherwise like
+    /// [`arrive_at`](Self::arrive_at).
     ///
     /// ```
     /// use core::time::Duration;
@@ -188,9 +189,9 @@ impl VirtualTime {
             .keep(at_ns, Arrival::Bytes(end, bytes.to_vec(), from));
     }
 
-    /// Lets a device answer its questions: `answer` is told the question and the job that asks, and
-    /// says which answers come how long after the question. A device that never answers has none,
-    /// and one that answers twice has two, of which the first counts.
+    /// Lets a device answer its questions. `answer` gets the question and the asking job, and
+    /// returns the answers with their delays after the question. A device that never answers
+    /// returns none; among several answers to one question, the first to come counts.
     ///
     /// See [`Device`](fass::shared::Device).
     pub fn answers<Q, A, Answers>(
@@ -209,7 +210,7 @@ impl VirtualTime {
             };
             for (after, answer) in answer(question, ticket.job()) {
                 let driver = Rc::clone(&driver);
-                // One that comes too late is given back.
+                // A late answer is given back.
                 let give = move || _ = driver.borrow_mut().answer(ticket, answer);
                 let at_ns = now_ns.saturating_add(nanoseconds(after));
                 machine.keep(at_ns, Arrival::Answer(Box::new(give)));
@@ -218,7 +219,7 @@ impl VirtualTime {
         self.machine.devices.borrow_mut().push(Box::new(look));
     }
 
-    /// Returns all that complete instances have sent so far on a wire that is connected.
+    /// Returns all bytes sent so far by complete instances on a connected wire.
     ///
     /// See [`Wire`].
     ///
@@ -230,7 +231,7 @@ impl VirtualTime {
         packets.flat_map(|(bytes, _)| bytes).collect()
     }
 
-    /// Returns the same, packet by packet, with the peer that each is to if the sender has said so.
+    /// Returns the sent packets one by one, with each packet's addressee, if stated by the sender.
     ///
     /// See [`packet_at`](Self::packet_at).
     ///
@@ -256,13 +257,13 @@ impl VirtualTime {
     }
 }
 
-/// The installed platform, which has no state of its own.
+/// The installed platform, without state of its own.
 struct HostPlatform;
 
 impl Platform for HostPlatform {
     fn terms(&self) -> RunConfig {
         let terms = |machine: Rc<Machine>| machine.settings.borrow().terms.clone();
-        // Without a machine, those that one has at first.
+        // Without a machine, the defaults of a new machine.
         current().map(terms).unwrap_or_default()
     }
 
@@ -279,12 +280,11 @@ impl Platform for HostPlatform {
         let Some(executed_ns) = machine.executed_ns.get() else {
             panic!("`execute_for` is called outside a subtask; call it in a subtask's function");
         };
-        // A sum that does not fit is reported by the driver as a finish beyond
-        // the last time there is.
+        // The driver reports a sum that does not fit as a finish beyond the last possible time.
         let ns = nanoseconds(duration);
         (machine.executed_ns).set(Some(executed_ns.saturating_add(ns)));
         // Time passes for this function alone: it is called at the instant of its start, and the
-        // scheduler learns how long it took when it has returned.
+        // scheduler learns its duration after it has returned.
         let now_ns = &machine.now_ns;
         now_ns.set(now_ns.get().saturating_add(ns));
     }
@@ -317,7 +317,8 @@ impl Platform for HostPlatform {
             return None;
         }
         let (free, taken) = (0, 1);
-        // Functions take turns; another machine's thread may have the lock, and will give it back.
+        // Functions take turns; another machine's thread may have the lock, and will give the lock
+        // back.
         while (lock.state.compare_exchange(free, taken, Acquire, Relaxed)).is_err() {
             thread::yield_now();
         }
@@ -334,7 +335,7 @@ impl Platform for HostPlatform {
 
     fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], _: Begin) -> bool {
         let machine = expect_current();
-        // Those of a second plan, which will be refused, are not this run's.
+        // Topics of a second plan, soon to be refused, do not belong to this run.
         if !machine.has_launched.get() {
             machine.edge.open(dag, graph, channels);
         }

@@ -1,4 +1,4 @@
-//! Reports of runs: of the whole, of each DAG, each job and each instance.
+//! Reports of runs: of the whole run, of each DAG, each job and each instance.
 
 use std::collections::BTreeMap;
 use std::ops::Deref;
@@ -12,8 +12,8 @@ use sched_dag::{DagId, DagKey, DagStatistics, Instance, SubtaskKey};
 
 use crate::edge::Divergence;
 
-/// Everything that happened from the commit to the end of a run: the engine's [`Run`], and what
-/// only virtual time knows.
+/// Everything from the commit to the end of a run: the engine's [`Run`], and facts known only in
+/// virtual time.
 ///
 /// ```
 /// use std::time::Duration;
@@ -43,17 +43,17 @@ use crate::edge::Divergence;
 pub struct Report {
     /// The instances that became ready, in that order.
     pub instances: Vec<InstanceRecord>,
-    /// The jobs that were released, in that order.
+    /// The released jobs, in the order of their releases.
     pub jobs: Vec<JobRecord>,
-    /// The panics that were [contained](crate::VirtualTime::contain_panics), in
-    /// the order in which their functions ran; none without containment.
+    /// The [contained](crate::VirtualTime::contain_panics) panics, in the order in which their
+    /// functions ran; none without containment.
     pub panics: Vec<PanicRecord>,
-    /// For each DAG whether a subtask of it has fallen back on its second function.
+    /// By DAG, whether a subtask has fallen back on its second function.
     pub(crate) degraded: Vec<bool>,
-    /// All events in the order in which they happened.
+    /// All events in order of occurrence.
     pub events: Vec<Event>,
-    /// The lines of the [log](fass::log!) so far, as people are shown them on other platforms: a
-    /// level, DAG, subtask and job, the time, the text and the fields.
+    /// The lines of the [log](fass::log!) so far, in the form shown on other platforms: a level,
+    /// DAG, subtask and job, the time, the text and the fields.
     pub logs: Vec<String>,
     /// The time of the last event.
     pub end_ns: u64,
@@ -61,10 +61,10 @@ pub struct Report {
     pub compared: u64,
     /// In a replay, how many recorded values this run has not computed (yet).
     pub uncompared: u64,
-    /// In a replay, the first value that is not the recorded one.
+    /// In a replay, the first value differing from the recorded one.
     pub divergence: Option<Divergence>,
-    /// In a replay, a DAG and its first job that is recorded, if that is not the first one it had:
-    /// what its functions remember of jobs before is lacking.
+    /// In a replay, a DAG and its first recorded job, unless that job is the DAG's very first: then
+    /// its functions' memory of earlier jobs is missing.
     pub lacking: Option<(String, u64)>,
     pub(crate) run: Run,
     /// How late interrupts may have been, in nanoseconds.
@@ -80,8 +80,8 @@ impl Deref for Report {
 }
 
 impl Report {
-    /// Makes the report of a run which has come to `end_ns`, whose instances have executed for so
-    /// long, and in which nothing panicked.
+    /// Makes the report of a run that has reached `end_ns`, with the execution times of its
+    /// instances and without panics.
     pub(crate) fn new(
         run: Run,
         end_ns: u64,
@@ -122,20 +122,19 @@ impl Report {
         }
     }
 
-    /// Returns the record of one instance, if it became ready.
+    /// Returns the record of one instance, if the instance became ready.
     pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
         (self.instances.iter()).find(|record| record.instance == instance)
     }
 
-    /// Reports whether no call took any time: then response times and deadlines met say
-    /// nothing.
+    /// Reports whether no call took any time: then response times and met deadlines mean nothing.
     ///
     /// See [`VirtualTime::silent`](crate::VirtualTime::silent).
     pub fn took_no_time(&self) -> bool {
         self.instances.iter().all(|record| record.execution_ns == 0)
     }
 
-    /// Returns what to tell people if nothing follows from the times.
+    /// Returns a warning if no call took any time, so the times mean nothing.
     pub(crate) fn warning(&self) -> Option<String> {
         let calls = self.instances.len();
         (calls > 0 && self.took_no_time()).then(|| {
@@ -146,19 +145,20 @@ impl Report {
         })
     }
 
-    /// Checks rules R1 to R5 of the task model over what was recorded, and
-    /// returns what breaks them: nothing, unless the scheduler is wrong.
+    /// Checks rules R1 to R5 of the task model over the recorded events, and returns the
+    /// violations: none, unless the scheduler is wrong.
     ///
-    /// After a panic ([`RunError::Panicked`](crate::RunError::Panicked)) the
-    /// last instant is incomplete, and may seem to break them.
+    /// After a panic ([`RunError::Panicked`](crate::RunError::Panicked)) the last instant is
+    /// incomplete, and may seem to break the rules.
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
-        // A test that has changed times may have put them out of order.
+        // A test that changed times may have put the events out of order.
         let mut events = self.events.clone();
         events.sort_by_key(|event| event.time_ns);
         let events = events.iter().copied();
         let (task_set, late_ns) = (self.task_set(), self.late_ns);
-        // With any tolerance it is not judged how late a timer is, but one that ends a wait.
+        // With any tolerance, the lateness of a timer is not judged, except for a timer ending a
+        // wait.
         let terms = JudgeOptions {
             late_ns,
             ..JudgeOptions::whole((late_ns > 0).into())
@@ -169,9 +169,8 @@ impl Report {
         found
     }
 
-    /// Returns the events as lines such as `5000000 start sink[0] core 1`: time, what
-    /// has happened, name with the job in brackets, and what else there is. That a DAG
-    /// is stopped has no job.
+    /// Returns the events as lines such as `5000000 start sink[0] core 1`: the time, the event, the
+    /// name with the job in brackets, and further facts. The stop of a DAG has no job.
     ///
     /// For tests that compare whole sequences in words.
     #[must_use]
@@ -220,11 +219,11 @@ pub struct DagReport<'r> {
 }
 
 impl Report {
-    /// Returns what a DAG did, which is asked for by its name, or by the handle that built it.
+    /// Returns the report of a DAG, selected by name or by the handle that built the DAG.
     ///
     /// # Panics
     ///
-    /// If there is no such DAG: a test that asks for one is wrong.
+    /// If there is no such DAG: a test asking for one is wrong.
     ///
     /// ```
     /// use core::time::Duration;
@@ -254,7 +253,7 @@ impl Report {
         }
     }
 
-    /// Returns what each DAG did, in the order of the commit.
+    /// Returns the report of each DAG, in the order of the commit.
     ///
     /// See [`dag`](Self::dag).
     pub fn dags(&self) -> impl Iterator<Item = DagReport<'_>> {
@@ -271,11 +270,11 @@ impl<'r> DagReport<'r> {
         self.report.statistics(self.id)
     }
 
-    /// Returns in how many jobs a sink was late.
+    /// Returns the number of jobs in which a sink was late.
     ///
     /// # Panics
     ///
-    /// If it is no sink of the DAG.
+    /// If the subtask is not a sink of the DAG.
     ///
     /// See [`Report::dag`].
     #[track_caller]
@@ -290,7 +289,7 @@ impl<'r> DagReport<'r> {
         self.report.degraded[self.id.index()]
     }
 
-    /// Returns the jobs that were released, in that order.
+    /// Returns the released jobs, in the order of their releases.
     ///
     /// See [`Report::dag`].
     pub fn jobs(&self) -> impl Iterator<Item = &'r JobRecord> + use<'r> {
@@ -323,12 +322,12 @@ impl<'r> DagReport<'r> {
 pub struct InstanceRecord {
     /// The instance.
     pub instance: Instance,
-    /// How long it executes in all, in nanoseconds, once it has begun.
+    /// The total execution time after the start, in nanoseconds.
     pub execution_ns: u64,
     pub(crate) times: law::InstanceRecord,
 }
 
-/// A job that was released, with its [times](law::JobRecord).
+/// A released job, with its [times](law::JobRecord).
 ///
 /// See [`Report`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -356,7 +355,7 @@ impl Deref for JobRecord {
     }
 }
 
-/// A panic that was contained: it ended its DAG, and the run went on.
+/// A contained panic: it ended its DAG, and the run went on.
 ///
 /// See [`contain_panics`](crate::VirtualTime::contain_panics).
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
-//! Settings of a machine, by the builder's methods, before the commit; how long calls take
-//! that do not say, and what it suffers: interrupts that come late, and calls that fail.
+//! Settings of a machine, made by the builder's methods before the commit: also how long calls last
+//! that state no duration, and disturbances: late interrupts and failing calls.
 //!
-//! All of it follows from what was asked alone, so that a run can be repeated.
+//! Everything follows from the given settings alone, so a run can be repeated.
 
 use std::time::Duration;
 
@@ -16,15 +16,15 @@ use crate::{VirtualTime, nanoseconds};
 pub(crate) struct Settings {
     /// The terms of the commits to come.
     pub(crate) terms: RunConfig,
-    /// How long calls take that do not say.
+    /// The duration of calls that do not state one.
     pub(crate) silent: Silent,
     /// How late interrupts are.
     pub(crate) late: Late,
-    /// The calls that fail.
+    /// The failing calls.
     pub(crate) faults: Vec<Fault>,
-    /// Whether a panic of a function ends its DAG only.
+    /// Whether a panic of a function ends only its DAG.
     pub(crate) contains_panics: bool,
-    /// How many jobs' inputs are kept, if not all is.
+    /// The number of jobs whose inputs are kept, unless everything is kept.
     pub(crate) most_jobs: Option<u32>,
 }
 
@@ -35,7 +35,7 @@ pub(crate) struct Late {
     seed: u64,
 }
 
-/// A call that fails.
+/// A failing call.
 #[derive(Clone, Debug)]
 pub(crate) struct Fault {
     dag: String,
@@ -44,9 +44,9 @@ pub(crate) struct Fault {
 }
 
 impl VirtualTime {
-    /// Lets each interrupt of the scheduler's timer come late, by a time from 0 to `most` that
-    /// is drawn uniformly. It follows from the seed and the time at which the interrupt is due.
-    /// Another event that comes first does what is due.
+    /// Delays each interrupt of the scheduler's timer by a time drawn uniformly from 0 to `most`.
+    /// The delay depends on the seed and the interrupt's due time. If another event comes first,
+    /// the scheduler handles the due work at that event.
     ///
     /// ```
     /// use std::time::Duration;
@@ -71,7 +71,7 @@ impl VirtualTime {
         self.set(|settings| settings.late = Late { most_ns, seed })
     }
 
-    /// Lets one call fail: in place of its function it executes as long as
+    /// Makes one call fail: instead of its function, the call executes as long as
     /// [`silent`](Self::silent) says, and then has the fault. May be called several times, and
     /// [contains](Self::contain_panics) panics. A commit without such a subtask is refused.
     ///
@@ -104,10 +104,10 @@ impl VirtualTime {
 }
 
 impl Late {
-    /// Returns how late the interrupt is that is due then.
+    /// Returns how late the interrupt due at `due_ns` is.
     pub(crate) fn of_interrupt_ns(self, due_ns: u64) -> u64 {
-        // By the due time, not by a count of draws: an interrupt that another event forestalls does
-        // not change how late the later ones are.
+        // By the due time, not by a count of draws: an interrupt forestalled by another event does
+        // not change the delays of later ones.
         scale(nth(nth(self.seed, 0) ^ due_ns, 0), 0..=self.most_ns)
     }
 }
@@ -117,7 +117,7 @@ impl Fault {
         self.dag == dag.name() && self.subtask == subtask.name()
     }
 
-    /// Reports whether it is this call that has to fail.
+    /// Reports whether this call has to fail.
     pub(crate) fn is(&self, instance: Instance, task_set: &TaskSet) -> bool {
         let dag = task_set.dag(instance.dag);
         self.job == instance.job && self.is_of(dag, dag.subtask(instance.subtask))
@@ -135,8 +135,8 @@ impl Fault {
     }
 }
 
-/// The time that a call takes if its function executes nothing by `fass::execute_for`, and
-/// the subtask has a WCET. Without one it takes none.
+/// The duration of a call if its function executes nothing by `fass::execute_for`, and the subtask
+/// has a WCET. Without a WCET, the call takes no time.
 ///
 /// ```
 /// use std::time::Duration;
@@ -160,13 +160,13 @@ impl Fault {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Silent {
-    /// None.
+    /// No time.
     NoTime,
-    /// Its WCET: stated, or observed ([`VirtualTime::wcets`](crate::VirtualTime::wcets)).
+    /// The WCET: stated, or observed ([`VirtualTime::wcets`](crate::VirtualTime::wcets)).
     #[default]
     Wcet,
-    /// A time from 1 ns to the WCET, drawn uniformly. It follows from the seed and the
-    /// instance alone.
+    /// A time from 1 ns to the WCET, drawn uniformly. The time depends only on the seed and the
+    /// instance.
     Drawn {
         /// The seed.
         seed: u64,
@@ -174,8 +174,8 @@ pub enum Silent {
 }
 
 impl Silent {
-    /// Returns how long a segment of a call takes, in nanoseconds. Of a subtask whose WCET is known
-    /// in all only, the first segment takes it.
+    /// Returns the duration of a segment of a call, in nanoseconds. If a subtask's WCET is only
+    /// known as a whole, the first segment takes the whole time.
     pub(crate) fn of_call_ns(self, instance: Instance, segment: usize, subtask: &Subtask) -> u64 {
         let wcet_ns = match subtask.segments_ns() {
             Some(segments_ns) => segments_ns.get(segment).copied(),
@@ -190,8 +190,7 @@ impl Silent {
                 let numbers = [dag.0.into(), subtask.0.into(), job].into_iter();
                 let numbers = numbers.chain((1..).take(segment));
                 let drawn = numbers.fold(nth(seed, 0), |drawn, n| nth(drawn ^ n, 0));
-                // At least 1 ns, so that a call which has a WCET takes time; without a WCET it is
-                // 0.
+                // At least 1 ns, so a call with a WCET takes time; without a WCET the result is 0.
                 scale(drawn, wcet_ns.min(1)..=wcet_ns)
             }
         }
@@ -199,9 +198,9 @@ impl Silent {
 }
 
 impl VirtualTime {
-    /// Sets how long a call takes whose function does not say so by `fass::execute_for`: its
-    /// WCET, unless this says otherwise. The time counts from the call's start, and is added
-    /// when the function has returned, so `fass::now_ns` in the function does not show it.
+    /// Sets the duration of calls whose functions state none by `fass::execute_for`. The default is
+    /// the WCET. The time counts from the call's start, and is added after the function has
+    /// returned, so `fass::now_ns` in the function does not show it.
     ///
     /// See [`Silent`].
     pub fn silent(self, silent: Silent) -> Self {
@@ -217,7 +216,7 @@ impl VirtualTime {
         self.machine.settings.borrow().terms.clone()
     }
 
-    /// Changes these.
+    /// Changes the terms of the commits to come.
     #[doc(hidden)]
     pub fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         change(&mut self.machine.settings.borrow_mut().terms);

@@ -588,10 +588,9 @@ fn workers(
 }
 
 impl State {
-    /// Returns the instant of an instance's end, for a worker whose function returned at
-    /// `returned_ns` on the clock. If the instance lost its core and got the core back before
-    /// reporting, it ends at the resumption; or at the step taken before its report, if that step
-    /// is later.
+    /// Returns an instance's end, for a worker whose function returned at `returned_ns` on the
+    /// clock. If the instance lost its core and got the core back before reporting, it ends at the
+    /// resumption; or at the step taken before its report, if that step is later.
     pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
         self.since_epoch(returned_ns).max(self.resumed_ns[worker])
     }
@@ -638,8 +637,8 @@ impl State {
         }
     }
 
-    /// Tells the scheduler that a parked instance has ended, on the core where the instance ran. At
-    /// this moment the core's processor runs the reporting worker, and not the core's occupant.
+    /// Tells the scheduler that a parked instance has ended, on the core where the instance ran.
+    /// The core's processor now runs the reporting worker, not the core's occupant.
     pub(crate) fn end_parked(
         &mut self,
         worker: Number,
