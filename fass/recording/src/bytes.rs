@@ -1,10 +1,9 @@
-//! Bytes: written into a buffer that is given, and read although they may be anything.
+//! Bytes: written into a given buffer, and read without any trust in them.
 
 use core::fmt;
 
-/// Writes values one after the other into a buffer, and counts what does not fit. Which of both forms
-/// they have is of the type: so recording has no code for the other.
-///
+/// Writes values one after the other into a buffer, and counts the bytes that do not fit. The
+/// type's parameter chooses one of the two forms, so recording has no code for the other form.
 /// ```
 /// use recording::{Encoder, Full, Recordable};
 ///
@@ -21,16 +20,16 @@ use core::fmt;
 #[derive(Debug)]
 pub struct Encoder<'b, const CDR: bool = false> {
     buffer: &'b mut [u8],
-    /// The bytes so far, with those that did not fit; `usize::MAX`: more than can be.
+    /// The bytes so far, including those that did not fit; `usize::MAX`: more than possible.
     written: usize,
 }
 
-/// A buffer is too small for what was to be written.
+/// A buffer is too small for the values.
 ///
 /// See [`Encoder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full {
-    /// The bytes that it would need.
+    /// The bytes needed.
     pub needed: usize,
 }
 
@@ -51,7 +50,7 @@ impl<'b> Encoder<'b, true> {
 }
 
 impl<const CDR: bool> Encoder<'_, CDR> {
-    /// Aligns what follows to its size, if that is the form.
+    /// Aligns the next bytes to their size, if the form requires alignment.
     #[inline]
     pub(crate) fn align(&mut self, bytes: usize) {
         if CDR && let Some(places) = self.places(padding(self.written, bytes)) {
@@ -59,7 +58,7 @@ impl<const CDR: bool> Encoder<'_, CDR> {
         }
     }
 
-    /// Writes text, and how many bytes it has.
+    /// Writes text, preceded by its length in bytes.
     pub(crate) fn text(&mut self, text: &str) {
         self.count(text.len() + usize::from(CDR));
         self.put(text.as_bytes());
@@ -76,23 +75,24 @@ impl<const CDR: bool> Encoder<'_, CDR> {
         }
     }
 
-    /// Returns the place of the next so many bytes, to be filled; none if they do not fit.
+    /// Returns the place of the next `count` bytes, to be filled; `None` if they do not fit.
     #[inline]
     pub(crate) fn places(&mut self, count: usize) -> Option<&mut [u8]> {
         let start = self.written;
-        // Counted even if it does not fit: so the caller learns how large the buffer has to be.
+        // Counted even without room, so the caller learns the buffer's necessary size.
         self.written = start.saturating_add(count);
-        // Cut in this way, the compiler knows its length where it knows `count`.
+        // With this cut, the compiler knows the slice's length where it knows `count`.
         let (places, _) = self.buffer.get_mut(start..)?.split_at_mut_checked(count)?;
         Some(places)
     }
 
-    /// Writes how many elements or bytes follow. More than 2^32 - 1 fit into no buffer.
+    /// Writes the number of following elements or bytes. More than 2^32 - 1 fit into no buffer.
     pub(crate) fn count(&mut self, count: usize) {
         self.align(4);
         match u32::try_from(count) {
             Ok(count) => self.put(&count.to_le_bytes()),
-            // Cut short it would be another value; `finish` reports a buffer that is too small.
+            // A truncated count would be another value; `finish` reports a buffer that is too
+            // small.
             Err(_) => self.written = usize::MAX,
         }
     }
@@ -101,7 +101,7 @@ impl<const CDR: bool> Encoder<'_, CDR> {
     ///
     /// # Errors
     ///
-    /// [`Full`] if not all fitted: then what is in the buffer is of no use.
+    /// [`Full`] if not everything fitted: then the buffer's contents are of no use.
     #[inline]
     pub const fn finish(self) -> Result<usize, Full> {
         match self.written <= self.buffer.len() {
@@ -113,7 +113,7 @@ impl<const CDR: bool> Encoder<'_, CDR> {
     }
 }
 
-/// Refuses a type when it is compiled, if it is to be in a form that it does not have.
+/// Refuses a type at compile time if it does not have the required form.
 pub(crate) const fn require(has_form: bool) {
     assert!(
         has_form,
@@ -121,7 +121,7 @@ pub(crate) const fn require(has_form: bool) {
     );
 }
 
-/// Returns how many bytes there are up to the next multiple, of 8 at most.
+/// Returns the number of bytes up to the next multiple of `bytes`, at most 8.
 const fn padding(offset: usize, bytes: usize) -> usize {
     offset.wrapping_neg() & (bytes - 1) & 7
 }
@@ -154,14 +154,14 @@ pub struct Decoder<'b, const CDR: bool = false> {
     offset: usize,
 }
 
-/// Bytes that are no value of the type, or no recording.
+/// Bytes that are not a value of the type, or not a recording.
 ///
 /// See [`Decoder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Malformed {
-    /// The offset of the first byte of what is wrong.
+    /// The offset of the first wrong byte.
     pub offset: usize,
-    /// The part that was expected there.
+    /// The part expected there.
     pub expected: &'static str,
 }
 
@@ -181,8 +181,8 @@ impl<'b> Decoder<'b, true> {
 }
 
 impl<'b, const CDR: bool> Decoder<'b, CDR> {
-    /// Leaves out what stands before a number of so many bytes. Other programs leave there what was in
-    /// their memory.
+    /// Skips the padding before a number of so many bytes. Other programs leave arbitrary bytes of
+    /// their memory there.
     #[inline]
     fn align(&mut self, bytes: usize) {
         if CDR {
@@ -224,7 +224,7 @@ impl<'b, const CDR: bool> Decoder<'b, CDR> {
     ///
     /// # Errors
     ///
-    /// There are fewer; `expected` says what they would have been.
+    /// There are fewer bytes; `expected` names the expected bytes.
     ///
     /// ```
     /// let mut input = recording::Decoder::new(&[1, 2, 3]);
@@ -241,7 +241,7 @@ impl<'b, const CDR: bool> Decoder<'b, CDR> {
         }
     }
 
-    /// Takes the bytes of a number, or an array of others in the form of recordings.
+    /// Takes the bytes of a number, or, in the form of recordings, of an array of numbers.
     pub(crate) fn array<const N: usize>(
         &mut self,
         expected: &'static str,
@@ -253,16 +253,16 @@ impl<'b, const CDR: bool> Decoder<'b, CDR> {
         (taken.try_into()).map_err(|_| Malformed { offset, expected })
     }
 
-    /// Takes how many elements follow, each of which takes so many bytes or more. So there are
-    /// never more than the bytes that are left.
+    /// Takes the number of following elements, each of at least so many bytes. So the number never
+    /// exceeds the bytes left.
     pub(crate) fn count(&mut self, least_bytes: usize) -> Result<usize, Malformed> {
         let expected = "how many elements follow, as many as there are bytes for";
         let offset = self.offset;
-        // 4 bytes on every target, so a recording of one machine can be read on another.
+        // 4 bytes on every target, so another machine can read the recording.
         let count = u32::from_le_bytes(self.array(expected)?);
         let count = usize::try_from(count).unwrap_or(usize::MAX);
-        // Before anything is allocated: an altered count must not cost memory that the file does
-        // not fill.
+        // Checked before any allocation: an altered count must not cost more memory than the file
+        // can fill.
         match count.checked_mul(least_bytes.max(1)) {
             Some(bytes) if bytes <= self.remaining() => Ok(count),
             _ => Err(Malformed { offset, expected }),
@@ -273,7 +273,7 @@ impl<'b, const CDR: bool> Decoder<'b, CDR> {
     ///
     /// # Errors
     ///
-    /// Something is.
+    /// Some bytes are left.
     ///
     /// ```
     /// let input = recording::Decoder::new(&[1]);
@@ -286,7 +286,7 @@ impl<'b, const CDR: bool> Decoder<'b, CDR> {
         }
     }
 
-    /// Says what was expected at the next byte.
+    /// Returns an error naming the part expected at the next byte.
     pub(crate) const fn expected(&self, expected: &'static str) -> Malformed {
         Malformed {
             offset: self.offset,
@@ -296,7 +296,7 @@ impl<'b, const CDR: bool> Decoder<'b, CDR> {
 }
 
 impl Malformed {
-    /// Returns the same for bytes that stand behind others.
+    /// Returns the same error for bytes that follow `bytes` others.
     pub(crate) const fn behind(self, bytes: usize) -> Self {
         Self {
             offset: self.offset + bytes,

@@ -1,9 +1,8 @@
-//! A recording's header, which tells whose it is and what is in it; and its entries, one entry
-//! after the other.
+//! A recording's header, naming its app and its contents, and the entries of a recording, one after
+//! the other.
 //!
-//! Besides there is a commit of a run, its model as it was accepted and what was proven of it; and
-//! the
-//! statistics of all jobs of a run that has ended.
+//! The module also has the commit of a run, that is, its accepted model and the proven bounds, and
+//! the statistics of all jobs of an ended run.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -18,7 +17,7 @@ crate::recordable! {
     /// See [`Writer`](crate::Writer).
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct Header {
-        /// The app, or what else the recording is of.
+        /// The app, or another origin of the recording.
         pub app: String,
         /// The DAGs, in the order of their commit.
         pub dags: Vec<DagHeader>,
@@ -31,21 +30,21 @@ crate::recordable! {
     /// See [`Writer`](crate::Writer).
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct DagHeader {
-        /// Its name.
+        /// The DAG's name.
         pub name: String,
-        /// The hash of its names and edges; 0: the values were not recorded in a run.
+        /// The hash of the DAG's names and edges; 0: the values were not recorded in a run.
         pub graph: u64,
     }
 
-    /// Values of one type and one place: what a subtask writes to a topic, or samples, or finds in
-    /// a state.
+    /// Values of one type and one place: values that a subtask writes to a topic, or samples, or
+    /// finds in a state.
     ///
     /// See [`Writer`](crate::Writer).
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub struct Channel {
         /// The number of the DAG.
         pub dag: u16,
-        /// The number of the subtask that writes the values, or finds them.
+        /// The number of the subtask writing the values, or finding them.
         pub subtask: u16,
         /// The role of the values in the DAG.
         pub role: Role,
@@ -56,7 +55,7 @@ crate::recordable! {
     }
 }
 
-/// Declares kinds that have a number in recordings, in their order, and a word.
+/// Declares kinds with a number in recordings, in their order, and a word for each.
 macro_rules! kinds {
     ($($(#[$about:meta])* pub enum $Kinds:ident($expected:literal) {
         $($(#[$doc:meta])* $Kind:ident = $name:literal,)+
@@ -68,7 +67,7 @@ macro_rules! kinds {
         }
 
         impl $Kinds {
-            /// Returns the word for it.
+            /// Returns the word for the kind.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$Kind => $name,)+
@@ -85,12 +84,12 @@ macro_rules! kinds {
             }
 
             fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
-                // The number is the place in the declaration: new kinds are added at the end only.
+                // The number is the place in the declaration: new kinds are added only at the end.
                 out.put(&[*self as u8]);
             }
 
             fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
-                // Taken before the byte is read, so that it names the place of the number itself.
+                // Made before the byte is read, so the error names the place of the number itself.
                 let malformed = input.expected($expected);
                 let number = usize::from(u8::decode(input)?);
                 [$(Self::$Kind),+].get(number).copied().ok_or(malformed)
@@ -106,21 +105,21 @@ kinds! {
     /// assert_eq!(recording::Role::Source.name(), "source");
     /// ```
     pub enum Role("what the values are: 0 source, 1 result, 2 sample, 3 state, 4 answer") {
-        /// A source returned them. A replay takes them.
+        /// A source returned the values. A replay takes them.
         Source = "source",
-        /// Another subtask returned them. A replay compares them.
+        /// Another subtask returned the values. A replay compares them.
         Result = "result",
-        /// A subtask found them as latest values of a topic, of whatever DAG: the type is
-        /// `(u64, u64, T)?`, with the job that the value is of, and when that was complete. A
-        /// replay takes them.
+        /// A subtask found the values as latest values of a topic, in any DAG. The type is
+        /// `(u64, u64, T)?`, with the value's job, and the time of the value's completion. A replay
+        /// takes the values.
         Sample = "sample",
-        /// A subtask found them in a state, before it changed that in the job. A replay that begins
-        /// with a job takes what is recorded of it, and compares the others. Since version 5 of the
-        /// format.
+        /// A subtask found the values in a state, before changing the state in the job. A replay
+        /// beginning with a job takes that job's recorded states, and compares the others. Since
+        /// version 5 of the format.
         State = "state",
-        /// A subtask waited for them, as answers of a device: the type is `[(u32, u64, T?)]`, of the
-        /// job's waits with their numbers, how many nanoseconds each answer took, and the answer, if
-        /// it came in time. A replay takes them. Since version 6 of the format.
+        /// A subtask waited for the values, as answers of a device. The type is `[(u32, u64, T?)]`:
+        /// for each wait of the job, its number, the answer's delay in nanoseconds, and the answer,
+        /// if in time. A replay takes the values. Since version 6 of the format.
         Answer = "answer",
     }
 
@@ -140,7 +139,7 @@ kinds! {
         Cut = "cut",
         /// The subtask goes on with another function, after a fault in this job.
         Restart = "restart",
-        /// The value of a channel is not in the recording, for there was no room.
+        /// The value of a channel is missing in the recording, for lack of room.
         Lost = "lost",
         /// The instance of a subtask asked for the time: the value is a `Vec<u64>` of the answers,
         /// in nanoseconds. Since version 2 of the format.
@@ -161,29 +160,29 @@ impl Role {
     }
 }
 
-/// Something that happened in a run.
+/// An event of a run.
 ///
 /// See [`Writer`](crate::Writer).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry<'v> {
-    /// The kind of it.
+    /// The kind of event.
     pub what: EntryKind,
     /// The number of the DAG.
     pub dag: u16,
-    /// The number of the channel or of the subtask; [`EntryKind`] says which.
+    /// The number of the channel or of the subtask, depending on the [`EntryKind`].
     pub place: u16,
     /// The job.
     pub job: u64,
     /// The nominal release of the job, in nanoseconds from the start of the run.
     pub release_ns: u64,
-    /// When it happened: for values, when the instance was complete that wrote or sampled
+    /// The time of the event. For values: the completion of the instance that wrote or sampled
     /// them.
     pub at_ns: u64,
-    /// The value's bytes, where it has one.
+    /// The value's bytes, if there is a value.
     pub value: &'v [u8],
 }
 
-/// Reads the nominal release of the entry whose value begins there in a recording.
+/// Reads the nominal release of the entry whose value begins at offset `value` in a recording.
 ///
 /// ```
 /// use recording::{Entry, EntryKind, Header, Recording, Writer};
@@ -197,14 +196,14 @@ pub struct Entry<'v> {
 /// assert_eq!(recording::release_ns_of(&bytes, place), Some(20));
 /// ```
 pub fn release_ns_of(bytes: &[u8], value: usize) -> Option<u64> {
-    // It is the last but one of the numbers before the value.
+    // The release is the last but one of the numbers before the value.
     let (_, [release_ns, _]) = bytes.get(..value)?.as_rchunks::<8>().1.split_last_chunk()?;
     Some(u64::from_le_bytes(*release_ns))
 }
 
 impl<'v> Entry<'v> {
     pub(super) fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>) {
-        // The value comes last and has no length: the frame's length says where it ends.
+        // The value comes last and has no length: the frame's length determines its end.
         self.what.encode(out);
         (self.dag, self.place, self.job, self.release_ns, self.at_ns).encode(out);
         out.put(self.value);
@@ -225,14 +224,14 @@ impl<'v> Entry<'v> {
         })
     }
 
-    /// Makes sure that it fits to the header.
+    /// Makes sure that the entry fits the header.
     pub(super) fn check(&self, header: &Header) -> Result<(), Malformed> {
-        /// Where the numbers and the value stand in the payload.
+        /// Offsets of the numbers and the value in the payload.
         const DAG: usize = 1;
         const PLACE: usize = 3;
         const VALUE: usize = 29;
         let malformed = |offset, expected| Malformed { offset, expected };
-        // Later code takes these numbers for indices without asking again.
+        // Later code uses these numbers as indices without further checks.
         if usize::from(self.dag) >= header.dags.len() {
             return Err(malformed(DAG, "the number of a DAG of the header"));
         }
@@ -245,7 +244,7 @@ impl<'v> Entry<'v> {
                 };
                 match self.what {
                     EntryKind::Value => channel.schema.walk(&mut rest, &mut |_| ()),
-                    // A lost value has no bytes, which `end` below makes sure of.
+                    // A lost value has no bytes; `end` below checks that.
                     _ => Ok(()),
                 }
             }
@@ -263,10 +262,10 @@ impl<'v> Entry<'v> {
 }
 
 crate::recordable! {
-    /// DAGs that were committed together, and how they are scheduled.
+    /// DAGs committed together, and their scheduling.
     ///
-    /// Numbers are those of the kernel: DAGs, subtasks and clusters count from 0, and times are
-    /// in nanoseconds.
+    /// Numbers are the kernel's: DAGs, subtasks and clusters count from 0, and times are in
+    /// nanoseconds.
     ///
     /// ```
     /// use recording::{Commit, Chunk, Recording, Stream};
@@ -280,38 +279,39 @@ crate::recordable! {
     /// ```
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct Commit {
-        /// The policy that orders instances: its place in the table of policies.
+        /// The policy ordering instances: its place in the table of policies.
         pub policy: u8,
-        /// Whether an instance that has started may lose its core.
+        /// Whether a started instance may lose its core.
         pub is_preemptive: bool,
         /// All cores.
         pub cores: u32,
         /// The number of cores of each cluster; empty if cores are not divided.
         pub clusters: Vec<u32>,
-        /// The analysis charges an instance with so much, if that has an end.
+        /// The overhead charged to an instance by the analysis; `None` if unbounded.
         pub charge_ns: Option<u64>,
-        /// It charges so much for making another one ready.
+        /// The overhead charged to an instance for each instance it makes ready.
         pub ready_ns: u64,
         /// The DAGs, in the order of their numbers.
         pub dags: Vec<CommittedDag>,
         /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
-        /// of the segment that follows, if it is stated.
+        /// of the next segment, if stated.
         pub waits: Vec<(u32, u32, u64, Option<u64>)>,
-        /// The subtasks that are pinned: DAG and subtask, and the core of their cluster. In versions
-        /// 7 to 9 of the format only.
+        /// The pinned subtasks: DAG and subtask, and the core of their cluster. Only in versions 7
+        /// to 9 of the format.
         pub pins: Vec<(u32, u32, u32)>,
-        /// The affinities: a DAG, and one of the cores of its cluster that alone execute it. Since
-        /// version 7, too.
+        /// The affinities: a DAG, and one of the cores of its cluster allowed to execute the DAG.
+        /// Since version 7, too.
         pub affinities: Vec<(u32, u32)>,
-        /// A move to another core takes so much, where cores are told apart. Since version 7, too.
+        /// The cost of a move to another core, where cores are told apart. Since version 7, too.
         pub move_ns: u64,
-        /// By DAG, which test gave its bound, or why there is none. Since version 8.
+        /// By DAG, the test that gave its bound, or the reason for a missing bound. Since version
+        /// 8.
         pub answers: Vec<String>,
-        /// The uses of locks: DAG and subtask, the lock, its longest section, if it is stated, and
-        /// the most sections of an instance. Since version 8.
+        /// The uses of locks: DAG and subtask, the lock, its longest section, if stated, and the
+        /// most sections of an instance. Since version 8.
         pub locks: Vec<(u32, u32, String, Option<u64>, u32)>,
-        /// The longest interrupt of a device, and the least time from one to the next; 0: there is
-        /// none. Since version 9.
+        /// The longest interrupt of a device, and the least time between two interrupts; 0: no
+        /// interrupts. Since version 9.
         pub device_ns: [u64; 2],
         /// The lists of cores, by the numbers of DAGs and subtasks, with times. Since version 10.
         pub lists: Vec<String>,
@@ -320,78 +320,78 @@ crate::recordable! {
     /// A DAG of a [`Commit`].
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct CommittedDag {
-        /// Its name.
+        /// The DAG's name.
         pub name: String,
-        /// The hash of its names and edges.
+        /// The hash of the DAG's names and edges.
         pub hash: u64,
-        /// Whether signals release it, rather than time.
+        /// Whether signals release the DAG, rather than time.
         pub is_sporadic: bool,
         /// The period, or the least time between releases.
         pub period_ns: u64,
-        /// From the nominal release to the deadline.
+        /// The time from the nominal release to the deadline.
         pub relative_deadline_ns: u64,
         /// The nominal release of job 0.
         pub offset_ns: u64,
-        /// The number of jobs, if it has an end.
+        /// The number of jobs, if limited.
         pub jobs: Option<u64>,
         /// The most jobs at a time.
         pub in_flight: u32,
-        /// The fate of a job that is due while as many are in flight: 0 it waits, 1 it is
-        /// skipped, 2 the oldest one is aborted.
+        /// The fate of a job due while the most jobs are in flight: 0 the job waits, 1 the job is
+        /// skipped, 2 the oldest job in flight is aborted.
         pub overrun: u8,
-        /// If a fault costs a job only: the most faults within a window of jobs, the window, and
-        /// the most in all.
+        /// If a fault only costs a job: the most faults within a window of jobs, the window, and
+        /// the most faults in all.
         pub survives: Option<(u32, u64, u32)>,
-        /// The cluster, if the app has chosen it.
+        /// The cluster, if chosen by the app.
         pub cluster: Option<u32>,
         /// The subtasks, in the order of their numbers.
         pub subtasks: Vec<CommittedSubtask>,
-        /// The precedence edges, from a subtask to another one.
+        /// The precedence edges, from a subtask to a successor.
         pub edges: Vec<(u32, u32)>,
         /// The sinks with their relative deadlines.
         pub sinks: Vec<(u32, u64)>,
-        /// The proven bound on its response time.
+        /// The proven bound on the DAG's response time.
         pub bound_ns: Option<u64>,
         /// The topics.
         pub topics: Vec<CommittedTopic>,
-        /// Of each state that orders two subtasks its name, the earlier and the later one.
+        /// For each state ordering two subtasks: its name, the earlier and the later subtask.
         pub states: Vec<(String, u32, u32)>,
-        /// The latest values that it samples: the subtask, the DAG that writes them, the number
-        /// of the topic there, and how old they may be.
+        /// The sampled latest values: the sampling subtask, the DAG writing the values, the number
+        /// of the topic in that DAG, and the values' largest permitted age.
         pub samples: Vec<(u32, u32, u32, Option<u64>)>,
     }
 
     /// A subtask of a [`Commit`].
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct CommittedSubtask {
-        /// Its name.
+        /// The subtask's name.
         pub name: String,
-        /// Its priority; 0 is the highest.
+        /// The subtask's priority; 0 is the highest.
         pub priority: u32,
-        /// Whether it keeps its core once it has started.
+        /// Whether a started instance keeps its core.
         pub is_non_preemptive: bool,
-        /// Its WCET, if it is stated.
+        /// The WCET, if stated.
         pub wcet_ns: Option<u64>,
     }
 
     /// A topic of a [`Commit`].
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct CommittedTopic {
-        /// Its name.
+        /// The topic's name.
         pub name: String,
         /// The type of its values.
         pub type_name: String,
-        /// The subtask that writes it.
+        /// The writing subtask.
         pub writer: u32,
-        /// The subtasks of the DAG that read it.
+        /// The reading subtasks of the DAG.
         pub readers: Vec<u32>,
-        /// Whether DAGs sample its latest value.
+        /// Whether DAGs sample the topic's latest value.
         pub is_sampled: bool,
     }
 }
 
 crate::recordable! {
-    /// The end of a run: how many events there were, and the times of all jobs.
+    /// The end of a run: the number of events, and the times of all jobs.
     ///
     /// ```
     /// use recording::{Chunk, Recording, Stream, Times};
@@ -414,9 +414,9 @@ crate::recordable! {
     /// The times of a DAG's jobs.
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct DagTimes {
-        /// From the nominal release to the last finish, of complete jobs.
+        /// The time from the nominal release to the last finish, for complete jobs.
         pub response: Counted,
-        /// From the nominal release to the release.
+        /// The time from the nominal release to the release.
         pub release_jitter: Counted,
         /// By subtask.
         pub subtasks: Vec<SubtaskTimes>,
@@ -425,12 +425,12 @@ crate::recordable! {
     /// The times of a subtask's instances.
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct SubtaskTimes {
-        /// From the last finish of a predecessor to the start.
+        /// The time from the last finish of a predecessor to the start.
         pub join_latency: Counted,
-        /// The time that its calls took, preemptions left out.
+        /// The time taken by the subtask's calls, without preemptions.
         pub execution: Counted,
-        /// Of a sink of several: from the nominal release to its finish, its deadlines missed,
-        /// and the proven bound.
+        /// For one of several sinks: the time from the nominal release to its finish, its missed
+        /// deadlines, and the proven bound.
         pub sink: Option<(Counted, u64, Option<u64>)>,
     }
 
@@ -439,8 +439,8 @@ crate::recordable! {
     pub struct Counted {
         /// The least value, exactly.
         pub min_ns: u64,
-        /// The highest value of each bucket that is not empty, and how many are in it; the last
-        /// one is exact.
+        /// The highest value of each non-empty bucket, and the number of values in the bucket. The
+        /// highest value of the last bucket is exact.
         pub buckets: Vec<(u64, u64)>,
     }
 }

@@ -1,5 +1,5 @@
-//! Text and lists that have their bytes in themselves, up to a stated length: to copy or to read
-//! them allocates nothing. They are written as a `String` and a `Vec` are.
+//! Text and lists with inline storage, up to a fixed length: copying or reading allocates nothing.
+//! Their recorded form is the form of `String` and `Vec`.
 
 use alloc::boxed::Box;
 use core::fmt;
@@ -24,7 +24,7 @@ use super::schema::{Scalar, Schema};
 pub struct Text<const N: usize>(List<u8, N>);
 
 impl<const N: usize> Text<N> {
-    /// Makes it of a text that fits.
+    /// Makes an inline text from a text.
     ///
     /// # Panics
     ///
@@ -35,7 +35,7 @@ impl<const N: usize> Text<N> {
         Self::try_new(text).expect("the text is longer than its place; state a longer one")
     }
 
-    /// Makes it of a text, if that fits.
+    /// Makes an inline text from a text, if the text fits.
     #[must_use]
     pub fn try_new(text: &str) -> Option<Self> {
         List::try_new(text.as_bytes()).map(Self)
@@ -46,7 +46,7 @@ impl<const N: usize> Deref for Text<N> {
     type Target = str;
 
     fn deref(&self) -> &str {
-        // Never the default: it was made of a text.
+        // Never the default: the bytes come from a text.
         str::from_utf8(&self.0).unwrap_or_default()
     }
 }
@@ -75,7 +75,7 @@ impl<const N: usize> Recordable for Text<N> {
     }
 }
 
-/// A list of `N` elements at most. It is a slice.
+/// A list of `N` elements at most, usable as a slice.
 ///
 /// ```
 /// use recording::{List, Recordable};
@@ -94,7 +94,7 @@ pub struct List<T, const N: usize> {
 }
 
 impl<T: Copy + Default, const N: usize> List<T, N> {
-    /// Makes it of these elements, if they fit.
+    /// Makes a list of these elements, if they fit.
     #[must_use]
     pub fn try_new(elements: &[T]) -> Option<Self> {
         let mut list = Self::default();

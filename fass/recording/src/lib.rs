@@ -1,22 +1,22 @@
-//! Recordings: values that cross the edge of a run, as bytes with schemas, and files of them.
+//! Recordings: values crossing the edge of a run, as bytes with schemas, and files of such values.
 //!
-//! The results of a DAG of functions follow from what enters it. So a *recording*, that is a
-//! file of the values that sources returned, samples found, and of what became of jobs, is
-//! enough to compute every value again. This crate has what is needed to write values down:
+//! The results of a DAG of functions follow from the DAG's inputs. So a *recording*, a file of the
+//! values returned by sources, of found samples, and of the fate of jobs, is enough to compute
+//! every value again. This crate has the parts for writing values down:
 //!
-//! - [`Recordable`]: a type whose values become bytes and come back; [`recordable!`] makes one
-//!   of an app's struct;
-//! - [`Schema`]: what such a type looks like, so that a program that does not know the type can
-//!   read its values;
+//! - [`Recordable`]: a type whose values convert to bytes and back; [`recordable!`] makes an app's
+//!   struct recordable;
+//! - [`Schema`]: the form of such a type, so a program that does not know the type can read its
+//!   values;
 //! - [`Recording`], [`Writer`]: the file, read and written.
 //!
-//! The crate knows no DAG and no machine, for those that read recordings need neither: the host
-//! tool, an app that takes a recording as its input.
+//! The crate depends on no DAG and no machine, since readers of recordings need neither: the host
+//! tool, or an app taking a recording as its input.
 //!
 //! # The form of values
 //!
-//! Numbers are little-endian and as wide as their type, without padding: what has the same type
-//! and the same value has the same bytes, on every machine.
+//! Numbers are little-endian and as wide as their type, without padding: the same value of the same
+//! type has the same bytes on every machine.
 //!
 //! | type | bytes |
 //! |---|---|
@@ -24,8 +24,8 @@
 //! | `bool` | 1: 0 or 1 |
 //! | `char` | 4: the scalar value |
 //! | `Option<T>` | 1: 0, or 1 and the value |
-//! | `Vec<T>`, [`List<T, N>`](List) | 4: how many, and these |
-//! | `String`, [`Text`] | 4: how many bytes of UTF-8, and these |
+//! | `Vec<T>`, [`List<T, N>`](List) | 4: how many, and the elements |
+//! | `String`, [`Text`] | 4: how many bytes of UTF-8, and the bytes |
 //! | array, tuple, struct | the elements or fields, one after the other |
 //! | `Arc<T>`, `Box<T>` | as `T` |
 //!
@@ -33,26 +33,28 @@
 //!
 //! # CDR
 //!
-//! The same types have a second form, for the wires of others: that of XCDR1, the Common Data
-//! Representation of ROS 2, little-endian and without its header of 4 bytes. It differs in two points.
-//! A number, or how many elements follow, begins at a multiple of its size, behind zeros; of lists
-//! and arrays of numbers only the first one needs it, and an empty one does not. Text has a zero at
-//! its end, which is counted. [`Encoder::cdr`] writes it, and [`Decoder::cdr`] reads it, whatever
-//! stands in place of the zeros. Options, characters and numbers of 16 bytes have no such form over
-//! there.
+//! The same types have a second form, for the wires of other systems: XCDR1, the Common Data
+//! Representation of ROS 2, little-endian and without its header of 4 bytes. The form differs in
+//! two points. First, a number, or a count of elements, begins at a multiple of its size, behind
+//! padding zeros. In lists and arrays of numbers only the first number needs padding, and an empty
+//! list needs none. Second, text has a zero at its end, included in the length. [`Encoder::cdr`]
+//! writes this form, and [`Decoder::cdr`] reads it, with any bytes in place of the zeros. Options,
+//! characters and numbers of 16 bytes have no such form in ROS 2.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - Writing into a buffer allocates nothing, and a buffer that is too small is told with what
-//!   is needed.
-//! - Reading any bytes gives a value or the offset of what is wrong. It does not panic, recurses
-//!   to a depth that the type fixes, and allocates at most [`MOST_GROWTH`] times the bytes that
-//!   it is given, for each level of that depth. Bytes that are accepted are those that the value
-//!   would be written as.
-//! - Reading a file takes a time that its length bounds: a type in it has at most
-//!   [`MOST_WEIGHTLESS`] parts that take no bytes, so no value has many more parts than bytes.
+//! - Writing into a buffer allocates nothing. If a buffer is too small, the error states the
+//!   necessary size.
+//! - Reading any bytes gives a value, or the offset of the first error. Reading does not panic,
+//!   recurses to a depth fixed by the type, and allocates at most [`MOST_GROWTH`] times the given
+//!   bytes, for each level of that depth. Only bytes in the exact form written for the value are
+//!   accepted.
+//! - Reading a file takes a time bounded by the file's length: each type has at most
+//!   [`MOST_WEIGHTLESS`] parts taking no bytes, so no value has many more parts than bytes.
 //!
-//! # What is not
+//! # Limits
+//!
+//! A checksum finds accidents, not intent: a person can forge a file with other contents.
 //!
 //! A checksum finds accidents, not intent: a person can make a file that says something else.
 

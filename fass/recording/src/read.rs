@@ -1,4 +1,4 @@
-//! Reading a recording, all of which may be wrong: its chunks, and the values of one channel by
+//! Reading a recording without any trust in its bytes: its chunks, and the values of one channel by
 //! their type.
 
 use alloc::borrow::Cow;
@@ -15,7 +15,7 @@ use super::stream::{
     COMMIT, CUT, Crc, END, ENTRY, EVENTS, HEADER, MAGIC, Stream, TEXT, TIMES, VERSION,
 };
 
-/// A recording that is whole and unaltered.
+/// A whole and unaltered recording.
 ///
 /// See [`Writer`](crate::Writer).
 #[derive(Clone, Debug)]
@@ -25,12 +25,12 @@ pub struct Recording<'b> {
     is_cut: bool,
 }
 
-/// How far a recording was read, and what is there.
+/// How far a recording was read, and the contents so far.
 #[derive(Clone, Debug)]
 struct Progress {
     header: Header,
     has_header: bool,
-    /// Where the first frame stands, and what is behind the last whole frame.
+    /// The offset of the first frame, and the offset after the last whole frame.
     first: usize,
     last: usize,
     crc: Crc,
@@ -38,7 +38,7 @@ struct Progress {
     lost: u64,
 }
 
-/// A frame, and where its payload stands.
+/// A frame, and the offset of its payload.
 struct Frame<'b> {
     kind: u8,
     offset: usize,
@@ -49,12 +49,12 @@ struct Frame<'b> {
 const CHECKSUM: &str = "the checksum of all before; the file is altered";
 
 impl<'b> Recording<'b> {
-    /// Reads all of a recording once, and makes sure that it is whole, that no byte was
-    /// altered, and that every value is one of its type.
+    /// Reads a whole recording once. Makes sure that the recording is complete, that no byte was
+    /// altered, and that every value fits its type.
     ///
     /// # Errors
     ///
-    /// The first place that is otherwise.
+    /// The first place with an error.
     ///
     /// See [`Writer`](crate::Writer).
     pub fn read(bytes: &'b [u8]) -> Result<Self, Malformed> {
@@ -67,7 +67,7 @@ impl<'b> Recording<'b> {
         })
     }
 
-    /// Returns what the recording says of itself.
+    /// Returns the header, the recording's statement about itself.
     ///
     /// See [`Writer`](crate::Writer).
     pub const fn header(&self) -> &Header {
@@ -81,32 +81,32 @@ impl<'b> Recording<'b> {
         self.read.count
     }
 
-    /// Returns how many entries are of what was lost; 0, if the recording is not
-    /// [cut](Self::is_cut): it is complete.
+    /// Returns the number of entries for lost values. If the number is 0 and the recording is not
+    /// [cut](Self::is_cut), the recording is complete.
     ///
     /// See [`Writer`](crate::Writer).
     pub const fn lost(&self) -> u64 {
         self.read.lost
     }
 
-    /// Reports whether the recording says nothing of what happened after its last entry: the
-    /// run died, or its buffer was full of what is never lost.
+    /// Reports whether the recording ends before its run: the run died, or the buffer was full of
+    /// entries that must never be lost.
     ///
     /// See [`Stream`].
     pub const fn is_cut(&self) -> bool {
         self.is_cut
     }
 
-    /// Returns the entries, in the order in which they were written.
+    /// Returns the entries, in the order of writing.
     ///
     /// See [`Writer`](crate::Writer).
     pub fn entries(&self) -> impl Iterator<Item = Entry<'b>> + Clone + Debug + use<'b> {
-        // Decoded again, not kept: reading takes no memory that grows with the recording.
+        // Decoded again, not kept: the memory needed for reading does not grow with the recording.
         let entries = self.frames().filter(|frame| frame.kind == ENTRY);
         entries.filter_map(|frame| Entry::decode(frame.payload).ok())
     }
 
-    /// Returns all that is in the recording, in the order in which it was written.
+    /// Returns everything in the recording, in the order of writing.
     ///
     /// See [`Commit`], [`Events`], [`Times`].
     pub fn chunks(&self) -> impl Iterator<Item = Chunk<'b>> + Clone + Debug + use<'b> {
@@ -114,8 +114,7 @@ impl<'b> Recording<'b> {
             .map_while(|frame| Chunk::read(&frame).ok().flatten())
     }
 
-    /// Returns the frames up to the end. Whatever could be wrong was found when the recording was
-    /// read.
+    /// Returns the frames up to the end. The first reading of the recording has found any errors.
     fn frames(&self) -> impl Iterator<Item = Frame<'b>> + Clone + Debug + use<'b> {
         let mut input = Decoder::new(&self.bytes[self.read.first..]);
         let frames = core::iter::from_fn(move || frame(&mut input).ok());
@@ -123,18 +122,18 @@ impl<'b> Recording<'b> {
     }
 }
 
-/// Something of a recording.
+/// A part of a recording.
 ///
 /// See [`Recording::chunks`].
 #[derive(Clone, Debug)]
 pub enum Chunk<'b> {
     /// The recording's statement about itself.
     Header(Header),
-    /// A value, or what became of a job.
+    /// A value, or the fate of a job.
     Entry(Entry<'b>),
-    /// Facts known besides, in lines.
+    /// Other facts, in lines.
     Text(&'b str),
-    /// The model that was committed; what follows is of it.
+    /// The committed model; the chunks after it belong to this model.
     Commit(Commit),
     /// Events of a journal.
     Events(Events<'b>),
@@ -159,7 +158,7 @@ pub enum Chunk<'b> {
 pub struct Events<'b> {
     /// The number of the cluster.
     pub cluster: u16,
-    /// How many events of the run its journal has taken before these.
+    /// How many events of the run the cluster's journal has taken before these.
     pub before: u64,
     words: &'b [[u8; 24]],
 }
@@ -190,7 +189,7 @@ impl<'b> Events<'b> {
 }
 
 impl<'b> Chunk<'b> {
-    /// Reads a frame, if it is no end. Not inlined: all that a record can have is decoded here.
+    /// Reads a frame, unless the frame is an end. Not inlined: this decodes every kind of chunk.
     #[inline(never)]
     fn read(frame: &Frame<'b>) -> Result<Option<Self>, Malformed> {
         let payload = frame.payload;
@@ -203,9 +202,9 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 9 it ends before the lists, in version 8 before the device, in version 7
-                // before the answers and locks, in version 6 before the pins, and in version 5 before
-                // the waits: all that follows is 0.
+                // A commit of version 9 ends before the lists, of version 8 before the device, of
+                // version 7 before the answers and locks, of version 6 before the pins, and of
+                // version 5 before the waits: all missing parts are 0.
                 let of_before = |lacks: usize| {
                     let bytes = [payload, &[0; 48][..lacks]].concat();
                     Commit::from_bytes(&bytes).ok()
@@ -246,7 +245,7 @@ impl Progress {
         }
     }
 
-    /// Reads all frames, and reports whether the last one is of a recording that is cut.
+    /// Reads all frames, and reports whether the last frame marks a cut recording.
     fn read(&mut self, bytes: &[u8]) -> Result<bool, Malformed> {
         let mut input = Decoder::new(bytes);
         let mark = "the mark of a recording, 0x89 and `FASSREC`";
@@ -255,13 +254,13 @@ impl Progress {
         }
         let malformed =
             input.expected("version 1 to 9 of recordings, which are those that are read");
-        // A later version may have kinds that this code cannot check; an earlier one only lacks
-        // some.
+        // A later version may have kinds that this code cannot check; an earlier version only lacks
+        // some kinds.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
         let mut crc = Crc::new();
-        // Mark and version are in all checksums, so a frame fits to no file of another version.
+        // Mark and version are in all checksums, so a frame fits no file of another version.
         crc.update(&bytes[..input.offset()]);
 
         (self.first, self.last, self.crc) = (input.offset(), input.offset(), crc);
@@ -270,8 +269,8 @@ impl Progress {
             let inside = |malformed: Malformed| malformed.behind(frame.offset);
             match Chunk::read(&frame)? {
                 Some(Chunk::Header(header)) => {
-                    // Entries are checked against the header, so it cannot change or come after
-                    // them.
+                    // Entries are checked against the header, so the header cannot change or come
+                    // after them.
                     if self.has_header || self.count > 0 {
                         return Err(frame.expected("no other header"));
                     }
@@ -290,32 +289,32 @@ impl Progress {
                 Some(_) => {}
                 None => {
                     let said = <(u64, u64)>::from_bytes(frame.payload).map_err(inside)?;
-                    // Checksums find altered frames; this finds a writer that has miscounted.
+                    // Checksums find altered frames; this check finds a writer that has miscounted.
                     if said != (self.count, self.lost) {
                         return Err(inside(Malformed {
                             offset: 0,
                             expected: "how many entries there are, and how many of them are lost",
                         }));
                     }
-                    // Bytes behind the end are in no checksum, so nobody vouches for them.
+                    // No checksum covers bytes behind the end, so nobody vouches for them.
                     if input.remaining() > 0 {
                         return Err(input.expected("the end of the file"));
                     }
                     return Ok(frame.kind == CUT);
                 }
             }
-            // Only now: `mended` goes on from here, behind the last frame that was found right.
+            // Only now: `mended` goes on from here, behind the last correct frame.
             (self.last, self.crc) = (input.offset(), crc);
         }
     }
 }
 
-/// Returns a recording of what is whole and unaltered at the start of these bytes, as a run
-/// leaves them that died. It is [cut](Recording::is_cut).
+/// Returns a recording of the whole and unaltered part at the start of these bytes, left behind by
+/// a run that died. The result is [cut](Recording::is_cut).
 ///
 /// # Errors
 ///
-/// Not even the first bytes are those of a recording: what is wrong with them.
+/// Even the first bytes do not belong to a recording: the error says why.
 ///
 /// ```
 /// use recording::{Header, Recording, Writer};
@@ -334,19 +333,19 @@ pub fn mended(bytes: &[u8]) -> Result<Vec<u8>, Malformed> {
     {
         return Err(malformed);
     }
-    // The end, if there was one, is not in it: a new one is written, with the counts of what is
-    // left.
+    // An old end, if there was one, is left out: a new end is written, with the counts of the
+    // remaining part.
     let whole = bytes[..progress.last].to_vec();
     let stream = Stream::behind(progress.crc, (progress.count, progress.lost), whole);
     Ok(stream.cut())
 }
 
-/// Returns a whole recording as it is, and a [`mended`] one in place of one that only ends too
-/// early, as a program that was killed leaves it, or a disk that was full.
+/// Returns a whole recording as it is. If a recording only ends too early, left by a killed program
+/// or a full disk, returns the [`mended`] recording instead.
 ///
 /// # Errors
 ///
-/// The bytes are no recording, or are altered.
+/// The bytes are not a recording, or are altered.
 ///
 /// ```
 /// use recording::{Header, Recording, Writer, completed};
@@ -361,7 +360,7 @@ pub fn completed<'b>(bytes: impl Into<Cow<'b, [u8]>>) -> Result<Cow<'b, [u8]>, M
     let mut progress = Progress::none();
     match progress.read(&bytes) {
         Ok(_) => Ok(bytes),
-        // A frame that is whole and wrong was altered; this one is not whole.
+        // A whole frame with an error was altered; here, the next frame is not whole.
         Err(_)
             if progress.last > 0 && frame(&mut Decoder::new(&bytes[progress.last..])).is_err() =>
         {
@@ -372,7 +371,7 @@ pub fn completed<'b>(bytes: impl Into<Cow<'b, [u8]>>) -> Result<Cow<'b, [u8]>, M
 }
 
 impl Frame<'_> {
-    /// Says what was expected where the frame begins.
+    /// Returns an error naming the part expected at the frame's start.
     const fn expected(&self, expected: &'static str) -> Malformed {
         Malformed {
             offset: self.offset - 5,
@@ -383,7 +382,7 @@ impl Frame<'_> {
 
 /// Reads the next frame.
 fn frame<'b>(input: &mut Decoder<'b>) -> Result<Frame<'b>, Malformed> {
-    // Kind and length are 5 bytes before the payload, from which `Frame::expected` counts back.
+    // Kind and length are 5 bytes before the payload; `Frame::expected` subtracts these bytes.
     let [kind] = input.array("another frame; the recording has no end, so a part is missing")?;
     let length = u32::from_le_bytes(input.array("4 bytes, how long the frame is")?);
     let length = usize::try_from(length).unwrap_or(usize::MAX);
@@ -404,9 +403,9 @@ fn frame<'b>(input: &mut Decoder<'b>) -> Result<Frame<'b>, Malformed> {
 /// Reads the next frame, and makes sure that no byte up to its end was altered.
 fn checked<'b>(input: &mut Decoder<'b>, crc: &mut Crc) -> Result<Frame<'b>, Malformed> {
     let frame = frame(input)?;
-    // In the order of the file, without the checksums, as the writer has summed up.
+    // In the order of the file, without the checksums, as the writer has computed it.
     crc.update(&[frame.kind]);
-    // It was a `u32`.
+    // The length was a `u32`.
     let length = u32::try_from(frame.payload.len()).unwrap_or(u32::MAX);
     crc.update(&length.to_le_bytes());
     crc.update(frame.payload);
@@ -419,10 +418,10 @@ fn checked<'b>(input: &mut Decoder<'b>, crc: &mut Crc) -> Result<Frame<'b>, Malf
     }
 }
 
-/// Makes sure that the parts of a header fit to each other.
+/// Makes sure that the parts of a header fit each other.
 fn check_header(header: &Header) -> Result<(), &'static str> {
     let (dags, channels) = (header.dags.len(), &header.channels);
-    // Each has a number of 16 bits, also where both are numbered together.
+    // Each has a 16-bit number, also where both are numbered together.
     if dags + channels.len() >= usize::from(u16::MAX) {
         return Err("fewer than 65,535 DAGs and channels");
     }
@@ -433,18 +432,18 @@ fn check_header(header: &Header) -> Result<(), &'static str> {
     }
 }
 
-/// A recording does not have what is wanted of it.
+/// A recording lacks the requested data.
 ///
 /// See [`Recording::values`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mismatch(String);
 
 impl<'b> Recording<'b> {
-    /// Returns the values that a DAG's subtask has written to a topic, with their jobs.
+    /// Returns the values written by a DAG's subtask to a topic, with their jobs.
     ///
     /// # Errors
     ///
-    /// The recording has none of this topic, or of another type.
+    /// The recording has no values of this topic, or values of another type.
     ///
     /// ```
     /// use recording::{Header, Recording, Writer};
@@ -466,7 +465,7 @@ impl<'b> Recording<'b> {
         let name_of = |dag: u16| &*header.dags[usize::from(dag)].name;
         let mut channels = (0_u16..).zip(&header.channels);
         let found = channels.find(|(_, channel)| {
-            // A topic may be sampled as well: only its writer's channel has the value of each job.
+            // DAGs may sample a topic as well: only its writer's channel has the value of each job.
             let is_written = channel.role.is_written();
             is_written && channel.topic == topic && name_of(channel.dag) == dag
         });
@@ -492,7 +491,7 @@ impl<'b> Recording<'b> {
         }
         let is_of_channel =
             move |entry: &Entry<'_>| entry.what == EntryKind::Value && entry.place == number;
-        // Each is one of the type: the recording was read by the same schema.
+        // Each value fits the type: the recording was read by the same schema.
         let value = |entry: Entry<'_>| Some((entry.job, T::from_bytes(entry.value).ok()?));
         Ok(self.entries().filter(is_of_channel).filter_map(value))
     }

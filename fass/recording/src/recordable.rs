@@ -1,9 +1,9 @@
-//! The types whose values can be written down: the trait, scalars, an app's structs, and what is
-//! made of others: options, lists, arrays, tuples, shared ones.
+//! The types whose values can be written down: the trait, scalars, an app's structs, and composed
+//! types: options, lists, arrays, tuples, shared values.
 //!
-//! Schemas are among them, for they stand in recordings. They are read as values are, trusting nothing: the depth is bounded, and so are the
-//! parts that take no bytes; no list or array has such elements, of which a few bytes could
-//! promise any number.
+//! Schemas are recordable, too, as they are parts of recordings. They are read like values, without
+//! any trust: the depth is bounded, and so are the parts taking no bytes. The elements of lists and
+//! arrays always take bytes; otherwise a few bytes could promise any number of elements.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -14,13 +14,13 @@ use super::bytes::{Decoder, Encoder, Full, Malformed, require};
 use super::schema;
 use super::schema::{DEEP, Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
 
-/// The most bytes of memory that a byte of input may become, for each level of the type's nesting.
+/// The most bytes of memory resulting from a byte of input, for each level of the type's nesting.
 pub const MOST_GROWTH: usize = 256;
 
 /// A type whose values can be written down, and read again.
 ///
-/// Implemented for what the [crate](crate#the-form-of-values) lists; an app's struct becomes one
-/// by [`recordable!`](crate::recordable!). A type that is none is refused by the compiler:
+/// Implemented for the types listed in the [crate](crate#the-form-of-values). An app's struct
+/// becomes recordable by [`recordable!`](crate::recordable!). The compiler refuses other types:
 ///
 /// ```compile_fail,E0277
 /// let _ = recording::to_bytes(&std::time::Instant::now());
@@ -41,14 +41,14 @@ pub const MOST_GROWTH: usize = 256;
     note = "define an app's struct within `recording::recordable! {{ ... }}`; for `usize` take `u64`"
 )]
 pub trait Recordable: Sized {
-    /// The fewest bytes that a value takes.
+    /// The fewest bytes of a value.
     const LEAST_BYTES: usize;
 
-    /// How deeply the type is nested. A type that contains itself has no depth, and does not
+    /// The depth of the type's nesting. A type containing itself has no depth, and does not
     /// compile.
     const DEPTH: usize;
 
-    /// Returns what the type looks like.
+    /// Returns the form of the type.
     ///
     /// See [`Recordable`].
     fn schema() -> Schema;
@@ -58,7 +58,7 @@ pub trait Recordable: Sized {
     /// See [`Encoder`].
     fn encode<const CDR: bool>(&self, out: &mut Encoder<'_, CDR>);
 
-    /// Writes values one after the other; numbers at once, for that is many times as fast.
+    /// Writes values one after the other; numbers all at once, many times as fast.
     #[doc(hidden)]
     fn encode_all<const CDR: bool>(values: &[Self], out: &mut Encoder<'_, CDR>) {
         values.iter().for_each(|value| value.encode(out));
@@ -68,20 +68,20 @@ pub trait Recordable: Sized {
     ///
     /// # Errors
     ///
-    /// Where the bytes are none of this type.
+    /// The place at which the bytes do not fit the type.
     ///
     /// See [`Decoder`].
     fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed>;
 
-    /// Reads the value that these bytes are.
+    /// Reads the value made of exactly these bytes.
     ///
     /// # Errors
     ///
-    /// As [`decode`](Self::decode), or something is left.
+    /// As [`decode`](Self::decode), or if bytes are left.
     ///
     /// See [`Recordable`].
     fn from_bytes(bytes: &[u8]) -> Result<Self, Malformed> {
-        // When it is compiled: no value of such a type could be read by its schema.
+        // At compile time: no value of such a type could be read by its schema.
         const { assert!(Self::DEPTH <= MOST_DEPTH, "the type is nested too deeply") };
         let mut input = Decoder::new(bytes);
         let value = Self::decode(&mut input)?;
@@ -126,8 +126,8 @@ macro_rules! implement_number {
 
             #[inline]
             fn encode_all<const CDR: bool>(values: &[Self], out: &mut Encoder<'_, CDR>) {
-                /// As many as are copied at once: each block by way of a place of its own, so
-                /// the compiler knows that it does not overlap where it goes.
+                /// The number of values copied at once. Each block goes through a place of its own,
+                /// so the compiler knows that source and target do not overlap.
                 const BLOCK: usize = 8;
                 if !values.is_empty() {
                     out.align(size_of::<Self>());
@@ -182,7 +182,7 @@ impl Recordable for bool {
 
     fn decode<const CDR: bool>(input: &mut Decoder<'_, CDR>) -> Result<Self, Malformed> {
         let malformed = input.expected("a truth value, 0 or 1");
-        // Other bytes are refused, not taken for true: each of both values has one form.
+        // Other bytes are refused, not taken for true: each of the two values has one form.
         match input.array(malformed.expected)? {
             [0] => Ok(false),
             [1] => Ok(true),
@@ -231,8 +231,8 @@ impl Recordable for String {
 
 /// Defines structs whose values can be written down: a struct is written field by field.
 ///
-/// Takes structs with named fields and without parameters, as they would be written without it;
-/// the fields' types have to be [`Recordable`].
+/// Takes structs with named fields and without parameters, in their usual notation; the fields'
+/// types have to be [`Recordable`].
 ///
 /// ```
 /// use recording::Recordable;
@@ -289,7 +289,7 @@ macro_rules! recordable {
     };
 }
 
-/// Reports whether a value in the heap is not much larger than the bytes that it comes from.
+/// Reports whether a value on the heap is not much larger than its recorded bytes.
 const fn is_moderate<T: Recordable>() -> bool {
     size_of::<T>() <= MOST_GROWTH * T::LEAST_BYTES
 }
@@ -344,7 +344,7 @@ impl<T: Recordable> Recordable for Vec<T> {
             );
         }
         let count = input.count(T::LEAST_BYTES)?;
-        // Not more than the count says, which the bytes that are left bound.
+        // Not more than the count, bounded by the bytes left.
         let mut values = Self::with_capacity(count);
         for _ in 0..count {
             values.push(T::decode(input)?);
@@ -438,7 +438,7 @@ macro_rules! implement_tuple {
     };
 }
 
-/// Returns how deeply that is nested which has elements of these depths.
+/// Returns the depth of a type with elements of these depths.
 pub const fn deepest(elements: &[usize]) -> usize {
     let (mut deepest, mut index) = (0, 0);
     while index < elements.len() {
@@ -460,7 +460,7 @@ implement_tuple!(A a B b C c D d E e F f);
 implement_tuple!(A a B b C c D d E e F f G g);
 implement_tuple!(A a B b C c D d E e F f G g H h);
 
-/// The numbers of the other kinds of schema; that of a scalar is its place in `Scalar::ALL`.
+/// The numbers of the other kinds of schema; a scalar's number is its place in `Scalar::ALL`.
 const OPTION: u8 = 32;
 const LIST: u8 = 33;
 const ARRAY: u8 = 34;
@@ -530,7 +530,7 @@ impl Schema {
         depth: usize,
     ) -> Result<Self, Malformed> {
         let start = input.clone();
-        // Before anything is read: each level is a call, and the stack has an end.
+        // Before anything is read: each level is a call, and the stack is finite.
         if depth == MOST_DEPTH {
             return Err(start.expected(DEEP));
         }
@@ -543,7 +543,7 @@ impl Schema {
             let malformed = input.expected(WEIGHTLESS);
             let element = inner(input)?;
             match element.least_bytes() {
-                // A list of these would have any number of elements in no bytes.
+                // A list of such elements would have any number of elements in no bytes.
                 0 => Err(malformed),
                 _ => Ok(Box::new(element)),
             }

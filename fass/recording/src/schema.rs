@@ -1,26 +1,26 @@
-//! Schemas of types: names and types, so that values can be read without the type, and the
-//! form in which people write that.
+//! Schemas of types: names and types for reading values without the type, and the textual form of
+//! schemas.
 
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// The deepest that types may be nested.
+/// The deepest nesting of types.
 pub const MOST_DEPTH: usize = 16;
 
-/// The most parts of a type that may take no bytes. So a value has no more than so many parts for
-/// each of its bytes, and reading it takes a time that its length bounds.
+/// The most parts of a type that take no bytes. So a value has at most so many parts for each of
+/// its bytes, and the value's length bounds the time for reading it.
 pub const MOST_WEIGHTLESS: usize = 64;
 
-/// The type expected in place of one that has more.
+/// The type expected in place of a type with more such parts.
 pub(super) const WEIGHTLESS: &str = "a type with at most 64 parts that take no bytes";
 
-/// The type expected in place of one that is nested more deeply.
+/// The type expected in place of a type nested more deeply than [`MOST_DEPTH`].
 pub(super) const DEEP: &str = "a type that is nested less deeply";
 
-/// The form of a type. It is shown, and read by [`Schema::parse`], as a type of Rust but
-/// for `T?`, an `Option<T>`, `[T]`, a `Vec<T>`, and `text`, a `String`.
+/// The form of a type. Displayed, and parsed by [`Schema::parse`], in Rust's notation for types,
+/// except `T?` for `Option<T>`, `[T]` for `Vec<T>`, and `text` for `String`.
 ///
 /// ```
 /// use recording::{Recordable, Schema};
@@ -50,14 +50,14 @@ pub enum Schema {
 /// See [`Schema`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its name.
+    /// The field's name.
     pub name: String,
-    /// Its type.
+    /// The field's type.
     pub schema: Schema,
 }
 
-/// Hands the types that are not made of others to a macro: what each is called here and in a schema,
-/// its least number of bytes, its type in Rust, and what reads it.
+/// Passes the types not composed of others to a macro: each type's name here and in a schema, its
+/// least number of bytes, its Rust type, and its reader.
 macro_rules! of_scalars {
     ($define:ident) => {
         $define!(
@@ -83,7 +83,7 @@ pub(super) use of_scalars;
 
 macro_rules! define_scalars {
     ($($Scalar:ident $name:literal $bytes:literal $Type:ident $read:expr;)*) => {
-        /// A type that is not made of others.
+        /// A type not composed of others.
         ///
         /// See [`Schema`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,7 +93,7 @@ macro_rules! define_scalars {
         }
 
         impl Scalar {
-            /// All of them, in the order of their numbers in recordings.
+            /// All scalars, in the order of their numbers in recordings.
             pub(crate) const ALL: &'static [Self] = &[$(Self::$Scalar),*];
 
             /// Returns the name of the type.
@@ -129,7 +129,7 @@ impl Schema {
         Self::Struct(name.into(), Vec::from(fields))
     }
 
-    /// Returns what the type is made of.
+    /// Returns the types of which this type is composed; none for a scalar.
     fn parts(&self) -> impl Iterator<Item = &Self> {
         let (inner, elements, fields): (Option<&Self>, &[Self], &[Field]) = match self {
             Self::Scalar(_) => (None, &[], &[]),
@@ -143,7 +143,7 @@ impl Schema {
         inner.into_iter().chain(elements).chain(fields)
     }
 
-    /// Returns how deeply the type is nested.
+    /// Returns the depth of the type's nesting.
     fn depth(&self) -> usize {
         1 + self.parts().map(Self::depth).max().unwrap_or(0)
     }
@@ -154,7 +154,7 @@ impl Schema {
         of_parts.fold(usize::from(self.least_bytes() == 0), usize::saturating_add)
     }
 
-    /// Returns the fewest bytes that a value takes.
+    /// Returns the fewest bytes of a value.
     ///
     /// ```
     /// use recording::Recordable;
@@ -204,11 +204,11 @@ impl fmt::Display for Schema {
 }
 
 impl Schema {
-    /// Reads a schema in the form in which it is shown.
+    /// Parses a schema in its displayed form.
     ///
     /// # Errors
     ///
-    /// The column, counted from 1, and what was expected there.
+    /// The column, counted from 1, and the part expected there.
     ///
     /// ```
     /// use recording::Schema;
@@ -221,7 +221,7 @@ impl Schema {
         let mut rest = Rest { text, whole: text };
         let schema = rest.schema(0)?;
         match rest.peek() {
-            // An option follows its type, and so has made deeper what was read.
+            // An option sign follows its type, and so deepens the type already read.
             None if schema.depth() > MOST_DEPTH => rest.refuse(DEEP),
             None if schema.weightless() > MOST_WEIGHTLESS => rest.refuse(WEIGHTLESS),
             None => Ok(schema),
@@ -285,7 +285,7 @@ impl<'t> Rest<'t> {
             Some('(') => self.tuple(depth)?,
             _ => self.named(depth)?,
         };
-        // Each `?` is one more level around what is read already.
+        // Each `?` is one more level around the type read so far.
         for depth in depth.. {
             if !self.takes('?') {
                 break;
@@ -301,7 +301,7 @@ impl<'t> Rest<'t> {
     fn sequence(&mut self, depth: usize) -> Result<Schema, Refused> {
         self.expect('[', "`[`")?;
         let element = Box::new(self.schema(depth + 1)?);
-        // As the reader of bytes does: a schema that can be typed is one that can be recorded.
+        // As the reader of bytes does: every schema that can be typed can also be recorded.
         if element.least_bytes() == 0 {
             return self.refuse("elements that take bytes");
         }

@@ -1,8 +1,8 @@
-//! Going through a value by its schema, without its type, and its text: JSON, for people and for
-//! programs.
+//! Walks through a value by its schema, without its type, and writes JSON, for people and programs.
 //!
-//! A struct is an object, what else has parts is an array; an option without a value, and a
-//! number that is infinite or none, is `null`, since JSON has no word for these.
+//! A struct becomes an object, anything else with parts an array. An option without a value, and a
+//! number that is infinite or NaN, becomes `null`, since JSON has no word for these. number that is
+//! infinite or none, is `null`, since JSON has no word for these.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -31,9 +31,9 @@ pub enum Part<'p> {
     Open(Option<&'p str>),
     /// The next part is the value of the field of this name.
     Field(&'p str),
-    /// They were the last ones.
+    /// The end of the elements or fields.
     Close(Option<&'p str>),
-    /// An option without a value. One with a value is that value.
+    /// An option without a value. An option with a value is just that value.
     Nothing,
     /// A truth value.
     Bool(bool),
@@ -83,11 +83,11 @@ impl From<usize> for Part<'_> {
 }
 
 impl Schema {
-    /// Goes through a value of this type, part by part.
+    /// Walks through a value of this type, part by part.
     ///
     /// # Errors
     ///
-    /// The bytes are none; the parts before were seen.
+    /// The bytes are not such a value; `see` got earlier parts.
     ///
     /// See [`Part`].
     pub fn walk(
@@ -144,8 +144,8 @@ impl Schema {
 macro_rules! read_scalars {
     ($($Scalar:ident $name:literal $bytes:literal $Type:ident $read:expr;)*) => {
         impl Scalar {
-            /// Returns the bytes of a value that is written as Rust writes it; text stands for
-            /// itself. None if the type has no such value.
+            /// Returns the bytes of a value in Rust's notation; text stands for itself. `None` if
+            /// the type has no such value.
             ///
             /// ```
             /// assert_eq!(recording::Scalar::U16.parse("258"), Some(vec![2, 1]));
@@ -167,11 +167,11 @@ macro_rules! read_scalars {
 
 of_scalars!(read_scalars);
 
-/// Writes a value, whose type is known by its schema, as JSON.
+/// Writes a value as JSON, using its schema instead of its type.
 ///
 /// # Errors
 ///
-/// The bytes are no value of this type. (What `out` says of its own errors is lost.)
+/// The bytes are not a value of this type. (Errors of `out` are lost.)
 ///
 /// ```
 /// use recording::Recordable;
@@ -189,14 +189,14 @@ pub fn write_json(schema: &Schema, bytes: &[u8], out: &mut dyn Write) -> Result<
         if follows && !matches!(part, Part::Close(_)) {
             let _ = out.write_char(',');
         }
-        // Nothing stands before the first part of a whole, or between a field's name and its value.
+        // No comma before the first part of a whole, or between a field's name and its value.
         follows = !matches!(part, Part::Open(_) | Part::Field(_));
         let _ = write!(out, "{part}");
     })?;
     input.expect_end()
 }
 
-/// A part by itself is shown as JSON.
+/// Displays a single part as JSON.
 impl fmt::Display for Part<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -212,7 +212,7 @@ impl fmt::Display for Part<'_> {
             Part::Bool(truth) => write!(out, "{truth}"),
             Part::Char(letter) => write_text(letter.encode_utf8(&mut [0; 4]), out),
             Part::Text(text) => write_text(text, out),
-            // Most numbers are short, and are faster so.
+            // Most numbers are short, and faster in this way.
             Part::Unsigned(number) => match u64::try_from(number) {
                 Ok(number) => write!(out, "{number}"),
                 Err(_) => write!(out, "{number}"),
@@ -228,7 +228,7 @@ impl fmt::Display for Part<'_> {
     }
 }
 
-/// Writes a string of JSON (RFC 8259, section 7).
+/// Writes a JSON string (RFC 8259, section 7).
 fn write_text(text: &str, out: &mut dyn Write) -> fmt::Result {
     out.write_char('"')?;
     for letter in text.chars() {
@@ -243,7 +243,7 @@ fn write_text(text: &str, out: &mut dyn Write) -> fmt::Result {
     out.write_char('"')
 }
 
-/// A value in a message: as JSON, or the bytes where they are none of its type.
+/// A value in a message: as JSON, or as bytes if they do not fit the type.
 ///
 /// ```
 /// use recording::{Recordable, Shown};

@@ -1,20 +1,18 @@
 //! The file: a mark, a header, entries, and an end, each with a checksum.
-//!
 //! ```text
 //! 0x89 "FASSREC"  version, 2 bytes   then frames:
 //! kind, 1 byte    length, 4 bytes    payload    checksum, 4 bytes
 //! ```
 //!
-//! The checksum of a frame is that of all bytes from the file's first one on, checksums left
-//! out. So a frame that is altered, left out, doubled or moved is found, and so is a cut at a
-//! frame's end, by the missing frame of the end. There are two kinds of ends: of a recording
-//! that says of everything what became of it, if only that it is lost, and of one that says
-//! nothing of what came after its last entry. [`mended`](crate::mended) gives the second one to
-//! what a run that died has left. Between entries there may be the rest of what is known of the
-//! run: its [commits](crate::Commit), the events of its journals, the [times](crate::Times) of
-//! runs that have ended, and lines of text.
+//! A frame's checksum covers all bytes from the file's first byte on, except checksums. So an
+//! altered, missing, doubled or moved frame is found, and so is a cut at the end of a frame, by the
+//! missing end frame. There are two kinds of ends. One ends a recording that accounts for
+//! everything, if only as lost. The other ends a recording that knows nothing about the time after
+//! its last entry; [`mended`](crate::mended) adds this end to the bytes left by a run that died.
+//! Between entries there may be other facts about the run: its [commits](crate::Commit), the events
+//! of its journals, the [times](crate::Times) of ended runs, and lines of text.
 //!
-//! A recording is written here, frame by frame, to whatever takes bytes.
+//! Recordings are written here, frame by frame, to any sink of bytes.
 
 use alloc::vec::Vec;
 
@@ -23,18 +21,18 @@ use super::entry::{Commit, Times};
 use super::entry::{Entry, EntryKind, Header};
 use super::recordable::to_bytes;
 
-/// The first bytes of each recording. The first one is no text, so that a transfer of text is
-/// found, which would alter the rest.
+/// The first bytes of each recording. The first byte is not text, so a transfer in text mode is
+/// detected; it would alter the rest.
 pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 
-/// The version of the format that is written, of values included. Those before are read, too: the
-/// first has no entries of [`EntryKind::Clock`], and neither of
-/// [`EntryKind::Fault`]; those before 4 have no text, and
-/// those before 5 no commits, events and times, and no [states](crate::Role::State); those before 6
-/// no [waits](Commit::waits) and no [answers](crate::Role::Answer); those before 7 no
-/// [pins](Commit::pins) and [affinities](Commit::affinities); those before 8 no
-/// [answers](Commit::answers) and [locks](Commit::locks); those before 9 no
-/// [device](Commit::device_ns); those before 10 no [lists](Commit::lists), and later ones no pins.
+/// The version of the written format, including values. Earlier versions are read, too. The first
+/// version has no entries of [`EntryKind::Clock`], and neither of [`EntryKind::Fault`]. Versions
+/// before 4 have no text. Those before 5 have no commits, events and times, and no
+/// [states](crate::Role::State). Those before 6 have no [waits](Commit::waits) and no
+/// [answers](crate::Role::Answer). Those before 7 have no [pins](Commit::pins) and
+/// [affinities](Commit::affinities). Those before 8 have no [answers](Commit::answers) and
+/// [locks](Commit::locks), those before 9 no [device](Commit::device_ns), and those before 10 no
+/// [lists](Commit::lists); version 10 has no pins.
 pub const VERSION: u16 = 10;
 
 /// The kinds of frames.
@@ -73,7 +71,7 @@ const fn table() -> [u32; 256] {
     table
 }
 
-/// A checksum of bytes that are given piece by piece.
+/// A checksum of bytes given piece by piece.
 ///
 /// ```
 /// use recording::Crc;
@@ -87,12 +85,12 @@ const fn table() -> [u32; 256] {
 pub struct Crc(u32);
 
 impl Crc {
-    /// Begins with no byte.
+    /// Begins without any byte.
     pub const fn new() -> Self {
         Self(u32::MAX)
     }
 
-    /// Takes more bytes in.
+    /// Adds more bytes.
     pub fn update(&mut self, bytes: &[u8]) {
         self.0 = bytes.iter().fold(self.0, |crc, &byte| {
             let [low, ..] = crc.to_le_bytes();
@@ -112,7 +110,7 @@ impl Default for Crc {
     }
 }
 
-/// A place that takes the bytes of a recording.
+/// A destination for the bytes of a recording.
 ///
 /// See [`Stream`].
 pub trait Sink {
@@ -143,7 +141,7 @@ impl Sink for fn(&[u8]) {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Stream<S: ?Sized> {
-    /// Of all bytes that are no checksums.
+    /// Over all bytes except checksums.
     crc: Crc,
     entries: u64,
     lost: u64,
@@ -194,7 +192,7 @@ pub type Writer = Stream<Vec<u8>>;
 /// The bytes of an entry before its value.
 const ENTRY_HEAD: usize = 29;
 
-/// The bytes of events before the first one.
+/// The bytes of events before the first event.
 const EVENTS_HEAD: usize = 10;
 
 impl Writer {
@@ -211,12 +209,12 @@ impl<S: Sink> Stream<S> {
     pub fn begin(to: S) -> Self {
         let mut stream = Self::behind(Crc::new(), (0, 0), to);
         stream.put(&MAGIC);
-        // Right behind the mark, in every version: so a reader knows what it cannot read.
+        // Right behind the mark, in every version: so a reader recognises versions it cannot read.
         stream.put(&VERSION.to_le_bytes());
         stream
     }
 
-    /// Goes on behind a part of a recording, all of whose frames are whole.
+    /// Goes on behind a part of a recording consisting of whole frames.
     pub(super) const fn behind(crc: Crc, (entries, lost): (u64, u64), to: S) -> Self {
         Self {
             crc,
@@ -226,13 +224,12 @@ impl<S: Sink> Stream<S> {
         }
     }
 
-    /// Lends what takes the bytes.
+    /// Lends the sink.
     pub const fn sink(&mut self) -> &mut S {
         &mut self.to
     }
 
-    /// Ends the recording, and returns what has taken its bytes. One in which something is lost
-    /// says so.
+    /// Ends the recording, and returns its sink. The end states whether anything is lost.
     ///
     /// See [`Writer`].
     pub fn end(mut self) -> S {
@@ -240,7 +237,7 @@ impl<S: Sink> Stream<S> {
         self.to
     }
 
-    /// Ends a recording that says nothing of what happened after its last entry.
+    /// Ends a recording that knows nothing about the time after its last entry.
     pub fn cut(mut self) -> S {
         self.finish(CUT);
         self.to
@@ -248,12 +245,12 @@ impl<S: Sink> Stream<S> {
 }
 
 impl<S: Sink + ?Sized> Stream<S> {
-    /// Says what the recording is of; once, before the first entry.
+    /// Adds the header; once, before the first entry.
     pub fn header(&mut self, header: &Header) {
         self.whole(HEADER, &[&to_bytes(header)]);
     }
 
-    /// Adds an entry. It has to fit to the header, or the recording will be refused.
+    /// Adds an entry. The entry has to fit the header, or the recording will be refused.
     ///
     /// # Panics
     ///
@@ -263,7 +260,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     pub fn write(&mut self, entry: &Entry<'_>) {
         self.entries += 1;
         self.lost += u64::from(entry.what == EntryKind::Lost);
-        // On the stack, and the value goes out from where it is: an entry allocates nothing.
+        // On the stack, and the value is written from its own place: an entry allocates nothing.
         let mut head = [0; ENTRY_HEAD];
         let mut out = Encoder::new(&mut head);
         Entry {
@@ -278,7 +275,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     ///
     /// # Panics
     ///
-    /// If it has 4 GiB or more.
+    /// If the text has 4 GiB or more.
     ///
     /// ```
     /// use recording::{Chunk, Recording, Stream};
@@ -293,14 +290,14 @@ impl<S: Sink + ?Sized> Stream<S> {
         self.whole(TEXT, &[text.as_bytes()]);
     }
 
-    /// Adds what was committed; what follows is of these DAGs.
+    /// Adds a commit. The parts written afterwards belong to its DAGs.
     ///
     /// See [`Commit`].
     pub fn commit(&mut self, commit: &Commit) {
         self.whole(COMMIT, &[&bytes_of_commit(commit)]);
     }
 
-    /// Adds events of a cluster's journal, of which so many came before.
+    /// Adds events of a cluster's journal; `before` counts the journal's earlier events.
     ///
     /// See [`Events`](crate::Events).
     pub fn events(&mut self, cluster: u16, before: u64, words: &[[u64; 3]]) {
@@ -327,13 +324,13 @@ impl<S: Sink + ?Sized> Stream<S> {
         self.entries
     }
 
-    /// Returns how many of these are of what was lost.
+    /// Returns the number of entries for lost values.
     pub const fn lost(&self) -> u64 {
         self.lost
     }
 
     fn finish(&mut self, kind: u8) {
-        // The counts are in the end, not in the header: nothing that is written is gone back to.
+        // The counts are in the end, not in the header: the writer never goes back.
         self.whole(kind, &[&to_bytes(&(self.entries, self.lost))]);
     }
 
@@ -356,13 +353,13 @@ impl<S: Sink + ?Sized> Stream<S> {
     }
 
     fn checksum(&mut self) {
-        // Not by `put`: a checksum is of all bytes but the checksums themselves.
+        // Not by `put`: a checksum covers all bytes except the checksums themselves.
         self.to.put(&self.crc.value().to_le_bytes());
     }
 }
 
-/// Returns the bytes of a commit. Not generic, as below: so they are compiled here, for size, whoever
-/// has the sink.
+/// Returns the bytes of a commit. Not generic, like the next function: so the code is compiled
+/// here, for size, whatever the sink.
 fn bytes_of_commit(commit: &Commit) -> Vec<u8> {
     to_bytes(commit)
 }
