@@ -1,7 +1,7 @@
-//! Faults that the commit would find, told with the lines of the file.
+//! Finds the commit's faults in advance, and reports them with the lines of the file.
 //!
-//! The commit names DAGs and subtasks. The author of a file looks for a line, so
-//! each fault is given that of the edge, subtask or DAG that it is about.
+//! The commit names DAGs and subtasks. The author of a file looks for a line, so each fault gets
+//! the line of its edge, subtask or DAG.
 
 use alloc::format;
 use alloc::string::String;
@@ -17,11 +17,11 @@ use text::of_file;
 use crate::file::{FileDag, Set};
 use crate::length::Length;
 
-/// Verifies a set as its commit will on a machine, with any shape of graph allowed.
+/// Verifies a set as its commit on a machine will, with any shape of graph allowed.
 ///
 /// # Errors
 ///
-/// Every fault, with its line; of very many the first, and their number.
+/// Every fault, with its line; of very many faults only the first, and their number.
 pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), Vec<Malformed>> {
     let Err(rejected) = verified(set, machine, length) else {
         return Ok(());
@@ -69,7 +69,7 @@ pub fn verified(
     verify(&specs, &options)
 }
 
-/// Returns the line that a fault is about; 1 if it is about no line in particular.
+/// Returns the line of a fault; 1 if the fault concerns no particular line.
 fn line_of(set: &Set, fault: &DagFault) -> usize {
     let line = match fault {
         DagFault::Cycle { dag, hops } => set.dags.get(dag.id.index()).map(|dag| {
@@ -115,7 +115,7 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
         DagFault::CoreList { list, .. } => {
             let mut lists = set.lists.iter();
             let is_it = |text: &str| text.split(':').next() == Some(list);
-            // Of two of one core the later one is too many.
+            // Of two lists for one core the later list is the surplus one.
             let found = lists.rfind(|(_, text)| is_it(text));
             found.map(|(line, _)| *line)
         }

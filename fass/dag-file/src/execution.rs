@@ -1,4 +1,4 @@
-//! How execution times follow from what a file says, by a word of the command line.
+//! Execution times derived from a file, as chosen by a word of the command line.
 
 use alloc::format;
 use alloc::string::String;
@@ -8,7 +8,7 @@ use text::quoted;
 /// A millionth, the finest fraction of a WCET.
 pub const WHOLE: u64 = 1_000_000;
 
-/// How execution times follow from what the file says.
+/// How execution times follow from the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Execution {
     /// Every instance takes its WCET.
@@ -20,16 +20,16 @@ pub enum Execution {
         /// The largest fraction, at most a whole.
         most: u64,
     },
-    /// One of the subtask's samples, each with the same probability; the WCET
-    /// where a subtask has none.
+    /// One of the subtask's samples, each with the same probability; the WCET for a subtask without
+    /// samples.
     Samples,
-    /// The samples in their order, job by job, and again from the first one; the WCET where a
-    /// subtask has none.
+    /// The samples in their order, job by job, and again from the first sample; the WCET for a
+    /// subtask without samples.
     Sequence,
 }
 
 impl Execution {
-    /// The forms that [`parse`](Self::parse) reads, for messages.
+    /// The forms accepted by [`parse`](Self::parse), for messages.
     pub const FORMS: &'static str =
         "wcet, uniform:0.2..1 (fractions of the WCET), samples or sequence";
 
@@ -37,7 +37,7 @@ impl Execution {
     ///
     /// # Errors
     ///
-    /// In words: it is none of them, or the fractions are no range within 0 to 1.
+    /// In words: the text is none of them, or the fractions are not a range within 0 to 1.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text {
             "wcet" => return Ok(Self::Wcet),
@@ -77,9 +77,9 @@ fn fraction(text: &str) -> Option<u64> {
         .checked_add(part * 10_u64.pow(missing))
 }
 
-/// Returns the kernel's worst overheads in nanoseconds, as measured in deterministic mode: of a context
-/// switch, a dispatch, an interrupt, and an instance that becomes ready. A dispatch may wait for those
-/// of all other cores, which take turns.
+/// Returns the kernel's worst overheads in nanoseconds, measured in deterministic mode: of a
+/// context switch, a dispatch, an interrupt, and an instance becoming ready. A dispatch may wait
+/// for the dispatches of all other cores, since cores take turns.
 #[must_use]
 pub const fn kernel_overheads_ns(cores: u64) -> [u64; 4] {
     [1000, 2500 * cores, 4000, 1000]

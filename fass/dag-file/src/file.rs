@@ -1,7 +1,7 @@
 //! The contents of a DAG file.
 //!
-//! The DAGs themselves are specs of `sched-dag`. Next to each stands what only the
-//! file knows: the lines, for messages, and the samples of execution times.
+//! The DAGs themselves are specs of `sched-dag`. Beside each spec are data found only in the file:
+//! line numbers, for messages, and samples of execution times.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -16,10 +16,10 @@ pub struct DagFile {
     pub sets: Vec<Set>,
 }
 
-/// DAGs that run together.
+/// DAGs running together.
 #[derive(Clone, Debug, Default)]
 pub struct Set {
-    /// The set's name; empty if the file names none.
+    /// The set's name; empty if the file gives no name.
     pub name: String,
     /// The DAGs, at least one.
     pub dags: Vec<FileDag>,
@@ -39,9 +39,9 @@ impl Set {
 /// One DAG.
 #[derive(Clone, Debug, Default)]
 pub struct FileDag {
-    /// The DAG. If it states no number of jobs, a [`Length`](crate::Length) decides that.
+    /// The DAG. If the spec has no number of jobs, a [`Length`](crate::Length) decides the number.
     pub spec: DagSpec,
-    /// The line that begins it, counted from 1.
+    /// The DAG's first line, counted from 1.
     pub line: usize,
     /// More about each subtask, in the order of the spec.
     pub subtasks: Vec<FileSubtask>,
@@ -49,19 +49,19 @@ pub struct FileDag {
     pub edge_lines: Vec<usize>,
 }
 
-/// The lines of a file about a subtask, beyond its spec.
+/// The file's data on a subtask, beyond its spec.
 #[derive(Clone, Debug, Default)]
 pub struct FileSubtask {
-    /// The line that states it, counted from 1.
+    /// The line of the subtask, counted from 1.
     pub line: usize,
-    /// Samples that were measured, one after the other, in nanoseconds; mostly none. Each has the
-    /// execution time of every segment in turn, and between them how long the waits lasted.
+    /// Measured samples, one after the other, in nanoseconds; usually none. Each sample has the
+    /// execution time of every segment in turn, with the durations of the waits between them.
     pub samples_ns: Arc<[u64]>,
 }
 
 impl FileDag {
-    /// Returns the longest time that an instance of a subtask may execute: its WCET, or that of its
-    /// samples.
+    /// Returns the longest possible execution time of a subtask's instance: the WCET, or the
+    /// longest sample.
     pub fn most_ns(&self, subtask: usize) -> u64 {
         let spec = &self.spec.subtasks[subtask];
         let samples = self.subtasks[subtask].samples_ns.chunks(sample_len(spec));
@@ -70,12 +70,12 @@ impl FileDag {
     }
 }
 
-/// Returns how many times a sample of a subtask has: those of its segments and waits.
+/// Returns the number of times in a sample of a subtask: one for each segment and each wait.
 pub const fn sample_len(spec: &SubtaskSpec) -> usize {
     2 * spec.waits.len() + 1
 }
 
-/// Returns how long an instance executes whose times are those of a sample.
+/// Returns the execution time of an instance with the times of a sample.
 pub fn executed_ns(sample: &[u64]) -> u64 {
     sample
         .iter()
@@ -84,7 +84,7 @@ pub fn executed_ns(sample: &[u64]) -> u64 {
 }
 
 impl DagFile {
-    /// Returns the number of subtasks of the set that has most.
+    /// Returns the number of subtasks of the largest set.
     pub fn most_subtasks(&self) -> usize {
         let of = |set: &Set| set.dags.iter().map(|dag| dag.subtasks.len()).sum();
         self.sets.iter().map(of).max().unwrap_or(0)

@@ -1,4 +1,4 @@
-//! How long a set runs, and the jobs of its DAGs that follow.
+//! The length of a set's run, and the resulting jobs.
 
 use sched_dag::DagSpec;
 
@@ -11,12 +11,13 @@ pub enum Length {
     Jobs(u64),
     /// Each DAG releases the jobs of this time in nanoseconds, at least one.
     Span(u64),
-    /// So many times the longest period of the set: so no DAG ends while others are slowed by it.
+    /// So many times the longest period of the set. So no DAG ends while the others still suffer
+    /// its load.
     Periods(u64),
 }
 
 impl Length {
-    /// Returns the same, for the DAGs of a set.
+    /// Returns the same length, resolved for the DAGs of a set.
     pub fn of(self, set: &Set) -> Self {
         let Self::Periods(count) = self else {
             return self;
@@ -25,7 +26,7 @@ impl Length {
         Self::Span(periods.max().unwrap_or(0).saturating_mul(count))
     }
 
-    /// Returns the number of jobs of a DAG: its own, if it states one.
+    /// Returns a DAG's number of jobs: the number in its spec, if there is one.
     pub fn jobs(self, spec: &DagSpec) -> u64 {
         match (spec.jobs, self) {
             (Some(jobs), _) | (None, Self::Jobs(jobs) | Self::Periods(jobs)) => jobs,

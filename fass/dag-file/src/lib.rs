@@ -1,16 +1,16 @@
-//! DAGs that a file describes: reading such a file, writing it, and checking it.
+//! DAGs described by a file: reading such a file, writing it, and checking it.
 //!
-//! A *DAG file* is text: DAGs with their subtasks, edges and times, in one or more *sets*; the DAGs
+//! A *DAG file* is text: DAGs with their subtasks, edges and times, in one or more *sets*. The DAGs
 //! of a set run together, the sets one after the other (`docs/dag-file.md`). The host tool and the
-//! app `dag-file` read and check it by the same code.
+//! app `dag-file` read and check files with the same code.
 //!
-//! - [`DagFile`]: what a file says; its `Display` is a file again;
-//! - [`parse()`]: reading it, strictly;
-//! - [`check()`]: what the commit would refuse, with the lines at fault;
+//! - [`DagFile`]: the contents of a file; its `Display` is a file again;
+//! - [`parse()`]: reads a file, strictly;
+//! - [`check()`]: finds the commit's refusals, with the lines at fault;
 //! - [`Execution`], [`Length`]: how long instances execute, and the sets run.
 //!
-//! A reader of another format makes a [`DagFile`] of it, too, with the line
-//! numbers of *that* file, and so all formats share checks and messages.
+//! Readers of other formats also produce a [`DagFile`], with the line numbers of their own files.
+//! So all formats share checks and messages.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,7 +1,7 @@
 //! Times in a DAG file: a whole number and its unit, such as `25ms`.
 //!
-//! Units are `ns`, `us` (also `µs`, as durations print it), `ms` and `s`. There is no
-//! default unit: a number alone is refused, for nobody can know what it meant.
+//! Units are `ns`, `us` (also `µs`, the form printed for durations), `ms` and `s`. There is no
+//! default unit: a number alone is refused, since nobody can know its meaning.
 
 use alloc::format;
 use alloc::string::String;
@@ -20,8 +20,8 @@ const UNITS: [(&str, u64); 4] = [
 ///
 /// # Errors
 ///
-/// In words: it is negative, has no unit or an unknown one, or is beyond 64 bits
-/// of nanoseconds.
+/// In words: the time is negative, has no unit or an unknown one, or is beyond 64 bits of
+/// nanoseconds.
 pub fn parse_ns(word: &str) -> Result<u64, String> {
     let shown = quoted(word);
     if word.starts_with('-') {
@@ -40,7 +40,7 @@ pub fn parse_ns(word: &str) -> Result<u64, String> {
         ));
     }
     let name = match unit {
-        // The sign for micro, and the Greek letter that looks like it.
+        // The sign for micro, and the similar Greek letter.
         "\u{b5}s" | "\u{3bc}s" => "us",
         other => other,
     };
@@ -60,7 +60,7 @@ pub fn parse_ns(word: &str) -> Result<u64, String> {
     })
 }
 
-/// A time as a DAG file has it: exactly, in the largest unit that divides it.
+/// A time in the form of a DAG file: exact, in the largest unit dividing the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Time(
     /// Nanoseconds.

@@ -1,7 +1,7 @@
-//! Writing DAG files: what [`parse()`](crate::parse()) reads back as it was.
+//! Writes DAG files such that [`parse()`](crate::parse()) reads them back unchanged.
 //!
-//! Only what differs from the default is written, so a file made from another
-//! format reads like one that a person wrote.
+//! Only values differing from the default are written, so a file converted from another format
+//! looks as if a person had written it.
 
 use core::fmt::{Display, Formatter, Result};
 
@@ -68,7 +68,7 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
 }
 
 fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>) -> Result {
-    // Each part is written as the reader takes it: the rest of the WCET is the first segment's.
+    // Each part is written in the reader's form: the rest of the WCET belongs to the first segment.
     let later_ns: u64 = spec.waits.iter().filter_map(|wait| wait.segment_ns).sum();
     write!(out, "subtask {}", spec.name)?;
     if let Some(wcet_ns) = spec.wcet_ns {

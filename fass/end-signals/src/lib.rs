@@ -1,8 +1,8 @@
-//! The signals by which a person, or a service manager, asks a program of Linux to end.
+//! The signals with which a person, or a service manager, asks a Linux program to end.
 //!
-//! SIGINT, which ctrl-C sends, and SIGTERM kill nobody while they are caught. They are counted, so
-//! that the program can end in order. A thread can wait for them, by a futex; `linux` has all its
-//! waits by the same two calls, [`wait`] and [`wake`].
+//! SIGINT, sent by ctrl-C, and SIGTERM kill nobody while they are caught. The crate counts them, so
+//! the program can end in order. A thread can wait for a signal, by a futex. The crate `linux`
+//! makes all its waits with the same two calls, [`wait`] and [`wake`].
 
 #![deny(unsafe_code)]
 
@@ -15,7 +15,7 @@ use sys::{Catch, ENDS_ASKED};
 
 pub use sys::{wait, wake};
 
-/// The signals, caught as long as this value lives. A program has one at a time.
+/// The signals, caught as long as this value lives. A program has one such value at a time.
 ///
 /// ```
 /// use end_signals::EndSignals;
@@ -29,13 +29,13 @@ pub use sys::{wait, wake};
 pub struct EndSignals(());
 
 impl EndSignals {
-    /// Has all of them counted from now on.
+    /// Counts all signals from now on.
     #[must_use = "they are caught as long as the value lives"]
     pub fn catch() -> Self {
         Self::new(Catch::All)
     }
 
-    /// Has the first one counted. The next one ends the program, as it usually does.
+    /// Counts the first signal. The next signal ends the program, as usual.
     #[must_use = "it is caught as long as the value lives"]
     pub fn catch_first() -> Self {
         Self::new(Catch::First)
@@ -47,18 +47,18 @@ impl EndSignals {
         Self(())
     }
 
-    /// Returns how many have come.
+    /// Returns how many signals have come.
     pub fn count(&self) -> u32 {
         ENDS_ASKED.load(Ordering::Acquire)
     }
 
-    /// Sends a process SIGINT. Whether it is still there does not matter.
+    /// Sends a process SIGINT. The process need not exist any more.
     pub fn send(process: u32) {
         sys::ask_to_end(process);
     }
 
-    /// Waits for the first that is caught, until a time at most on the clock that never jumps, and
-    /// reports whether it has come.
+    /// Waits for the first caught signal, at most until a time on the monotonic clock, and reports
+    /// whether a signal has come.
     pub fn wait(until_ns: u64) -> bool {
         wait(&ENDS_ASKED, 0, Some(until_ns));
         ENDS_ASKED.load(Ordering::Acquire) > 0

@@ -1,7 +1,7 @@
-//! The system calls of the crate: the only `unsafe` code in it.
+//! The system calls of the crate: its only `unsafe` code.
 //!
-//! The symbols are those of the C library, which the standard library links anyway. Each function
-//! is safe to call with any arguments.
+//! The symbols belong to the C library, linked by the standard library anyway. Each function is
+//! safe to call with any arguments.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -23,8 +23,8 @@ const SYS_FUTEX: i64 = 202;
 #[cfg(not(target_arch = "x86_64"))]
 const SYS_FUTEX: i64 = 98;
 
-/// Sleeps until the word is woken, or until a time on the clock; not at all if the word has
-/// another value. May return early.
+/// Sleeps until the word is woken, or until a time on the monotonic clock; not at all if the word
+/// has another value. May return early.
 pub fn wait(word: &AtomicU32, value: u32, until_ns: Option<u64>) {
     const WAIT_UNTIL: i32 = 9 | 128;
     let time = until_ns.map(|ns| Time {
@@ -38,7 +38,7 @@ pub fn wait(word: &AtomicU32, value: u32, until_ns: Option<u64>) {
     unsafe { syscall(SYS_FUTEX, word.as_ptr(), WAIT_UNTIL, value, time, none, any) };
 }
 
-/// Wakes a thread that waits for the word, or all.
+/// Wakes up to `most` threads waiting for the word.
 pub fn wake(word: &AtomicU32, most: i32) {
     const WAKE: i32 = 1 | 128;
     // SAFETY: FUTEX_WAKE takes the word's address and reads nothing.
@@ -48,19 +48,19 @@ pub fn wake(word: &AtomicU32, most: i32) {
 const SIGINT: i32 = 2;
 const SIGTERM: i32 = 15;
 
-/// How many signals that are to end the program were caught.
+/// The number of caught signals asking the program to end.
 pub(crate) static ENDS_ASKED: AtomicU32 = AtomicU32::new(0);
 
-/// Which of them are caught.
+/// The signals to catch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Catch {
     All,
-    /// The next one does what it usually does.
+    /// The next signal has its usual effect.
     First,
     None,
 }
 
-/// Has SIGINT and SIGTERM counted in [`ENDS_ASKED`], or lets them end the program.
+/// Counts SIGINT and SIGTERM in [`ENDS_ASKED`], or lets them end the program.
 pub(crate) fn catch_ends(catch: Catch) {
     extern "C" fn count(_signal: i32) {
         ENDS_ASKED.fetch_add(1, Ordering::Release);
@@ -77,8 +77,8 @@ pub(crate) fn catch_ends(catch: Catch) {
         Catch::None => USUAL,
     };
     for number in [SIGINT, SIGTERM] {
-        // SAFETY: a handler may be called in the middle of anything, and these change an atomic
-        // number, wake threads and set handlers, which takes no lock.
+        // SAFETY: a handler may be called in the middle of anything. These handlers change an
+        // atomic number, wake threads and set handlers, and none of this takes a lock.
         unsafe { signal(number, action) };
     }
 }

@@ -73,6 +73,7 @@ impl Budgets {
             let job = state.engine.scheduler.instance_of(vertex).job;
             let taken_ns = taken_ns(vertex);
             let what = Some((vertex, job, taken_ns));
+            // Another instance or turn: counting begins anew at this look.
             if seen.what != what {
                 *seen = Seen { what, processor_ns };
             }

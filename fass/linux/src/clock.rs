@@ -124,6 +124,7 @@ fn renew(latest: Base, since: u64) -> u64 {
     let is_prompt = counter().wrapping_sub(ticks) < PROMPT;
     // No reading of the latest base was above this.
     let ns = system_ns.max(latest.after(FRESH));
+    // A slow system call blurs the instant of its reading, so no base is made of that.
     if is_prompt
         && has_counter()
         && let Ok(mut rate) = RATE.try_lock()

@@ -156,6 +156,7 @@ impl<T> Lock<T> {
                 }
                 std::hint::spin_loop();
             }
+            // Where threads poll, the holder wakes nobody.
             if self.polls {
                 thread::sleep(NAP);
                 continue;

@@ -7,8 +7,8 @@
 //! spare worker takes its place. Its thread, with everything on its stack, sleeps until the end of
 //! the program.
 //!
-//! Outside of instances, such a panic still ends the program, and so does any in a program that
-//! replaces the hook. After such a fault nobody can replace the hook: `set_hook` waits for the
+//! Outside of instances, such a panic still ends the program, and so does any panic in a program
+//! replacing the hook. After such a fault nobody can replace the hook: `set_hook` waits for the
 //! thread inside.
 
 use std::any::Any;

@@ -2,8 +2,8 @@
 //!
 //! A section's holder can be preempted. The holder then gets its core back when nothing else has
 //! the core, and gives the lock back. A thread whose instance is ended in a section may never do
-//! so, and is *given up*: nobody waits for the thread any more. Since it keeps the claim on the
-//! data until it returns, the next thread entering sees that the lock is lost.
+//! so, and is *given up*: nobody waits for the thread any more. Since the thread keeps its claim on
+//! the data until its function returns, the next thread entering sees that the lock is lost.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};

@@ -374,6 +374,7 @@ impl Team {
             // The worker keeps its core until it waits: nobody at its level preempts it.
             workers[me].bring(self.levels, Role::Run);
         }
+        // The release thread has ended this instance for its budget meanwhile.
         if state.abandoned.contains(&me) {
             return Err(Abandoned);
         }

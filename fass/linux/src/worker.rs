@@ -214,9 +214,9 @@ impl Worker {
         self.mode.store(RUNS, Ordering::Relaxed);
     }
 
-    /// Prepares the worker to take the lock after an instance has ended. Called by the worker
-    /// itself. Reports whether the worker has raised itself for the lock; then it has to lower
-    /// itself under the lock.
+    /// Prepares the worker for taking the lock after an instance has ended. Called by the worker
+    /// itself. Reports whether the worker has raised itself; then it has to lower itself under the
+    /// lock.
     pub(crate) fn report(&self, levels: Option<Levels>) -> bool {
         let was_demoted = self.mode.swap(REPORTS, Ordering::AcqRel) == DEMOTED;
         if was_demoted {

@@ -8,7 +8,7 @@ use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use super::{nearest_integer, polynomial, sqrt};
 
-/// A number to more digits than a double has: the nearest double, and what that leaves.
+/// A number with more digits than a double: the nearest double, and the remainder.
 type Long = (f64, f64);
 
 /// The arc tangents of the eighths from 0 to 1.

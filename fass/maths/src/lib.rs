@@ -50,7 +50,7 @@ fn polynomial(x: f64, coefficients: &[f64]) -> f64 {
     highest_first.fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
 
-// Elsewhere the standard library has it as an instruction, too.
+// On other targets the standard library uses an instruction for it, too.
 #[cfg(not(target_arch = "x86_64"))]
 mod root {
     extern crate std;

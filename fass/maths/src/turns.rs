@@ -1,16 +1,16 @@
 //! Sine, cosine and tangent.
 //!
-//! The argument is reduced by multiples of a quarter turn, held in three parts of which the first
-//! two have zeros at their ends, so that their multiples are exact (W. J. Cody and W. Waite,
+//! The argument is reduced by multiples of a quarter turn. The quarter is held in three parts; the
+//! first two have zeros at their ends, so their multiples are exact (W. J. Cody and W. Waite,
 //! Software Manual for the Elementary Functions, 1980). The remainder, at most an eighth of a turn,
-//! comes with the rest that it is rounded by. There nine terms of the Taylor series are enough.
+//! comes with its rounding error. There nine terms of the Taylor series are enough.
 
 use core::f64::consts::FRAC_2_PI;
 
 use super::{nearest_integer, polynomial};
 
-/// The largest angle, in radians, of which sine and cosine are known: 2^20 quarter turns are
-/// exact, and this is less.
+/// The largest angle, in radians, with known sine and cosine: 2^20 quarter turns are exact, and
+/// this is less.
 pub const LARGEST_ANGLE: f64 = 1e6;
 
 /// A quarter turn, in three parts.
@@ -58,8 +58,8 @@ pub fn sin_cos(angle: f64) -> (f64, f64) {
     }
 }
 
-/// Returns `a - b` and what rounding took from it (D. E. Knuth, The Art of Computer Programming
-/// 2, 4.2.2, theorem B).
+/// Returns `a - b` and its rounding error (D. E. Knuth, The Art of Computer Programming 2, 4.2.2,
+/// theorem B).
 fn difference(a: f64, b: f64) -> (f64, f64) {
     let high = a - b;
     let of_b = a - high;
@@ -100,6 +100,6 @@ fn cos_of_part(x: f64, rest: f64) -> f64 {
     let half = square / 2.0;
     let near = 1.0 - half;
     let tail = square * square * polynomial(square, &TERMS) - x * rest;
-    // With what rounding took from `near`.
+    // With the rounding error of `near`.
     near + (((1.0 - near) - half) + tail)
 }

@@ -55,8 +55,6 @@
 //! # Limits
 //!
 //! A checksum finds accidents, not intent: a person can forge a file with other contents.
-//!
-//! A checksum finds accidents, not intent: a person can make a file that says something else.
 
 #![no_std]
 #![forbid(unsafe_code)]

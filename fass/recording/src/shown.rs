@@ -1,8 +1,7 @@
 //! Walks through a value by its schema, without its type, and writes JSON, for people and programs.
 //!
 //! A struct becomes an object, anything else with parts an array. An option without a value, and a
-//! number that is infinite or NaN, becomes `null`, since JSON has no word for these. number that is
-//! infinite or none, is `null`, since JSON has no word for these.
+//! number that is infinite or NaN, becomes `null`, since JSON has no word for these.
 
 use alloc::string::String;
 use alloc::vec::Vec;

@@ -1,17 +1,18 @@
-//! Hops: where a value has come from that another machine has sent, and how its clock stands to ours.
+//! Hops: the origin of a value sent by another machine, and the offset of the other machine's
+//! clock.
 //!
-//! The delay of a link is *stated* by the app. Nothing proves it: it is measured, by the clocks of
-//! both machines, and counted where it is exceeded. The offset of the clocks follows from an
-//! exchange of two messages: it is known up to half of the time that both were on their way, so the
-//! fastest exchange says most.
+//! The app *states* the delay of a link. Nothing proves the stated delay: the node measures the
+//! real one, by the clocks of both machines, and counts each excess. The offset of the clocks
+//! follows from an exchange of two messages. The offset is known up to half of both messages'
+//! travel time, so the fastest exchange is the most precise.
 
 use core::time::Duration;
 
-/// How far two clocks may drift apart, in millionths: each crystal by 100.
+/// How far two clocks may drift apart, in millionths: 100 for each crystal.
 const DRIFT_PPM: u64 = 200;
 
 crate::message! {
-    /// Where a value has come from. It is the first field, named `hop`, of messages between machines.
+    /// The origin of a value. In messages between machines, this is the first field, named `hop`.
     ///
     /// ```
     /// use core::time::Duration;
@@ -24,19 +25,19 @@ crate::message! {
     #[derive(Eq)]
     pub struct Hop: "fass_msgs/msg/Hop",
         "1edd48ab78536fd2d5c9f0a2759ce5a279975e01cfd60a0e3ffb3c05d47d608d" {
-        /// The job that has sent it.
+        /// The sending job.
         pub job: u64,
-        /// When it was put, on the sender's clock.
+        /// The time of sending, on the sender's clock.
         pub sent_ns: u64,
-        /// When it was heard, on the receiver's clock: the receiving source says so.
+        /// The time of receipt, on the receiver's clock; set by the receiving source.
         pub received_ns: u64,
-        /// The delay that the app states for the link; the receiving source says so.
+        /// The delay stated by the app for the link; set by the receiving source.
         pub delay_ns: u64,
     }
 }
 
 impl Hop {
-    /// Begins a hop, in the job that sends.
+    /// Begins a hop, in the sending job.
     #[must_use]
     pub const fn sent(job: u64, sent_ns: u64) -> Self {
         Self {
@@ -47,7 +48,7 @@ impl Hop {
         }
     }
 
-    /// Ends it, in the source that receives.
+    /// Completes a hop, in the receiving source.
     #[must_use]
     pub fn heard(self, received_ns: u64, stated: Duration) -> Self {
         let delay_ns = u64::try_from(stated.as_nanos()).unwrap_or(u64::MAX);
@@ -60,7 +61,7 @@ impl Hop {
 }
 
 recording::recordable! {
-    /// How the clock of another machine stands to ours.
+    /// The offset of another machine's clock from ours.
     ///
     /// ```
     /// use core::time::Duration;
@@ -83,15 +84,15 @@ recording::recordable! {
         /// Hops that took longer than stated, by more than the uncertainty.
         pub exceeded: u64,
         offset_ns: i64,
-        /// Half of the time that the kept exchange was on its way, and when it ended.
+        /// Half of the kept exchange's travel time, and the end of that exchange.
         half_ns: u64,
         kept_ns: u64,
     }
 }
 
 impl ClockOffset {
-    /// Takes an exchange: a message of ours, and the answer to it. It is kept if it says more than
-    /// the kept one, whose uncertainty grows with the drift of the clocks.
+    /// Takes an exchange: a message of ours, and the answer. The exchange is kept if it is more
+    /// precise than the kept one, whose uncertainty grows with the drift of the clocks.
     pub fn exchange(&mut self, there: &Hop, back: &Hop) {
         let from_to = |from: u64, to: u64| i128::from(to) - i128::from(from);
         let whole_ns = from_to(there.sent_ns, back.received_ns);
@@ -118,14 +119,14 @@ impl ClockOffset {
         }
     }
 
-    /// Returns by how much the offset may be wrong, either way, at an instant of our clock.
+    /// Returns the possible error of the offset, in either direction, at an instant of our clock.
     #[must_use]
     pub const fn uncertainty_ns(&self, now_ns: u64) -> u64 {
         let drift_ns = now_ns.saturating_sub(self.kept_ns) / (1_000_000 / DRIFT_PPM);
         self.half_ns.saturating_add(drift_ns)
     }
 
-    /// Returns how long a message to us was on its way, by this offset.
+    /// Returns how long a message to us was on its way, according to this offset.
     #[must_use]
     pub fn delay_ns(&self, hop: &Hop) -> Option<i64> {
         let sent_ns = i128::from(hop.sent_ns) - i128::from(self.offset_ns()?);

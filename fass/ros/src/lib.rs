@@ -1,22 +1,22 @@
-//! A ROS 2 node: topics as wires of typed messages, which a Zenoh router carries.
+//! A ROS 2 node: topics as wires of typed messages, carried by a Zenoh router.
 //!
-//! For our purposes a *node* is what `ros2 node list` shows: a name with topics, behind one session
-//! with a router, as `rmw_zenoh` has it. A *message* is a [`recordable!`](recording::recordable!)
-//! struct with the name and the hash that ROS 2 has for its type: the same value goes to a recording
-//! and over the wire. A [`Publication`] and a [`Subscription`] are each a
-//! [wire](fass::shared::Wire), and so DAGs use them, and tests feed them, as any wire.
+//! For our purposes a *node* is an entry of `ros2 node list`: a name with topics, behind one
+//! session with a router, as in `rmw_zenoh`. A *message* is a
+//! [`recordable!`](recording::recordable!) struct with the name and the hash of its ROS 2 type: the
+//! same value goes into a recording and over the wire. A [`Publication`] and a [`Subscription`] are
+//! each a [wire](fass::shared::Wire), so DAGs use them, and tests feed them, like any wire.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - Nothing is allocated after the commit: messages have their bytes in themselves.
-//! - No length in a datagram is believed. A payload that is no value of the type is malformed, and
+//! - Nothing is allocated after the commit: messages store their bytes inline.
+//! - No length in a datagram is trusted. A payload that does not fit the type is malformed, and
 //!   counted; a text or list longer than its place is never cut.
-//! - What is published while there is no session is lost, and counted as unsent.
+//! - Messages published without a session are lost, and counted as unsent.
 //!
-//! # What is not
+//! # Limits
 //!
-//! UDP loses datagrams, and nothing sends them again, whatever quality of service a topic has. Plain
-//! Zenoh has no authenticity: whoever can send from the router's address commands the robot.
+//! UDP loses datagrams, and nothing sends them again, whatever the topic's quality of service.
+//! Plain Zenoh has no authenticity: whoever can send from the router's address commands the robot.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

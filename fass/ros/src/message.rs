@@ -1,21 +1,22 @@
-//! Messages: what makes a struct one, and its bytes on a wire.
+//! Messages: the requirements on a message's struct, and its bytes on a wire.
 
 use recording::{Decoder, Encoder, Recordable};
 
-/// The representation of what follows: CDR, little-endian; and options.
+/// The representation of the body, CDR in little-endian order, and its options.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// A type of messages. [`message!`](crate::message!) makes one. It is `Copy`, and so has nothing in
-/// the heap: [`Text`](crate::Text) and [`List`](crate::List) stand for text and sequences.
+/// A type of messages, defined by [`message!`](crate::message!). The type is `Copy`, and so has
+/// nothing on the heap: [`Text`](crate::Text) and [`List`](crate::List) replace text and sequences.
 pub trait Message: Recordable + Copy + Send + Sync + 'static {
     /// The name of the type, such as `geometry_msgs/msg/Twist`.
     const NAME: &'static str;
 
-    /// Its hash by REP 2011, without `RIHS01_`: 64 digits. With a wrong one nobody hears of the other.
+    /// The type's hash by REP 2011, without `RIHS01_`: 64 digits. With a wrong hash neither side
+    /// hears of the other.
     const HASH: &'static str;
 }
 
-/// Defines types of messages, each with the name and the hash that ROS 2 has for it.
+/// Defines types of messages, each with the name and the hash of its ROS 2 type.
 ///
 /// ```
 /// ros::message! {
@@ -34,7 +35,7 @@ pub trait Message: Recordable + Copy + Send + Sync + 'static {
 /// assert_eq!(ros::from_cdr(&bytes[..length]), Some(tank));
 /// ```
 ///
-/// A field that ROS 2 cannot have is an error of the compiler:
+/// A field type unknown to ROS 2 is a compiler error:
 ///
 /// ```compile_fail,E0080
 /// ros::message! {
@@ -63,8 +64,8 @@ macro_rules! message {
     )*};
 }
 
-/// Writes a message as it is on a wire, and returns how many bytes it has. If these are more than
-/// `place` has, what is in it is of no use.
+/// Writes a message in its wire format, and returns its length in bytes. If the length exceeds that
+/// of `place`, the contents of `place` are of no use.
 pub fn to_cdr<T: Message>(message: &T, place: &mut [u8]) -> usize {
     let (header, body) = match place.split_first_chunk_mut() {
         Some((header, body)) => (header, body),
@@ -77,10 +78,11 @@ pub fn to_cdr<T: Message>(message: &T, place: &mut [u8]) -> usize {
     length.saturating_add(LITTLE_ENDIAN.len())
 }
 
-/// Reads a message; `None` if the bytes are none of its type, or in big-endian representation.
+/// Reads a message; `None` if the bytes do not fit its type, or are in big-endian representation.
 #[must_use]
 pub fn from_cdr<T: Message>(bytes: &[u8]) -> Option<T> {
-    // Behind the representation are options: some say how many bytes of padding end the message.
+    // Options follow the representation: some give the number of padding bytes at the message's
+    // end.
     let ([0, 1, _, _], body) = bytes.split_first_chunk()? else {
         return None;
     };
@@ -89,8 +91,8 @@ pub fn from_cdr<T: Message>(bytes: &[u8]) -> Option<T> {
     (input.remaining() < 4).then_some(message)
 }
 
-/// Returns a length that no message of the type exceeds: each byte of memory at most doubles, where a
-/// byte stands before a number of 8.
+/// Returns a length that no message of the type exceeds: each byte of memory at most doubles, where
+/// a byte precedes a number of 8 bytes.
 pub(crate) const fn most_bytes<T: Message>() -> usize {
     LITTLE_ENDIAN.len() + 2 * size_of::<T>() + 8
 }

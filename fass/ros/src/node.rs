@@ -1,4 +1,4 @@
-//! A node: its topics, and how their packets and the datagrams of one router become each other.
+//! A node: its topics, and the conversion between their packets and the datagrams of one router.
 
 use alloc::format;
 use alloc::string::String;
@@ -16,18 +16,18 @@ use super::message::{Message, from_cdr, most_bytes, to_cdr};
 use super::options::NodeOptions;
 use super::rmw::{absolute, is_name, token, type_in_keys};
 
-/// The most topics of a node: those that have got a packet are told as bits.
+/// The most topics of a node: one bit each marks the topics that have got a packet.
 const MOST_TOPICS: usize = 64;
 
-/// The number of the first topic in tokens; that of the node is 0.
+/// The number of the first topic in tokens; the node's number is 0.
 const FIRST_TOPIC: usize = 10;
 
-/// The default of `rmw_zenoh`, which is left out: reliable, of the last 42. Datagrams are sent once,
-/// whatever it is.
+/// The default quality of service of `rmw_zenoh`, written as empty fields: reliable, the last 42
+/// messages. Datagrams are sent only once, whatever the quality of service.
 const RELIABLE: &str = "::,:,:,:,,";
 
-/// A node of ROS 2. A platform joins it to a router; in virtual time a test has the other ends of its
-/// wires.
+/// A node of ROS 2. A platform connects the node to a router; in virtual time a test has the other
+/// ends of its wires.
 ///
 /// ```
 /// use ros::geometry_msgs::Twist;
@@ -43,14 +43,14 @@ pub struct Node {
     name: String,
     pub(crate) options: NodeOptions,
     pub(crate) session: Session,
-    /// The counts when people were last told.
+    /// The counts at the latest report to people.
     pub(crate) told: SessionCounts,
     pub(crate) topics: Vec<Topic>,
-    /// The session's declarations: keys to subscribe to, and tokens.
+    /// The session's declarations: keys for subscriptions, and tokens.
     pub(crate) declared: Vec<(bool, String)>,
     pub(crate) up_since: Parameter<u64>,
     pub(crate) clock: WallClock,
-    /// The datagram to go next, if not empty, and the topic whose turn is next.
+    /// The next datagram, if not empty, and the topic whose turn is next.
     pub(crate) out: Buffer,
     pub(crate) most_bytes: usize,
     pub(crate) turn: usize,
@@ -61,30 +61,30 @@ pub struct Node {
 #[derive(Debug)]
 pub(crate) struct Topic {
     pub(crate) wire: Wire,
-    /// Once the node has begun.
+    /// The device's end of the wire, once the node has begun.
     pub(crate) end: Option<Arc<DeviceEnd>>,
     pub(crate) key: String,
-    /// Of a publication, not a subscription.
+    /// Whether this is a publication, not a subscription.
     pub(crate) publishes: bool,
-    /// The messages so far, and the bytes that tell the publication from all others.
+    /// The messages so far, and the bytes identifying the publication.
     pub(crate) number: u64,
     pub(crate) gid: u128,
 }
 
-/// A topic that the node publishes.
+/// A topic published by the node.
 ///
 /// See [`Node`].
 #[derive(Debug)]
 pub struct Publication<T>(Wire, PhantomData<fn(T)>);
 
-/// A topic that the node subscribes to.
+/// A topic to which the node subscribes.
 ///
 /// See [`Node`].
 #[derive(Debug)]
 pub struct Subscription<T>(Wire, PhantomData<fn() -> T>);
 
 impl<T: Message> Publication<T> {
-    /// Returns the use of the subtask that publishes: its handle is a [`Publisher`](crate::Publisher).
+    /// Returns the use for the publishing subtask. Its handle is a [`Publisher`](crate::Publisher).
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn publishing(&self) -> SendValuesUse<T> {
@@ -98,7 +98,8 @@ impl<T: Message> Publication<T> {
 }
 
 impl<T: Message> Subscription<T> {
-    /// Returns the use of the source that receives. What is no message is malformed, and counted.
+    /// Returns the use for the receiving source. Packets that are not messages are malformed, and
+    /// counted.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn receiving(&self) -> ReceiveUse<T> {
@@ -116,8 +117,8 @@ impl Node {
     ///
     /// # Panics
     ///
-    /// If ROS 2 does not allow the name, the namespace or the domain, there is no identity, or the
-    /// lease is so short that no router can answer in time.
+    /// If ROS 2 does not allow the name, the namespace or the domain, the identity is missing, or
+    /// the lease is too short for any router to answer in time.
     #[must_use]
     #[track_caller]
     pub fn new(name: &str, options: NodeOptions) -> Self {
@@ -149,7 +150,7 @@ impl Node {
         }
     }
 
-    /// Publishes a topic, with a name that is absolute (`/imu`) or in the node's namespace.
+    /// Publishes a topic. The name is absolute (`/imu`) or in the node's namespace.
     ///
     /// # Panics
     ///
@@ -159,7 +160,7 @@ impl Node {
         Publication(self.add::<T>(topic, "MP", RELIABLE), PhantomData)
     }
 
-    /// Publishes a topic that shows the quality of service of sensors: best effort, of the last 5.
+    /// Publishes a topic with the quality of service of sensors: best effort, the last 5 messages.
     ///
     /// # Panics
     ///
@@ -169,28 +170,30 @@ impl Node {
         Publication(self.add::<T>(topic, "MP", "2::,5:,:,:,,"), PhantomData)
     }
 
-    /// Subscribes to a topic, with a name that is absolute (`/cmd_vel`) or in the node's namespace.
+    /// Subscribes to a topic. The name is absolute (`/cmd_vel`) or in the node's namespace.
     ///
     /// # Panics
     ///
-    /// If ROS 2 does not allow the name, the node subscribes to it already, or has 64 topics.
+    /// If ROS 2 does not allow the name, the node subscribes to the topic already, or has 64
+    /// topics.
     #[track_caller]
     pub fn subscribe<T: Message>(&mut self, topic: &str) -> Subscription<T> {
         Subscription(self.add::<T>(topic, "MS", RELIABLE), PhantomData)
     }
 
-    /// Returns since when there is a session with a router, in nanoseconds on the clock of
-    /// [`fass::now_ns`], or 0, if there is none. DAGs read it as any parameter.
+    /// Returns the time since which there is a session with a router, in nanoseconds on the clock
+    /// of [`fass::now_ns`]; 0 without a session. DAGs read the time like any parameter.
     pub const fn up_since(&self) -> &Parameter<u64> {
         &self.up_since
     }
 
-    /// Returns the node's clock, which the stamps of messages correct: of the router, or of a sender's.
+    /// Returns the node's clock. Stamps in messages of the router, or of a sender, correct the
+    /// clock.
     pub const fn clock(&self) -> &WallClock {
         &self.clock
     }
 
-    /// Returns the wires of its topics, in the order in which these were made.
+    /// Returns the wires of the node's topics, in the order of their creation.
     pub fn wires(&self) -> impl Iterator<Item = &Wire> {
         self.topics.iter().map(|topic| &topic.wire)
     }
@@ -231,7 +234,7 @@ impl Node {
             key,
             publishes,
             number: 0,
-            // Any will do.
+            // Any identifier will do, if it is unique.
             gid: self.options.identity ^ (id as u128) << 120,
         });
         wire

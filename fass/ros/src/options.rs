@@ -10,13 +10,13 @@ use zenoh::{Session, SessionOptions};
 /// See [`Node`](crate::Node).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeOptions {
-    /// The start of relative names of topics, empty or such as `/robot`.
+    /// The prefix of relative names of topics, empty or such as `/robot`.
     pub namespace: String,
-    /// The domain, 0 to 232: nodes of others are not heard.
+    /// The domain, 0 to 232: nodes of other domains are not heard.
     pub domain: u32,
-    /// Tells the node's session from all others; not 0, and to be given.
+    /// Distinguishes the node's session from all others; not 0, and to be given.
     pub identity: u128,
-    /// After so long without a datagram the router takes the node for gone.
+    /// After so long without a datagram the router considers the node gone.
     pub lease: Duration,
 }
 

@@ -1,4 +1,4 @@
-//! The forms of `rmw_zenoh` on a wire: names that ROS 2 allows, and keys, tokens and attachments.
+//! The formats of `rmw_zenoh` on a wire: names allowed by ROS 2, and keys, tokens and attachments.
 
 use alloc::format;
 use alloc::string::String;
@@ -21,7 +21,7 @@ pub fn is_name(name: &str) -> bool {
             && part.chars().all(is_letter)
     };
     let parts = name.strip_prefix('/').unwrap_or(name);
-    // The longest name that a participant over there has room for.
+    // The longest name for which other participants have room.
     parts.len() < 247 && !name.contains("__") && parts.split('/').all(is_part)
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn absolute(namespace: &str, name: &str) -> String {
     }
 }
 
-/// Returns the type and the hash of a topic as they are in keys.
+/// Returns the type and the hash of a topic in the form used in keys.
 pub(crate) fn type_in_keys(name: &str, hash: &str) -> String {
     let (package, name) = name.rsplit_once('/').unwrap_or_default();
     format!(
@@ -44,15 +44,15 @@ pub(crate) fn type_in_keys(name: &str, hash: &str) -> String {
     )
 }
 
-/// Returns a token: of a node, or of its topic by `rest`. `id` counts both.
+/// Returns the token of a node, or of its topic given by `rest`. `id` numbers both.
 pub(crate) fn token(of: &NodeOptions, node: &str, kind: &str, id: usize, rest: &str) -> String {
     let (domain, identity) = (of.domain, of.identity);
     let namespace = of.namespace.trim_matches('/').replace('/', "%");
     format!("@ros2_lv/{domain}/{identity:x}/0/{id}/{kind}/%/%{namespace}/{node}{rest}")
 }
 
-/// Returns the attachment of a message: its number, its Unix time and its publication, each bare. Other
-/// bytes end the process of a subscriber.
+/// Returns the attachment of a message: its number, its Unix time and its publication, each bare.
+/// Other bytes end the process of a subscriber.
 pub(crate) fn attachment(number: u64, unix_ns: u64, publication: u128) -> [u8; 33] {
     let mut bytes = [16; 33]; // how many bytes the publication has
     bytes[..8].copy_from_slice(&number.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The node as a [`Protocol`]: puts of the router's become packets of wires, and these become puts.
+//! The node as a [`Protocol`]: the router's puts become packets of wires, and packets become puts.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -13,18 +13,18 @@ use zenoh::{Declaration, MOST_BYTES, SessionCounts};
 use super::node::{Node, Topic};
 use super::rmw::attachment;
 
-/// The most bytes of a datagram besides key and value: a frame with its number, a put, the lengths of
-/// three, and the attachment.
+/// The most bytes of a datagram besides key and value: a frame with its number, a put, three
+/// lengths, and the attachment.
 const AROUND_BYTES: usize = 48;
 
-/// How many packets without a session are lost at once, so that it does not take long.
+/// How many packets without a session are lost at once, to bound the time.
 const MOST_LOST: u32 = 4;
 
-/// The most that a message's stamp moves the clock.
+/// The most by which a message's stamp moves the clock.
 const STEP: Duration = Duration::from_millis(1);
 
 impl Node {
-    /// Tells the DAGs if the session has come up, or is lost.
+    /// Tells the DAGs that the session has come up, or is lost.
     fn tell_session(&mut self) {
         let since_ns = self
             .session
@@ -64,7 +64,7 @@ impl Node {
             let Some(place) = places.find(is_waiting) else {
                 break;
             };
-            // Behind one that is lost, the same topic's next: to search takes longest.
+            // Behind a lost packet, the same topic's next packet: searching takes longest.
             self.turn = place;
             let topic = &mut self.topics[place];
             let unix_ns = self.clock.at(now_ns).unwrap_or(0);
@@ -135,7 +135,7 @@ impl Protocol for Node {
     }
 
     fn send(&mut self, now_ns: u64, send: &mut dyn FnMut(&mut Buffer) -> bool) -> bool {
-        // One that has not gone is still there.
+        // A datagram that has not gone is still there.
         let is_there = !self.out.content().is_empty() || self.fill(now_ns);
         self.tell_session();
         let has_gone = is_there && send(&mut self.out);

@@ -1,7 +1,7 @@
-//! The types of messages that come with the crate, named and documented as in ROS 2. Hashes are those
-//! of its release Jazzy, by the package `rosbags`.
+//! The types of messages included in the crate, named and documented as in ROS 2. Hashes are those
+//! of the ROS 2 release Jazzy, from the package `rosbags`.
 //!
-//! Text and sequences have a stated length at most; what is longer is malformed.
+//! Text and sequences have a maximum length; longer ones are malformed.
 
 /// Defines types of a package, each with its hash.
 macro_rules! package {
@@ -28,7 +28,7 @@ pub mod builtin_interfaces {
     }
 
     impl From<u64> for Time {
-        /// Makes it of nanoseconds since 1970, up to 2038.
+        /// Converts nanoseconds since 1970, up to 2038.
         fn from(unix_ns: u64) -> Self {
             let sec = i32::try_from(unix_ns / 1_000_000_000).unwrap_or(i32::MAX);
             let nanosec = (unix_ns % 1_000_000_000) as u32;
@@ -48,7 +48,7 @@ pub mod std_msgs {
         Bool "feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9"
         { data: bool }
 
-        /// Nothing. A struct without fields has a byte in ROS 2.
+        /// Nothing. In ROS 2 a struct without fields has a byte.
         Empty "20b625256f32d5dbc0d04fee44f43c41e51c70d3502f84b4a08e7a9c26a96312"
         { structure_needs_at_least_one_member: u8 }
 
@@ -56,7 +56,7 @@ pub mod std_msgs {
         Float64 "705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a"
         { data: f64 }
 
-        /// When and in which frame something was measured.
+        /// The time and the frame of a measurement.
         Header "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01"
         { stamp: Time, frame_id: Text<64> }
 
@@ -84,7 +84,7 @@ pub mod geometry_msgs {
         Point "6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881"
         { x: f64, y: f64, z: f64 }
 
-        /// A rotation. That of no angle has `w` 1.
+        /// A rotation. Without rotation, `w` is 1.
         Quaternion "8a765f66778c8ff7c8ab94afcc590a2ed5325a1d9a076ffff38fbce36f458684"
         { x: f64, y: f64, z: f64, w: f64 }
 
@@ -92,11 +92,11 @@ pub mod geometry_msgs {
         Pose "d501954e9476cea2996984e812054b68026ae0bfae789d9a10b23daf35cc90fa"
         { position: Point, orientation: Quaternion }
 
-        /// A pose, when and where.
+        /// A pose with its time and frame.
         PoseStamped "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8"
         { header: Header, pose: Pose }
 
-        /// A pose that is known in part.
+        /// A partly known pose.
         PoseWithCovariance "9a7c0fd234b7f45c6098745ecccd773ca1085670e64107135397aee31c02e1bb"
         { pose: Pose, covariance: [[f64; 6]; 6] }
 
@@ -104,7 +104,7 @@ pub mod geometry_msgs {
         Twist "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"
         { linear: Vector3, angular: Vector3 }
 
-        /// A velocity that is known in part.
+        /// A partly known velocity.
         TwistWithCovariance "49f574f033f095d8b6cd1beaca5ca7925e296e84af1716d16c89d38b059c8c18"
         { twist: Twist, covariance: [[f64; 6]; 6] }
     }
@@ -154,7 +154,7 @@ pub mod nav_msgs {
     use crate::Text;
 
     package! { nav_msgs:
-        /// Where a robot takes itself to be, and how fast it moves.
+        /// A robot's own estimate of its pose and velocity.
         Odometry "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0" {
             header: Header, child_frame_id: Text<64>,
             pose: PoseWithCovariance, twist: TwistWithCovariance

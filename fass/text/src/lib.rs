@@ -2,8 +2,8 @@
 //!
 //! - [`Lines`]: words and numbers of a file, with line numbers;
 //! - [`quoted`], [`visible`]: words of a file, or of a person, in messages;
-//! - [`of_file`]: what a commit would refuse, in the words of a file;
-//! - [`repeated`]: what stands twice.
+//! - [`of_file`]: faults a commit would refuse, in the words of a file;
+//! - [`repeated`]: items that appear twice.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

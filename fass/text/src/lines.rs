@@ -1,13 +1,12 @@
-//! Reading reference files line by line: words, numbers, and where they are.
+//! Reads reference files line by line: words, numbers, and their places.
 //!
-//! Reference files are records of blank-separated words, one record a line;
-//! blank lines count but say nothing. Everything unexpected is a
-//! [`Malformed`] with the number of its line, so that a broken file is never
-//! taken for a failing implementation.
+//! Reference files are records of blank-separated words, one record a line; blank lines count but
+//! have no meaning. Everything unexpected is a [`Malformed`] with its line number, so a broken file
+//! is never taken for a failing implementation.
 //!
-//! Faults of DAGs that a file describes are told in the words of the file, too:
-//! the commit speaks to an app's author, of attributes and registrations. A person with
-//! a file has keys and records, and is not told what follows from something else.
+//! Faults of DAGs from a file are reported in the words of the file, too. The commit speaks to an
+//! app's author, of attributes and registrations. A person with a file has keys and records, and
+//! does not see faults that only follow from others.
 
 use alloc::collections::BTreeMap;
 use alloc::format;
@@ -21,7 +20,7 @@ use sched_dag::{DagFault, RejectedDags, sorted_by_key};
 
 use crate::shown::{is_seen, quoted};
 
-/// The most cores that a machine has here.
+/// The most cores of a machine.
 pub const MOST_CORES: u32 = 64;
 
 /// A fault of a reference file, with its line, counted from 1.
@@ -60,7 +59,7 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Returns the next record, or `None` at the end of the file. A line that begins with `#` is a
+    /// Returns the next record, or `None` at the end of the file. A line beginning with `#` is a
     /// remark.
     pub fn next_line(&mut self) -> Option<Line<'a>> {
         for (index, text) in self.rest.by_ref() {
@@ -77,7 +76,8 @@ impl<'a> Lines<'a> {
         None
     }
 
-    /// Returns the next record if it is of this kind; else it stays the next one.
+    /// Returns the next record if it is of this kind; otherwise leaves the record for the next
+    /// call.
     pub fn next_if(&mut self, kind: &str) -> Option<Line<'a>> {
         let mut ahead = self.clone();
         let line = ahead.next_line().filter(|line| line.kind == kind)?;
@@ -85,11 +85,11 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// Reads so many `edge` records, between vertices of which there are so many.
+    /// Reads `count` `edge` records, between `vertices` vertices.
     ///
     /// # Errors
     ///
-    /// [`Malformed`] for another record, or an end that is none.
+    /// [`Malformed`] for another record, or for an edge to a missing vertex.
     pub fn edges(&mut self, count: u32, vertices: usize) -> Result<Vec<(usize, usize)>, Malformed> {
         let mut edges = Vec::new();
         for _ in 0..count {
@@ -105,7 +105,7 @@ impl<'a> Lines<'a> {
     ///
     /// # Errors
     ///
-    /// [`Malformed`] if it is of another kind, or there is none.
+    /// [`Malformed`] if the record is of another kind, or if there is none.
     pub fn expect(&mut self, kind: &str) -> Result<Line<'a>, Malformed> {
         match self.next_line() {
             Some(line) if line.kind == kind => Ok(line),
@@ -126,12 +126,12 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Reads a file of records that each begin a case; `read` reads one from there on.
+/// Reads a file of cases, each begun by one record; `read` reads a case from its first record on.
 ///
 /// # Errors
 ///
-/// [`Malformed`] for another record, for what `read` finds, for a name that stands twice,
-/// and for a file without a case.
+/// [`Malformed`] for another record, for errors of `read`, for a repeated name, and for a file
+/// without a case.
 pub fn cases<'a, Case>(
     text: &'a str,
     read: impl Fn(&Line<'a>, &mut Lines<'a>) -> Result<Case, Malformed>,
@@ -203,7 +203,7 @@ impl Line<'_> {
         }
     }
 
-    /// Returns the words, of which there must be as many as the caller takes.
+    /// Returns the words. Their number must be the caller's `N`.
     ///
     /// # Errors
     ///
@@ -217,7 +217,7 @@ impl Line<'_> {
     ///
     /// # Errors
     ///
-    /// [`Malformed`] if the word is no number or too large a one.
+    /// [`Malformed`] if the word is not a number, or the number is too large.
     pub fn number<T: FromStr<Err = core::num::ParseIntError>>(
         &self,
         word: &str,
@@ -248,11 +248,11 @@ impl Line<'_> {
         }
     }
 
-    /// Reads how many there are of something, of which there must be one.
+    /// Reads a count of items that must not be 0.
     ///
     /// # Errors
     ///
-    /// As [`number`](Self::number), and if it is 0.
+    /// As [`number`](Self::number), and if the count is 0.
     pub fn at_least_one(&self, word: &str) -> Result<u32, Malformed> {
         match self.number(word)? {
             0 => Err(self.malformed(format!("`{}` needs at least 1 here, found 0", self.kind))),
@@ -260,18 +260,18 @@ impl Line<'_> {
         }
     }
 
-    /// Reads the number of one of `count` things, which are called so.
+    /// Reads the number of one of `count` items, called `what` in messages.
     ///
     /// # Errors
     ///
-    /// As [`number`](Self::number), and if there is no such thing.
+    /// As [`number`](Self::number), and if there is no such item.
     pub fn index(&self, what: &str, word: &str, count: usize) -> Result<usize, Malformed> {
         let number: u64 = self.number(word)?;
         let index = usize::try_from(number).ok().filter(|index| *index < count);
         index.ok_or_else(|| self.malformed(format!("there is no {what} {number}")))
     }
 
-    /// Reads whether something is so.
+    /// Reads a flag.
     ///
     /// # Errors
     ///
@@ -306,8 +306,8 @@ impl fmt::Display for Malformed {
 
 impl core::error::Error for Malformed {}
 
-/// Returns the first of the items that equals one before it: the positions of that one
-/// and of itself.
+/// Returns the positions of the first item equal to an earlier one, and of that earlier item: the
+/// earlier position first.
 pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, usize)> {
     let items: Vec<T> = items.into_iter().collect();
     let order = sorted_by_key(items.len(), |position| &items[position]);
@@ -316,7 +316,7 @@ pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, us
     equal.min_by_key(|&(_, second)| second)
 }
 
-/// Returns the faults that a person can mend, and what to say of each.
+/// Returns the faults a person can mend, each with its message.
 pub fn of_file(rejected: &RejectedDags) -> impl Iterator<Item = (&DagFault, String)> {
     let faults = rejected.faults();
     let is_cycle =

@@ -1,16 +1,15 @@
-//! Words of a person or of a file, as messages show them.
+//! Words of a person or of a file, in the form shown by messages.
 //!
-//! A message repeats what is wrong, and that may be anything: megabytes without a
-//! blank, an escape sequence that rewrites the terminal, a byte-order mark that no one
-//! can see. So a message shows the beginning only, and whatever cannot be seen by its
-//! number in Unicode.
+//! A message repeats the faulty word, and the word may be anything: megabytes without a blank, an
+//! escape sequence rewriting the terminal, an invisible byte-order mark. So a message shows only
+//! the word's beginning, and replaces each invisible character by its number in Unicode.
 
 use core::fmt::{self, Write};
 
-/// The most characters of a word that a message shows.
+/// The most characters of a word shown in a message.
 const MOST_SHOWN: usize = 40;
 
-/// Returns a word between backquotes, visibly: its beginning, if it is long.
+/// Returns a word between backquotes, visibly; of a long word only the beginning.
 pub fn quoted(word: &str) -> impl fmt::Display {
     fmt::from_fn(move |out| write!(out, "`{}`", shown(word)))
 }
@@ -23,8 +22,8 @@ pub fn shown(word: &str) -> impl fmt::Display {
     })
 }
 
-/// Returns all of a text, with each character that cannot be seen, or that changes how
-/// others are, as an escape of Rust's: `\n`, `\u{1b}`, `\u{feff}`.
+/// Returns all of a text, with Rust escapes (`\n`, `\u{1b}`, `\u{feff}`) for each character that is
+/// invisible, or changes the look of others.
 pub fn visible(text: &str) -> impl fmt::Display {
     fmt::from_fn(move |out| {
         text.chars().try_for_each(|character| match character {
@@ -35,8 +34,8 @@ pub fn visible(text: &str) -> impl fmt::Display {
     })
 }
 
-/// Reports whether a character is seen as itself: it is no control character, and none
-/// of those that Unicode calls default-ignorable, or by which text changes direction.
+/// Reports whether a character is seen as itself: not a control character, not default-ignorable in
+/// Unicode, and not changing the direction of text.
 pub fn is_seen(character: char) -> bool {
     let is_hidden = matches!(
         character,

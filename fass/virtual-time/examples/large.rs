@@ -9,7 +9,6 @@
 //! A busy host takes its processor away from each of the large chains, and from hardly any of the
 //! small ones; so on such a host large chains seem to cost more.
 //! `cargo run --release -p virtual-time --example large 1000` measures a single size.
-//! `cargo run --release -p virtual-time --example large 1000` one size is measured alone.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

@@ -423,6 +423,7 @@ impl Workload<SubtaskRunner> for Calls {
     fn execute(&mut self, runner: &mut SubtaskRunner, now_ns: u64) -> Option<u64> {
         let (machine, instance) = (Rc::clone(&self.machine), runner.instance);
         let passes_over = |replay: &mut Replay| replay.passes_over(instance);
+        // The recording has no inputs for this instance, or its cut: the function must not run.
         if machine.edge.of_replay(passes_over) {
             runner.body.pass_over(instance.job);
             return Some(0);

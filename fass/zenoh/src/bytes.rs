@@ -1,25 +1,26 @@
-//! Zenoh's bytes: numbers of variable length, bytes counted by them, and extensions.
+//! Zenoh's bytes: numbers of variable length, bytes preceded by their count, and extensions.
 //!
-//! A number's byte has seven bits and says whether another follows. The ninth has eight, and none
-//! follows: so nine bytes hold 64 bits, as the time stamps of 2038 and later need.
+//! Each byte of a number has seven bits of the number, and a bit for a following byte. The ninth
+//! byte has eight bits, and is always the last: so nine bytes hold 64 bits, as time stamps of 2038
+//! and later need.
 
 /// Why a datagram is not read to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
-    /// It breaks the protocol's rules, or ends too early.
+    /// The datagram breaks the protocol's rules, or ends too early.
     Malformed,
-    /// It has something that is not known here, so what follows cannot be told, or more messages or
+    /// The datagram has an unknown part, so the rest cannot be interpreted, or has more messages or
     /// extensions than are read.
     Foreign,
-    /// It comes twice, or too late.
+    /// The datagram comes twice, or too late.
     Repeated,
 }
 
-/// The most messages, and the most extensions, that are read of a datagram, so that none takes long.
+/// The most messages, and the most extensions, read from a datagram, to bound the time for each.
 const MOST_MESSAGES: u32 = 16;
 const MOST_EXTENSIONS: u32 = 32;
 
-/// Bytes to be read, and how many messages and extensions of them may be.
+/// Bytes to be read, and the most messages and extensions that may follow.
 pub(crate) struct Reader<'b>(&'b [u8], u32, u32);
 
 impl<'b> Reader<'b> {
@@ -27,12 +28,12 @@ impl<'b> Reader<'b> {
         Self(bytes, MOST_MESSAGES, MOST_EXTENSIONS)
     }
 
-    /// Reads one message at most, as fragments have.
+    /// Reads one message at most, for fragments.
     pub(crate) const fn of_one(bytes: &'b [u8]) -> Self {
         Self(bytes, 1, MOST_EXTENSIONS)
     }
 
-    /// Returns what has not been read.
+    /// Returns the bytes not read yet.
     pub(crate) const fn rest(&self) -> &'b [u8] {
         self.0
     }
@@ -43,7 +44,7 @@ impl<'b> Reader<'b> {
         self.byte()
     }
 
-    /// Reads all that is left.
+    /// Reads all remaining bytes.
     pub(crate) fn take_rest(&mut self) -> &'b [u8] {
         core::mem::take(&mut self.0)
     }
@@ -79,9 +80,8 @@ impl<'b> Reader<'b> {
         self.bytes(length)
     }
 
-    /// Reads the extensions behind a message with this header, if there are some. Hands over each
-    /// with its bytes, if it is one of bytes. One that must be understood has to be in `known`, a
-    /// bit for each.
+    /// Reads the extensions behind a message with this header, if any. Hands over each extension
+    /// consisting of bytes. `known` must have the bit of each extension that must be understood.
     pub(crate) fn extensions(
         &mut self,
         header: u8,
@@ -109,7 +109,8 @@ impl<'b> Reader<'b> {
     }
 }
 
-/// Room for bytes, and how many have been written. What has no room is left out, and then all is.
+/// Room for bytes, and the number written. If some bytes do not fit, neither they nor any later
+/// bytes are written.
 pub(crate) struct Writer<'b>(&'b mut [u8], Option<usize>);
 
 impl<'b> Writer<'b> {

@@ -1,24 +1,24 @@
-//! Fragments of a message that is too long for a datagram, put together again.
+//! Reassembles the fragments of messages too long for a datagram.
 //!
-//! There is one buffer: the message that began last has it. A message is whole only if the numbers
-//! of its fragments are without gap, and one that is longer than the buffer is dropped.
+//! There is one buffer, for the message that began last. A message is whole only if there is no gap
+//! between the numbers of its fragments. A message longer than the buffer is dropped.
 
-/// The most bytes of a message that came in fragments.
+/// The most bytes of a reassembled message.
 pub const MOST_FRAGMENTED: usize = 8 * 1024;
 
-/// A fragment, as its header says.
+/// A fragment, with the facts from its header.
 pub(crate) struct Fragment<'b> {
     pub(crate) is_reliable: bool,
     pub(crate) is_first: bool,
     pub(crate) has_more: bool,
-    /// Whether nothing is missing between it and the frame or fragment before it.
+    /// Whether nothing is missing between the fragment and the frame or fragment before.
     pub(crate) is_next: bool,
     pub(crate) bytes: &'b [u8],
 }
 
 pub(crate) struct Fragments {
     bytes: [u8; MOST_FRAGMENTED],
-    /// Of what is there so far: whether it is of the reliable channel, and its length.
+    /// The channel of the present fragments (true if reliable), and their length so far.
     begun: Option<(bool, usize)>,
 }
 
@@ -28,13 +28,14 @@ impl Fragments {
         Self { bytes, begun: None }
     }
 
-    /// Drops what is there so far.
+    /// Drops the fragments so far.
     pub(crate) const fn clear(&mut self) {
         self.begun = None;
     }
 
-    /// Adds a fragment, and returns the message that it ends, if it ends one. `dropped` counts
-    /// fragments of a message that does not become whole, each with what was there of it.
+    /// Adds a fragment, and returns the message if the fragment completes one. `dropped` counts
+    /// fragments of messages that never become whole, each fragment together with any earlier
+    /// fragments of the same message.
     pub(crate) fn add(&mut self, fragment: &Fragment<'_>, dropped: &mut u64) -> Option<&[u8]> {
         let begun = self.begun.take();
         let length = match begun {
@@ -45,7 +46,8 @@ impl Fragments {
             Some((is_reliable, length)) if is_reliable == fragment.is_reliable => {
                 fragment.is_next.then_some(length)
             }
-            // One of the other channel, which has lost its place, does not disturb.
+            // A fragment of the other channel, whose place in the buffer is lost, does not disturb
+            // this message.
             _ => {
                 self.begun = begun;
                 None

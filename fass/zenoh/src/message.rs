@@ -1,5 +1,5 @@
-//! Messages of the network, which a frame carries. A client reads puts alone: a router tells of what
-//! others declare, asks and answers only where it was asked to.
+//! Messages of the network layer, carried in frames. A client reads only puts: a router reports
+//! declarations of others, asks and answers only on request.
 
 use crate::bytes::{Fault, Reader, Writer};
 
@@ -9,15 +9,14 @@ const DECLARE: u8 = 0x1e;
 /// Contents of a push.
 const PUT: u8 = 1;
 const DELETE: u8 = 2;
-/// The mark of a header before a key that has text, of a put with a time stamp, and of one with an
-/// encoding.
+/// Header marks: of a key with text, of a put with a time stamp, and of a put with an encoding.
 const HAS_TEXT: u8 = 0x20;
 const IS_STAMPED: u8 = 0x20;
 const HAS_ENCODING: u8 = 0x40;
-/// The extension of a put that has its attachment.
+/// The put extension for the attachment.
 const ATTACHMENT: u8 = 3;
 
-/// A value that somebody has put under a key.
+/// A value put under a key by another participant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Put<'d> {
     /// The key in full, not checked to be text.
@@ -26,20 +25,21 @@ pub struct Put<'d> {
     pub attachment: &'d [u8],
     /// The value.
     pub payload: &'d [u8],
-    /// The Unix time of its stamp, in nanoseconds.
+    /// The Unix time of the put's stamp, in nanoseconds.
     pub stamp_ns: Option<u64>,
 }
 
-/// A declaration of a client's, made again and again.
+/// A client's declaration, repeated again and again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Declaration<'k> {
     /// A subscription to a key.
     Subscriber(&'k str),
-    /// A key that says that somebody is there.
+    /// A key announcing somebody's presence.
     Token(&'k str),
 }
 
-/// Writes a declaration. The router keeps it by its number, so one that comes twice changes nothing.
+/// Writes a declaration. The router keeps declarations by number, so a repeated declaration changes
+/// nothing.
 pub(crate) fn declare(writer: &mut Writer<'_>, id: u64, declaration: Declaration<'_>) {
     let (kind, key) = match declaration {
         Declaration::Subscriber(key) => (2, key),
@@ -51,8 +51,8 @@ pub(crate) fn declare(writer: &mut Writer<'_>, id: u64, declaration: Declaration
     writer.counted(key.as_bytes());
 }
 
-/// Writes a put. It has its key in full: were a number for it declared once, and that datagram
-/// lost, the topic would stay silent.
+/// Writes a put, with its key in full. If the key were replaced by a number declared once, and that
+/// declaration were lost, the topic would stay silent.
 pub(crate) fn put(writer: &mut Writer<'_>, key: &str, attachment: &[u8], payload: &[u8]) {
     writer.bytes(&[PUSH | HAS_TEXT, 0]);
     writer.counted(key.as_bytes());
@@ -65,7 +65,7 @@ pub(crate) fn put(writer: &mut Writer<'_>, key: &str, attachment: &[u8], payload
     writer.counted(payload);
 }
 
-/// Reads a message, and returns the value, if it puts one.
+/// Reads a message, and returns the value of a put.
 pub(crate) fn read<'b>(reader: &mut Reader<'b>) -> Result<Option<Put<'b>>, Fault> {
     let header = reader.header()?;
     if header & 0x1f != PUSH {
@@ -84,11 +84,12 @@ pub(crate) fn read<'b>(reader: &mut Reader<'b>) -> Result<Option<Put<'b>>, Fault
         stamp_ns = Some(unix_ns(reader.number()?));
         reader.counted()?;
     }
-    // An encoding has a schema if it is odd.
+    // An odd encoding has a schema.
     if kind & HAS_ENCODING != 0 && reader.number()? & 1 != 0 {
         reader.counted()?;
     }
-    // Not the extension of a value in shared memory: what follows there is no value.
+    // The extension for values in shared memory is unknown here: the bytes behind it are not a
+    // value.
     reader.extensions(kind, 0b1010, &mut |id, body| {
         if id == ATTACHMENT {
             attachment = body;
@@ -109,7 +110,7 @@ pub(crate) fn read<'b>(reader: &mut Reader<'b>) -> Result<Option<Put<'b>>, Fault
     Ok((number == 0).then_some(put))
 }
 
-/// Returns the nanoseconds of a time stamp, which has seconds and their fraction of 32 bits each.
+/// Returns the nanoseconds of a time stamp. The stamp has seconds and their fraction, 32 bits each.
 const fn unix_ns(stamp: u64) -> u64 {
     const SECOND: u64 = 1_000_000_000;
     (stamp >> 32) * SECOND + (((stamp & 0xffff_ffff) * SECOND) >> 32)

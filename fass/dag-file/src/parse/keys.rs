@@ -45,7 +45,7 @@ impl<'l, 'a> Keys<'l, 'a> {
         Ok(Some(key))
     }
 
-    /// Takes the next word if it is this one.
+    /// Takes the next word if it equals `word`.
     pub(super) fn next_if(&mut self, word: &str) -> bool {
         let mut ahead = self.rest.clone();
         let is_it = ahead.next() == Some(&word);
@@ -79,7 +79,7 @@ impl<'l, 'a> Keys<'l, 'a> {
         self.number_of(key, word)
     }
 
-    /// Reads numbers with commas between them.
+    /// Reads numbers separated by commas.
     pub(super) fn numbers(&mut self, key: &str) -> Result<Vec<u32>, Malformed> {
         let words = self.value(key)?.split(',');
         words.map(|word| self.number_of(key, word)).collect()

@@ -1,9 +1,8 @@
-//! Reading DAG files, strictly: whatever is not as `docs/dag-file.md` says is
-//! refused with its line.
+//! Reads DAG files, strictly: anything not described in `docs/dag-file.md` is refused with its
+//! line.
 //!
-//! A file is records of blank-separated words, one record a line. A word that
-//! begins with `#` begins a comment. The last record is `end`, so that a file of
-//! which a part is missing is never taken for a shorter one.
+//! A file is records of blank-separated words, one record a line. A word beginning with `#` begins
+//! a comment. The last record is `end`, so an incomplete file is never taken for a shorter one.
 
 mod keys;
 
@@ -23,17 +22,17 @@ use keys::Keys;
 use crate::file::{DagFile, FileDag, FileSubtask, Set, executed_ns, sample_len};
 use crate::time::{Time, parse_ns};
 
-/// The words that may stand where a record begins.
+/// The words allowed at the beginning of a record.
 const RECORDS: &str = "`set`, `dag`, `subtask`, `edge`, `core`, `certificate`, `state` or `end`";
 
 /// Reads a file.
 ///
-/// Names are resolved and each record is understood; what only the commit can
-/// tell, such as a cycle, is for [`check()`](crate::check()).
+/// Names are resolved and each record is interpreted. Faults visible only to the commit, such as a
+/// cycle, are left to [`check()`](crate::check()).
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as the format says.
+/// [`Malformed`] for the first record that violates the format.
 pub fn parse(text: &str) -> Result<DagFile, Malformed> {
     let mut lines = Lines::new(text);
     let mut reader = Reader::default();
@@ -69,8 +68,8 @@ pub fn parse(text: &str) -> Result<DagFile, Malformed> {
 /// The most bytes of a name.
 const MOST_OF_NAME: usize = 255;
 
-/// Reports whether a name can stand in a file: one word of characters that are seen,
-/// not too long, that begins neither a comment nor a machine line and is no arrow.
+/// Reports whether a name can stand in a file: one word of visible characters, not too long, not an
+/// arrow, and not beginning like a comment or a machine line.
 pub fn is_name(word: &str) -> bool {
     let is_plain = |character: char| !character.is_whitespace() && is_seen(character);
     (1..=MOST_OF_NAME).contains(&word.len())
@@ -79,7 +78,7 @@ pub fn is_name(word: &str) -> bool {
         && word.chars().all(is_plain)
 }
 
-/// Says why a word is refused as a name.
+/// Explains why a word is refused as a name.
 pub fn no_name(word: &str) -> String {
     format!(
         "{} is no name; give a word of at most {MOST_OF_NAME} bytes that begins with neither `#` \
@@ -88,7 +87,7 @@ pub fn no_name(word: &str) -> String {
     )
 }
 
-/// Returns the next line that is not only a comment, without its comment.
+/// Returns the next line with more than a comment, without its comment.
 fn next_record<'a>(lines: &mut Lines<'a>) -> Option<Line<'a>> {
     loop {
         let mut line = lines.next_line()?;
@@ -124,7 +123,7 @@ impl<'a> Reader<'a> {
             "certificate" | "state" => self.take_certificate(line),
             other => {
                 let remedy = match self.file.sets.is_empty() {
-                    // Perhaps no line of it is meant for this reader.
+                    // Perhaps none of the file's lines is meant for this reader.
                     true => "write a file of another format as docs/dag-file.md says",
                     false => "make it a comment with #",
                 };
@@ -215,7 +214,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Takes a line of a certificate as it is: only the commit can tell what it proves.
+    /// Takes a line of a certificate as it is: only the commit can judge its proof.
     fn take_certificate(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
         self.open_dag(line)?;
         if let Some(set) = self.file.sets.last_mut() {
@@ -243,7 +242,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Checks that the latest set and DAG are not empty, before what follows them.
+    /// Checks that the latest set and DAG are not empty, before the next record.
     fn close(&mut self, next: &Line<'_>) -> Result<(), Malformed> {
         let Some(set) = self.file.sets.last() else {
             return Ok(());
@@ -270,7 +269,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Returns the error of a record whose name another one has.
+/// Returns the error of a record whose name is taken.
 fn twice(line: &Line<'_>, name: &str, first: usize) -> Malformed {
     let (kind, name) = (line.kind, quoted(name));
     line.malformed(format!(
@@ -278,11 +277,11 @@ fn twice(line: &Line<'_>, name: &str, first: usize) -> Malformed {
     ))
 }
 
-/// Makes sure that no edge of a DAG stands twice.
+/// Makes sure that no edge of a DAG appears twice.
 ///
 /// # Errors
 ///
-/// The first edge that is too many.
+/// The first surplus edge.
 pub fn refuse_repeated_edge(dag: &FileDag) -> Result<(), Malformed> {
     let Some((first, second)) = repeated(&dag.spec.edges) else {
         return Ok(());
@@ -408,7 +407,7 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
     Ok((spec, subtask))
 }
 
-/// Reads samples: with commas between them, and `+` between the times of each one.
+/// Reads samples: separated by commas, with `+` between the times of each sample.
 fn read_samples(
     line: &Line<'_>,
     samples: &str,
@@ -456,7 +455,7 @@ fn read_waits(keys: &mut Keys<'_, '_>, spec: &mut SubtaskSpec) -> Result<(), Mal
     }
 }
 
-/// Reads the WCET, or those of the first segment and, behind a limit each, of further ones.
+/// Reads the WCET, or the WCETs of the first segment and, each after a limit, of further segments.
 fn read_segments(keys: &mut Keys<'_, '_>, spec: &mut SubtaskSpec) -> Result<(), Malformed> {
     let mut sum_ns = keys.wcet_ns()?;
     while keys.next_if("wait") {

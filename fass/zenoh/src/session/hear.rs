@@ -1,4 +1,4 @@
-//! The router's datagrams, and how a session takes them.
+//! The router's datagrams, and their handling by a session.
 
 use super::{
     CLOSE, FRAGMENT, FRAME, INIT, IS_ANSWER, IS_RELIABLE, IS_SIZED, KEEP_ALIVE, MOST_BYTES, OPEN,
@@ -8,17 +8,17 @@ use crate::bytes::{Fault, Reader};
 use crate::fragments::Fragment;
 use crate::message::{self, Put};
 
-/// Kinds of messages from here on are the network's. One of the transport ends a frame.
+/// Message kinds from here on belong to the network layer. A transport message ends a frame.
 const FIRST_OF_NETWORK: u8 = 0x08;
-/// Marks of a fragment by extensions: it is the first of its message, or nothing will become of
-/// that.
+/// Marks of a fragment by extensions: the fragment is the first of its message, or the message is
+/// dropped.
 const IS_FIRST: u16 = 1 << 2;
 const IS_DROPPED: u16 = 1 << 3;
 
 type Each<'e> = &'e mut dyn FnMut(Put<'_>);
 
 impl Session {
-    /// Takes a datagram of the router's, and hands over each value in it.
+    /// Takes a datagram from the router, and hands over each value in the datagram.
     pub fn hear(&mut self, now_ns: u64, datagram: &[u8], each: Each<'_>) {
         let mut reader = Reader::new(datagram);
         while !reader.rest().is_empty() {
@@ -48,7 +48,7 @@ impl Session {
             (OPEN, Stage::Opening) if is_answer => self.hear_open(now_ns, from, header),
             (CLOSE, stage) => {
                 from.byte()?;
-                // Before a session is up it answers our own CLOSE, or a step that is tried again.
+                // Before a session is up, this CLOSE answers our own CLOSE, or a step tried again.
                 if let Stage::Up { .. } = stage {
                     self.lose();
                 }
@@ -101,7 +101,7 @@ impl Session {
         Ok(())
     }
 
-    /// Reads a frame with the messages in it, or a fragment.
+    /// Reads a frame with its messages, or a fragment.
     fn hear_frame(&mut self, from: &mut Reader<'_>, header: u8, each: Each<'_>) -> Read {
         let is_reliable = header & IS_RELIABLE != 0;
         let (number, mut marks) = (from.number()?, 0);
@@ -132,7 +132,7 @@ impl Session {
 
 type Read = Result<(), Fault>;
 
-/// Reads messages of the network up to the end, or to the next one of the transport.
+/// Reads messages of the network layer up to the end, or to the next transport message.
 fn messages(from: &mut Reader<'_>, counts: &mut SessionCounts, each: Each<'_>) -> Read {
     let is_ours = |header: &u8| header & 0x1f >= FIRST_OF_NETWORK;
     while from.rest().first().is_some_and(is_ours) {

@@ -7,12 +7,12 @@
 //!     +------ no answer, the router's CLOSE, its silence for a lease, a lost link ------+
 //! ```
 //!
-//! CLOSE is first because a router that has an older session with this address, such as that before
-//! a restart, would not answer INIT until the lease is over. It ends that session by itself, and
-//! what comes within some milliseconds behind CLOSE is lost with it.
+//! CLOSE comes first because of older sessions with this address, such as the session before a
+//! restart: a router with such a session would not answer INIT until the lease is over. CLOSE ends
+//! the old session, and loses any datagrams that follow within some milliseconds.
 //!
-//! UDP loses datagrams, and a router does not ask for what it has not got. So the datagram that
-//! keeps the session alive is one of the declarations again, in turn.
+//! UDP loses datagrams, and a router does not ask for missing ones. So the datagrams keeping the
+//! session alive repeat the declarations, in turn.
 
 mod hear;
 mod numbers;
@@ -33,49 +33,49 @@ const CLOSE: u8 = 3;
 const KEEP_ALIVE: u8 = 4;
 const FRAME: u8 = 5;
 const FRAGMENT: u8 = 6;
-/// The mark of an answer to INIT and OPEN, and of a frame of the reliable channel.
+/// The mark of an answer to INIT and OPEN, and of a frame on the reliable channel.
 const IS_ANSWER: u8 = 0x20;
 const IS_RELIABLE: u8 = 0x20;
 /// The mark of INIT with sizes, and of OPEN with a lease in seconds, not milliseconds.
 const IS_SIZED: u8 = 0x40;
-/// The size of numbers that INIT asks for: 28 bits for a frame's, of the form of 32.
+/// The size of numbers requested by INIT: 28 bits for a frame's number, in the form for 32 bits.
 const RESOLUTION: u8 = 0x0a;
-/// The most bytes of a datagram, of ours and of the router's.
+/// The most bytes of a datagram, in either direction.
 pub const MOST_BYTES: u16 = 1400;
-/// The most bytes of what the router wants to have back with OPEN.
+/// The most bytes of the cookie that the router wants back with OPEN.
 const MOST_COOKIE: usize = 128;
-/// INIT is sent so long after CLOSE.
+/// The time between CLOSE and INIT.
 const GAP_NS: u64 = 100_000_000;
-/// A step without an answer for so long begins anew, and a declaration is repeated each such time,
+/// After so long without an answer a step begins anew. Declarations are repeated at this interval,
 /// or more often if the lease is short.
 const RETRY_NS: u64 = 500_000_000;
 
-/// Whom a session speaks for, and how.
+/// The client of a session, and its lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SessionOptions {
-    /// Tells the client from all others; not 0. Zenoh shows it as `{:x}` does.
+    /// Distinguishes the client from all others; not 0. Zenoh shows the identity as `{:x}` does.
     pub identity: u128,
-    /// After so long without a datagram of ours the router takes the client for gone.
+    /// After so long without a datagram of ours the router considers the client gone.
     pub lease_ms: u64,
 }
 
 /// Counts of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SessionCounts {
-    /// Sessions that the router has opened.
+    /// Sessions opened by the router.
     pub opened: u64,
-    /// Sessions that were lost: the router was silent or ended it, or the link was gone.
+    /// Lost sessions: the router was silent or ended the session, or the link was gone.
     pub lost: u64,
     /// Values heard.
     pub puts: u64,
     /// Values sent.
     pub sent: u64,
-    /// Values and declarations that had no room in a datagram.
+    /// Values and declarations without room in a datagram.
     pub too_long: u64,
-    /// Datagrams with an error, behind which the rest was dropped.
+    /// Datagrams with an error. The part behind the error was dropped.
     pub malformed: u64,
-    /// Messages that a client does not know, or is one too many of a datagram, of which the rest is
-    /// dropped.
+    /// Messages unknown to a client, or exceeding the limit for a datagram. The rest of the
+    /// datagram is dropped.
     pub foreign: u64,
     /// Datagrams that came twice or too late.
     pub repeated: u64,
@@ -83,11 +83,11 @@ pub struct SessionCounts {
     pub gaps: u64,
     /// Fragments heard.
     pub fragments: u64,
-    /// Fragments dropped, each with those before it: one was missing, or the message is too long.
+    /// Fragments dropped, each with those before: one was missing, or the message is too long.
     pub dropped: u64,
 }
 
-/// Where a session stands.
+/// The stage of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     /// CLOSE is due.
@@ -103,16 +103,16 @@ enum Stage {
     Up {
         since_ns: u64,
     },
-    /// CLOSE is due, and nothing behind it.
+    /// CLOSE is due, and nothing afterwards.
     Ending,
     Ended,
 }
 
-/// A session with a router, and no more than one at a time.
+/// A session with a router, at most one at a time.
 pub struct Session {
     options: SessionOptions,
     stage: Stage,
-    /// When something was last sent or, in an open session, declared.
+    /// The time of the latest sending or, in an open session, of the latest declaration.
     step_ns: u64,
     heard_ns: u64,
     cookie: [u8; MOST_COOKIE],
@@ -121,7 +121,7 @@ pub struct Session {
     most_bytes: u16,
     lease_ns: u64,
     numbers: Numbers,
-    /// The place of the declaration that is next, and whether each has been sent once.
+    /// The place of the next declaration, and whether each has been sent once.
     next_declared: usize,
     is_declared: bool,
     fragments: Fragments,
@@ -129,7 +129,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Creates a session that is not up: what is due first is CLOSE, then INIT.
+    /// Creates a session that is not up: CLOSE is due first, then INIT.
     #[must_use]
     pub fn new(options: SessionOptions) -> Self {
         Self {
@@ -149,8 +149,8 @@ impl Session {
         }
     }
 
-    /// Writes the datagram that is due, if there is one, and returns its length, or else 0.
-    /// `declared` gives the declarations by their places, and none beyond the last.
+    /// Writes the due datagram, if any, and returns its length, or else 0. `declared` returns the
+    /// declarations by their places, and `None` beyond the last.
     pub fn due<'k>(
         &mut self,
         now_ns: u64,
@@ -192,8 +192,8 @@ impl Session {
         writer.end().unwrap_or(0)
     }
 
-    /// Writes a datagram that puts a value, and returns its length: `None` if the session is not up
-    /// or the value is too long.
+    /// Writes a datagram with a put, and returns its length; `None` if the session is not up or the
+    /// value is too long.
     pub fn put(
         &mut self,
         key: &str,
@@ -206,7 +206,7 @@ impl Session {
         self.frame(out, put).inspect(|_| self.counts.sent += 1)
     }
 
-    /// Returns since when the session is up.
+    /// Returns the time since which the session is up.
     #[must_use]
     pub const fn up_since_ns(&self) -> Option<u64> {
         match self.stage {
@@ -215,12 +215,12 @@ impl Session {
         }
     }
 
-    /// Ends the session: what is due next is CLOSE, and nothing behind it.
+    /// Ends the session: CLOSE is due next, and nothing afterwards.
     pub const fn close(&mut self) {
         self.stage = Stage::Ending;
     }
 
-    /// Loses the session, as the link is gone, and opens another one, also behind the end.
+    /// Gives up the session after the loss of the link, and opens another one, even after the end.
     pub const fn lose(&mut self) {
         if self.up_since_ns().is_some() {
             self.counts.lost += 1;
@@ -228,7 +228,7 @@ impl Session {
         self.stage = Stage::Fresh;
     }
 
-    /// Returns what has been counted.
+    /// Returns the counts.
     #[must_use]
     pub const fn counts(&self) -> SessionCounts {
         self.counts
@@ -243,7 +243,7 @@ impl Session {
     fn write_init(&self, writer: &mut Writer<'_>) {
         const CLIENT: u8 = 2;
         let identity = self.options.identity.to_le_bytes();
-        // Leading zeroes are no part of an identity; how many bytes there are stands with one less.
+        // An identity has no leading zeroes. Its length is written minus one.
         let last = identity.iter().rposition(|byte| *byte != 0).unwrap_or(0);
         let [last_byte, ..] = last.to_le_bytes();
         writer.bytes(&[INIT | IS_SIZED, VERSION, last_byte << 4 | CLIENT]);
@@ -264,7 +264,7 @@ impl Session {
         writer.counted(&self.cookie[..self.cookie_length]);
     }
 
-    /// Writes the next declaration, or what keeps a session alive that has none.
+    /// Writes the next declaration, or, without declarations, a message keeping the session alive.
     fn declare<'k>(
         &mut self,
         now_ns: u64,
@@ -294,7 +294,7 @@ impl Session {
         writer.end().unwrap_or(0)
     }
 
-    /// Writes a frame with a message, and returns its length; `None` if it has no room.
+    /// Writes a frame with a message, and returns its length; `None` if the message has no room.
     fn frame(&mut self, out: &mut [u8], message: impl FnOnce(&mut Writer<'_>)) -> Option<usize> {
         let most = out.len().min(self.most_bytes.into());
         let mut writer = Writer::new(&mut out[..most]);

@@ -1,16 +1,16 @@
-//! The numbers of frames and fragments, which wrap: ours, and the router's of two channels.
+//! The wrapping numbers of frames and fragments: ours, and the router's on two channels.
 
-/// Numbers of 28 bits, or of fewer if the router wants that.
+/// Numbers of 28 bits, or fewer if the router wants.
 pub(super) struct Numbers {
     mask: u32,
     next: u32,
-    /// The latest that were heard of the best-effort and of the reliable channel.
+    /// The latest numbers heard on the best-effort and on the reliable channel.
     latest: [u32; 2],
 }
 
 impl Numbers {
-    /// Creates numbers of which the first is taken from the top of an identity: so a test may begin
-    /// where they wrap.
+    /// Creates numbers. The first number comes from the top of an identity, so a test may begin
+    /// near the wrap.
     pub(super) const fn new(identity: u128) -> Self {
         let [.., c, b, a, top] = identity.to_le_bytes();
         Self {
@@ -20,8 +20,8 @@ impl Numbers {
         }
     }
 
-    /// Agrees on the size that the low bits of a resolution name. Returns `None` if that is more
-    /// than was asked for.
+    /// Agrees on the size given by the low bits of a resolution. Returns `None` if the size exceeds
+    /// the requested one.
     pub(super) fn agree(&mut self, resolution: u8) -> Option<()> {
         self.mask = *[0x7f, 0x3fff, u32::MAX >> 4].get(usize::from(resolution & 3))?;
         self.next &= self.mask;
@@ -38,16 +38,16 @@ impl Numbers {
         self.next = self.next.wrapping_add(1) & self.mask;
     }
 
-    /// Takes the number of the router's first frame in both channels. Returns `None` if it is too
-    /// large.
+    /// Takes the number of the router's first frame in both channels. Returns `None` if the number
+    /// is too large.
     pub(super) fn expect(&mut self, first: u64) -> Option<()> {
         let first = self.number(first)?;
         self.latest = [first.wrapping_sub(1) & self.mask; 2];
         Some(())
     }
 
-    /// Takes the number of a frame of a channel. Returns how far it is beyond the latest, 0 if it
-    /// is not newer, and `None` if it is too large.
+    /// Takes the number of a frame of a channel. Returns the distance from the latest number, 0 if
+    /// the frame is not newer, and `None` if the number is too large.
     pub(super) fn hear(&mut self, number: u64, is_reliable: bool) -> Option<u32> {
         let number = self.number(number)?;
         let latest = &mut self.latest[usize::from(is_reliable)];
