@@ -1,7 +1,7 @@
-//! Writes DAG files such that [`parse()`](crate::parse()) reads them back unchanged.
+//! Writes DAG files. [`parse()`](crate::parse()) reads a written file back unchanged.
 //!
 //! Only values differing from the default are written, so a file converted from another format
-//! looks as if a person had written it.
+//! reads like a file written by a person.
 
 use core::fmt::{Display, Formatter, Result};
 
