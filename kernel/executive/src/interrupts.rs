@@ -1,4 +1,4 @@
-//! Handlers of a core's interrupts: its timer's, and another core's wake-up.
+//! The handlers of a core's interrupts: its timer, and wake-ups by other cores.
 
 use core::sync::atomic::Ordering;
 
@@ -13,7 +13,7 @@ pub fn timer_interrupt(interrupted: &mut Interrupted) {
     core.timer_interrupts.fetch_add(1, Ordering::Relaxed);
     let now_ns = clock::now_ns();
     core.interrupted_ns.store(now_ns, Ordering::Relaxed);
-    // The instance that holds the core watches the clock: waking it is enough.
+    // The instance holding the core watches the clock: waking it is enough.
     timer::take_due(Alarm::Hold, now_ns);
     if timer::take_due(Alarm::Heartbeat, now_ns) {
         heartbeat::beat(core, now_ns);
@@ -25,14 +25,15 @@ pub fn timer_interrupt(interrupted: &mut Interrupted) {
     if timer::take_due(Alarm::Budget, now_ns) {
         containment::end_overrun(interrupted, now_ns);
     }
+    // Last, since a section's end may have passed while the handlers above ran.
     if section::has_put_off(core) {
         execution::interrupt(interrupted, now_ns, false);
     }
     timer::arm_earliest();
 }
 
-/// Handles another core's wake-up: there is work, an earlier event to wait for,
-/// or another heartbeat.
+/// Handles another core's wake-up: there is work, an earlier event to wait for, or another
+/// heartbeat.
 pub fn wake_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     let now_ns = clock::now_ns();
@@ -44,7 +45,7 @@ pub fn wake_interrupt(interrupted: &mut Interrupted) {
     execution::interrupt(interrupted, now_ns, false);
 }
 
-/// Returns the timer interrupts that all cores have taken since boot.
+/// Returns the number of timer interrupts taken by all cores since boot.
 pub fn timer_interrupts() -> u64 {
     let counts = this_core::all().iter().map(|core| &core.timer_interrupts);
     counts.map(|count| count.load(Ordering::Relaxed)).sum()

@@ -1,15 +1,54 @@
 //! The executive: the kernel's lower half, which executes jobs on processors.
 //!
-//! An app names `kernel`, never this. The two are crates of their own because they are
-//! compiled for different ends: what is here is on the way from a release to a completion,
-//! or right below it, and is compiled for speed; what is above (bringing a machine up,
-//! looking in on a run, telling of it afterwards) is compiled for size.
+//! An app names `kernel`, never this crate. The executive and `kernel` are separate crates because
+//! the build optimizes each for a different goal: the executive holds the path from a release to a
+//! completion, and the code right below that path, so it is compiled for speed; the code above
+//! (bringing a machine up, looking in on a run, reporting on a run afterwards) is compiled for
+//! size.
 //!
-//! # Rooms, from top to bottom
+//! # Modules, from top to bottom
 //!
-//! `interrupts` is what a core's timer and wake-ups do, `run` executes what was committed.
-//! `text` serves input and output; `memory` and `machine` (processor, interrupts, time) know
-//! nothing of what is above. `docs/architecture.md` has the table that the tests hold this to.
+//! `interrupts` handles a core's timer and wake-ups; `run` executes committed tasks. `text` serves
+//! input and output; `memory` and `machine` (processor, interrupts, time) know nothing of the
+//! modules above. `docs/architecture.md` has the table of modules; tests compare the code with that
+//! table.
+//!
+//! # Who holds which lock
+//!
+//! An arrow leads from an outer lock to an inner lock. "Thread" is a context: an instance, a
+//! worker, the app's main function, or core 0's background. "Handler" is an interrupt or exception
+//! handler.
+//!
+//! ```text
+//!  SLICED --+---> execution[0] --> execution[1] --> ... --+--> EDGE
+//!  WATCH ---+     (all nested: only `divided::rest`)      +--> STOCK
+//!  SLICED ------> EDGE            SLICED, WATCH, ProtocolPlace::protocol ------> BUFFER
+//!  Network::receiver --> ProtocolPlace::protocol --> Network::sender
+//!  (every lock) --> HEAP          all others: no lock inside but HEAP
+//!
+//!  lock            data                       taken in a thread by      taken in a handler by
+//!  execution[i]    scheduler, journal, bodies find_work, complete,      timer, wake-up, device,
+//!                  and contexts of cluster i  answer, background        contained fault
+//!  STOCK           free contexts              commit, end of `work`     `follow`, contained fault
+//!  EDGE            recorded, replayed values  commit, replayed source,  scheduler's step
+//!                                             completion, background
+//!  BUFFER          text for the port          print, idle core          core 0's heartbeat
+//!  WAITING         notes of faults            panic, background         exception, spent budget,
+//!                                                                       core 0's heartbeat
+//!  HEAP            allocator                  allocation, free          (handlers do not allocate)
+//!  MEMORY          frames, page table         boot, commit, drivers     -
+//!  RECORD, USED,   file of the boot, stack    main, background          -
+//!  Kernel::terms   figures, terms of commits
+//!  CLEARING        DAG being dropped          main, after a run         core 0's heartbeat (tries)
+//!  SLICED, WATCH   status, console; progress  core 0's background       core 0's heartbeat (tries)
+//! ```
+//!
+//! Each lock is a [`SpinLock`](machine::spinlock::SpinLock), whose guard masks interrupts on its
+//! core: a handler never waits for the code it has interrupted. A kernel panic, a non-maskable
+//! interrupt and a machine check only try a lock. Letters between clusters, and the fields of a
+//! [`Core`](machine::this_core::Core), are atomics. An app's own lock
+//! ([`section`](machine::section)) leaves interrupts enabled; inside a section the app may print or
+//! allocate, but no lock of the table is held around a section.
 
 #![cfg_attr(not(test), no_std)]
 #![allow(

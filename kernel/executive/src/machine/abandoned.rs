@@ -1,17 +1,17 @@
-//! Contexts that were left for good, in the middle of what they ran.
+//! Abandoned contexts: left for good, in the middle of a function.
 //!
-//! No destructor of what such a context ran is called: that code has just proved to be wrong, and
-//! there may be no end to it. Its stack is used again all the same.
+//! The kernel calls no destructor of the function: its code has just proved to be wrong, and a
+//! destructor might never end. The stack is used again all the same.
 //!
-//! **Frames invariant**: what lies on a context's stack is reached from that context alone.
-//! Functions, messages and states are `'static`, so they hold no reference to a frame, and the
-//! kernel lends nothing of one to others but the lock of its section, which ends when the context is
-//! recovered.
+//! **Frames invariant**: data on a context's stack is reached from that context alone. Functions,
+//! messages and states are `'static`, so they hold no reference to a frame, and the kernel lends
+//! nothing in a frame to others except the lock of its section; recovering the context ends that
+//! section.
 
 use super::context::Parked;
 use super::{paint, section};
 
-/// A context that a handler has left for good.
+/// A context left for good by a handler.
 #[must_use = "its stack is lost unless it is recovered"]
 pub struct AbandonedContext(Parked);
 
@@ -21,9 +21,10 @@ impl AbandonedContext {
         Self(left)
     }
 
-    /// Returns the context, to [begin anew](Parked::restart). The data of a lock that it held is lost.
+    /// Returns the context, ready to [begin anew](Parked::restart). The data of a lock held by the
+    /// context is lost.
     ///
-    /// By the frames invariant nobody else knows of what lay on its stack.
+    /// By the frames invariant nobody else knows of any data on its stack.
     #[must_use]
     pub fn recover(self) -> Parked {
         let Self(mut parked) = self;

@@ -1,22 +1,22 @@
-//! The questions that a core has to answer if it takes no interrupts.
+//! Accusations: questions put to a core that takes no interrupts.
 //!
-//! Another core opens an accusation and sends a non-maskable interrupt, by which the accused
-//! answers. Each accusation is of its own core and is open until that has answered, so each
-//! such interrupt has an accusation, however late the host lets the core run.
+//! Another core opens an accusation and sends a non-maskable interrupt; the accused core answers in
+//! its handler. Each accusation concerns one core and stays open until this core has answered, so
+//! every such interrupt has an accusation, however late the host lets the core run.
 //!
-//! That interrupts are disabled at an answer proves little: the host may have stopped the core
-//! within the kernel's instructions that disable them. Some answers later it has left these,
-//! and has taken an interrupt. So it counts how often a core has answered without
-//! having taken one.
+//! Disabled interrupts at an answer prove little: the host may have stopped the core within the
+//! kernel's instructions that disable interrupts. Some answers later the core has left these
+//! instructions, and has taken an interrupt. The core therefore counts how often it has answered
+//! without an interrupt in between.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 /// The accusations of one core.
 pub(super) struct AccusationBox {
     is_open: AtomicBool,
-    /// When the core had taken its last interrupt, as of its last answer.
+    /// The time of the core's last interrupt, as of its last answer, in nanoseconds.
     interrupted_ns: AtomicU64,
-    /// How often it has answered since.
+    /// The number of answers since then.
     answers: AtomicU32,
 }
 
@@ -29,13 +29,13 @@ impl AccusationBox {
         }
     }
 
-    /// Opens one, and reports whether none was open.
+    /// Opens an accusation, and reports whether none was open.
     pub(super) fn open(&self) -> bool {
         !self.is_open.swap(true, Ordering::AcqRel)
     }
 
-    /// Answers on the accused core, which took its last interrupt at `interrupted_ns`: returns
-    /// how often it has answered since then; 0 if it is not accused.
+    /// Answers on the accused core, whose last interrupt came at `interrupted_ns`: returns the
+    /// number of answers since then; 0 if the core is not accused.
     pub(super) fn answer(&self, interrupted_ns: u64) -> u32 {
         if !self.is_open.swap(false, Ordering::AcqRel) {
             return 0;

@@ -1,13 +1,12 @@
-//! Computations with stacks of their own, and the way from one to another.
+//! Contexts: computations with their own stacks, and the switch from one to another.
 //!
-//! A *context* is a computation with a stack. On each core one context runs.
-//! While it does, the processor's interrupt stack 1 points to the end of its
-//! save area, so an interrupt saves it right there (see `interrupt.s`), and a
-//! handler may then let the core go on with another context instead.
+//! A *context* is a computation with a stack. Each core runs one context. Meanwhile the processor's
+//! interrupt stack 1 points to the end of the context's save area, so an interrupt saves the
+//! context right there (see `interrupt.s`), and a handler may then make the core continue with
+//! another context instead.
 //!
-//! **Context invariant**: a context's save area and stack belong to the core on
-//! which it runs, or, while it runs nowhere, to the holder of its one
-//! [`Parked`]. So there is never more than one place that touches them.
+//! **Context invariant**: a context's save area and stack belong to the core running the context,
+//! or, while none does, to the holder of its one [`Parked`]. Never do two places touch them.
 
 use core::cell::UnsafeCell;
 use core::fmt;
@@ -18,7 +17,7 @@ use alloc::boxed::Box;
 
 use fass::platform::LockWords;
 
-/// The general registers as `interrupt.s` and the processor push them.
+/// The general registers, as pushed by `interrupt.s` and the processor.
 #[derive(Debug, Default)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the processor's own names")]
@@ -50,7 +49,7 @@ pub struct SavedRegisters {
 impl SavedRegisters {
     const INTERRUPTS_ENABLED: u64 = 1 << 9;
 
-    /// Reports whether interrupts were enabled where these were pushed.
+    /// Reports whether interrupts were enabled when the registers were pushed.
     pub(super) const fn are_interrupts_enabled(&self) -> bool {
         self.rflags & Self::INTERRUPTS_ENABLED != 0
     }
@@ -88,9 +87,8 @@ impl fmt::Display for SavedRegisters {
     }
 }
 
-/// The bytes that x87, SSE and AVX take of a save area: 512 bytes as `fxsave64` writes them, a
-/// header
-/// of 64 that says which parts are there, and the upper halves (Intel SDM 1, 13.4).
+/// The bytes of a save area for x87, SSE and AVX: 512 bytes in the format of `fxsave64`, a header
+/// of 64 bytes listing the saved parts, and the upper halves (Intel SDM 1, 13.4).
 pub(super) const VECTOR_BYTES: usize = 832;
 
 /// The control and status words of x87 after FNINIT, and MXCSR after reset (Intel SDM 1, 8.1.5,
@@ -112,36 +110,36 @@ const _: () = {
     assert!(size_of::<SavedRegisters>() == 22 * 8);
     assert!(core::mem::offset_of!(SaveArea, registers) == VECTOR_BYTES);
     assert!((VECTOR_BYTES + size_of::<SavedRegisters>()).is_multiple_of(16));
-    // What `xsaveopt64` writes to begins on a multiple of 64.
+    // The area for `xsaveopt64` begins on a multiple of 64.
     assert!(VECTOR_BYTES.is_multiple_of(64));
 };
 
-/// A computation with a stack of its own.
+/// A computation with its own stack.
 pub struct Context {
     save_area: UnsafeCell<SaveArea>,
     stack_top: u64,
     stack_bytes: AtomicU64,
     is_background: bool,
-    /// When it was last suspended, and for how long it has been in all before.
+    /// When the context was last suspended, and its total suspension before, both in nanoseconds.
     suspended_at_ns: AtomicU64,
     suspended_ns: AtomicU64,
-    /// When the execution of what it runs reaches its budget, if it is not
-    /// suspended any more until then.
+    /// When the execution of the context's instance reaches its budget, in nanoseconds on the
+    /// clock, if not suspended until then.
     budget_end_ns: AtomicU64,
-    /// Whether what it runs has been found at fault.
+    /// Whether the context's instance has been found at fault.
     is_at_fault: AtomicBool,
     sections: SectionNote,
-    /// The address of what it waits for, halted; 0 if there is nothing.
+    /// The address awaited by the halted context; 0 if there is none.
     awaited: AtomicUsize,
 }
 
 /// A context's note of its section; see [`section`](super::section).
 pub(super) struct SectionNote {
-    /// The lock that it is in a section of, or waits for; null if there is none.
+    /// The lock held or awaited by the context; null if there is none.
     pub(super) lock: AtomicPtr<LockWords>,
-    /// The core on which it waits, counted from 1.
+    /// The number of the core waiting for the lock, counted from 1; 0 if the context does not wait.
     pub(super) waits_on: AtomicU32,
-    /// When a preemption was put off first; 0 if none was.
+    /// When a preemption was first postponed, in nanoseconds on the clock; 0 if never.
     pub(super) put_off_ns: AtomicU64,
 }
 
@@ -160,12 +158,12 @@ impl SectionNote {
 unsafe impl Sync for Context {}
 
 impl Context {
-    /// Returns the address where the processor's interrupt frame has to end.
+    /// Returns the required end address of the processor's interrupt frame.
     pub(super) fn frame_end(&self) -> u64 {
         self.registers() as u64 + size_of::<SavedRegisters>() as u64
     }
 
-    /// Returns where `interrupt.s` keeps this context's registers.
+    /// Returns the address where `interrupt.s` keeps this context's registers.
     pub(super) fn registers(&self) -> *mut SavedRegisters {
         self.save_area.get().wrapping_byte_add(VECTOR_BYTES).cast()
     }
@@ -175,7 +173,7 @@ impl Context {
         self.stack_top
     }
 
-    /// Returns the context's stack if `address` lies in it, or in the guard page below.
+    /// Returns the context's stack if `address` lies in the stack, or in the guard page below.
     pub(super) fn stack_at(&self, address: u64) -> Option<Range<u64>> {
         let below = self.stack_top.checked_sub(address)?;
         let stack = self.stack();
@@ -187,7 +185,7 @@ impl Context {
         self.stack_top - self.stack_bytes()..self.stack_top
     }
 
-    /// Returns how large the context's stack is.
+    /// Returns the size of the context's stack, in bytes.
     pub fn stack_bytes(&self) -> u64 {
         self.stack_bytes.load(Ordering::Relaxed)
     }
@@ -197,69 +195,68 @@ impl Context {
         self.stack_bytes.store(stack_bytes, Ordering::Relaxed);
     }
 
-    /// Reports whether this is what its core does when nothing is assigned to it.
+    /// Reports whether this is its core's background, run when nothing is assigned to the core.
     pub const fn is_background(&self) -> bool {
         self.is_background
     }
 
-    /// Sets the time at which the budget of what the context runs ends.
+    /// Sets when the budget of the context's instance ends.
     pub fn set_budget_end(&self, end_ns: u64) {
         self.budget_end_ns.store(end_ns, Ordering::Relaxed);
     }
 
-    /// Returns when the budget ends of what the context runs.
+    /// Returns when the budget of the context's instance ends.
     pub fn budget_end_ns(&self) -> u64 {
         self.budget_end_ns.load(Ordering::Relaxed)
     }
 
-    /// Notes that what the context runs is at fault, and reports whether that was
-    /// known.
+    /// Notes a fault of the context's instance, and reports whether a fault was noted before.
     pub fn note_fault(&self) -> bool {
         self.is_at_fault.swap(true, Ordering::Relaxed)
     }
 
-    /// Reports whether what the context runs has been found at fault.
+    /// Reports whether the context's instance has been found at fault.
     pub fn is_at_fault(&self) -> bool {
         self.is_at_fault.load(Ordering::Relaxed)
     }
 
-    /// Returns what the context notes of its sections.
+    /// Returns the context's note of its section.
     pub(super) const fn sections(&self) -> &SectionNote {
         &self.sections
     }
 
-    /// Notes the address of what the context halts its core for; 0 if that is over.
+    /// Notes the address awaited by the context while its core halts; 0 ends the wait.
     pub fn note_awaited(&self, address: usize) {
         self.awaited.store(address, Ordering::SeqCst);
     }
 
-    /// Reports whether the context halts its core for what has an address.
+    /// Reports whether the context halts its core to await an address.
     pub fn awaits(&self, address: usize) -> bool {
         self.awaited.load(Ordering::SeqCst) == address
     }
 
-    /// Notes that the context has waited for `ns` without executing.
+    /// Notes that the context has waited for `ns` nanoseconds without executing.
     pub(super) fn note_waited(&self, ns: u64) {
         self.suspended_ns.fetch_add(ns, Ordering::Relaxed);
         self.set_budget_end(self.budget_end_ns().saturating_add(ns));
     }
 
-    /// Returns for how long the context has been suspended since it was made.
+    /// Returns the context's total suspension since its creation, in nanoseconds.
     pub fn suspended_ns(&self) -> u64 {
         self.suspended_ns.load(Ordering::Relaxed)
     }
 }
 
-/// A context that does not run. Its owner may have it run.
+/// A context that does not run. Its owner may run the context.
 pub struct Parked(&'static Context);
 
 impl Parked {
-    /// Makes a context with the stack of `stack_bytes` that grows down from `stack_top`,
-    /// which must be a multiple of 16. It has nothing to do yet.
+    /// Makes a context with a stack of `stack_bytes` growing down from `stack_top`, a multiple of
+    /// 16. The context has no work yet.
     pub fn new(stack_top: u64, stack_bytes: u64, is_background: bool) -> Self {
         let save_area = SaveArea {
             vector_state: [0; VECTOR_BYTES],
-            // The segments stay these: all code has them.
+            // The segments never change: all code has the same ones.
             registers: SavedRegisters {
                 cs: u64::from(super::descriptors::CODE),
                 ss: 0,
@@ -283,8 +280,8 @@ impl Parked {
         parked
     }
 
-    /// Sets back what one function would hand on to the next: the vector state's control words,
-    /// whether it was found at fault, and what it waits for.
+    /// Resets all state that one function would hand on to the next: the vector state's control
+    /// words, the mark of a fault, and the awaited address.
     pub(super) fn reset(&mut self) {
         self.0.is_at_fault.store(false, Ordering::Relaxed);
         self.0.note_awaited(0);
@@ -300,8 +297,8 @@ impl Parked {
         }
     }
 
-    /// Has the context begin anew with `entry`, on an empty stack, when it next runs.
-    /// All that it did before is forgotten.
+    /// Makes the context begin anew with `entry`, on an empty stack, when next run. Everything the
+    /// context did before is forgotten.
     pub fn restart(&mut self, entry: extern "C" fn() -> !) {
         self.0.set_budget_end(u64::MAX);
         // SAFETY: `&mut self` is the one holder of a context that does not run
@@ -311,7 +308,7 @@ impl Parked {
         // No upper halves of vectors are in use; others' would be saved and restored in vain.
         // SAFETY: likewise; the header begins with the parts that were saved.
         unsafe { parts.write(0) };
-        // What a function finds in the others means nothing to it.
+        // The function expects nothing in the other registers.
         registers.rbp = 0;
         registers.rip = entry as *const () as u64;
         registers.rflags = SavedRegisters::INTERRUPTS_ENABLED;
@@ -319,23 +316,23 @@ impl Parked {
         registers.rsp = self.0.stack_top - 8;
     }
 
-    /// Notes that the context is suspended from `now_ns` on.
+    /// Notes the context's suspension at `now_ns`.
     pub fn note_suspended(&self, now_ns: u64) {
         self.0.suspended_at_ns.store(now_ns, Ordering::Relaxed);
     }
 
-    /// Notes that the context goes on at `now_ns`.
+    /// Notes the context's resumption at `now_ns`.
     pub fn note_resumed(&self, now_ns: u64) {
         let since_ns = now_ns.saturating_sub(self.0.suspended_at_ns.load(Ordering::Relaxed));
         self.0.note_waited(since_ns);
     }
 
-    /// Returns when the budget ends of what the context runs.
+    /// Returns when the budget of the context's instance ends.
     pub fn budget_end_ns(&self) -> u64 {
         self.0.budget_end_ns()
     }
 
-    /// Returns where `interrupt.s` keeps the context's registers.
+    /// Returns the address where `interrupt.s` keeps the context's registers.
     pub(super) fn registers(&self) -> *mut SavedRegisters {
         self.0.registers()
     }
@@ -345,12 +342,12 @@ impl Parked {
         self.0
     }
 
-    /// Reports whether this is what its core does when nothing is assigned to it.
+    /// Reports whether this is its core's background, run when nothing is assigned to the core.
     pub const fn is_background(&self) -> bool {
         self.0.is_background()
     }
 
-    /// Gives the context up to a core that is to run it.
+    /// Gives the context up to a core about to run the context.
     pub(super) const fn into_context(self) -> &'static Context {
         self.0
     }
@@ -359,9 +356,8 @@ impl Parked {
     ///
     /// # Safety
     ///
-    /// The context ran on this core and runs no more, or will not run any
-    /// further than to the switch that the caller is about to make; no other
-    /// `Parked` of it exists.
+    /// The context ran on this core and has stopped, or will only run up to the caller's imminent
+    /// switch; no other `Parked` of the context exists.
     pub(super) const unsafe fn from_context(context: &'static Context) -> Self {
         Self(context)
     }

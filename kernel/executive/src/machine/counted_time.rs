@@ -1,50 +1,46 @@
-//! Time that QEMU counts, made to repeat to the nanosecond.
+//! Counted time under QEMU, made repeatable to the nanosecond.
 //!
-//! With `-icount shift=0,sleep=off` an instruction takes a nanosecond, and when
-//! all cores halt QEMU advances the clock to the next timer's end. That jump is
-//! made by another thread of QEMU's than the one that executes instructions: its
-//! main loop (`main_loop_wait` calls `icount_start_warp_timer`), which is also
-//! awake for no reason after each timer that has fired. It takes the halt of the
-//! last core for real as soon as `hlt` has set its flag, but the instructions up to
-//! and including `hlt` are counted only when the core's turn has ended
-//! (`icount_process_data`). If the main loop looks in between, it jumps to the
-//! timer's end, and those few instructions are added on top of it: the interrupt
-//! comes some 9 ns late. Which of the two is first depends on the host, some
-//! 1 halt in 100,000 goes the other way, and everything that follows is shifted.
+//! With `-icount shift=0,sleep=off` an instruction takes a nanosecond, and when all cores halt QEMU
+//! advances the clock to the next timer's end. Another QEMU thread makes that jump than the thread
+//! executing instructions: the main loop (`main_loop_wait` calls `icount_start_warp_timer`), which
+//! is also awake for no reason after each timer that has fired. The main loop accepts the halt of
+//! the last core as soon as `hlt` has set its flag, but the instructions up to and including `hlt`
+//! are counted only at the end of the core's turn (`icount_process_data`). If the main loop looks
+//! in between, it jumps to the timer's end, and those few instructions are added on top: the
+//! interrupt comes some 9 ns late. The order of the two depends on the host, some 1 halt in 100,000
+//! goes the other way, and everything afterwards is shifted.
 //!
-//! Interrupts that are late by less than [`GRACE_NS`] can be made equally late: a timer's
-//! interrupt, before it does or looks at anything, waits until exactly that long
-//! after its time ([`settle`]). As a loop has a length, it could not wait for a
-//! nanosecond; it executes as many `nop`s as nanoseconds are left. And a core reads
-//! the counter right before it halts ([`count_before_halt`]), which makes QEMU count
-//! what it has executed so far, so that no more than a few instructions are at stake.
+//! Interrupts late by less than [`GRACE_NS`] can be made equally late: a timer's interrupt, before
+//! any other action or look, waits until exactly that long after its time ([`settle`]). As a loop
+//! has a length, a loop could not wait for a nanosecond; the interrupt executes as many `nop`s as
+//! nanoseconds are left. And a core reads the counter right before halting ([`count_before_halt`]),
+//! so that QEMU counts all instructions executed so far and no more than a few remain at stake.
 //!
-//! The jump does more than move the clock. It tells every core's emulation to leave its
-//! next turn (`qemu_timer_notify_cb`, `rr_kick_vcpu_thread`). As a rule all cores have
-//! been passed by then, and QEMU goes on with the first. But if the main loop is so
-//! early that the halted cores behind the last one are still being passed
-//! (`rr_cpu_thread_fn`), it goes on right there, and other cores than usual have that
-//! mark left when the timer's core gets its turn. The mark matters if another timer ends
-//! in the next few microseconds: QEMU then looks for due timers before a marked core's
-//! turn, but within an unmarked one's, which has no instruction left for it and is lost
-//! (`icount_prepare_for_run`). So the order of turns would depend on the host. A core
-//! whose timer has fired therefore passes its turn once, by a `pause`; when it is its
-//! turn again all cores have been passed, and no mark is left ([`settle`]).
+//! The jump does more than move the clock. The jump tells every core's emulation to leave its next
+//! turn (`qemu_timer_notify_cb`, `rr_kick_vcpu_thread`). As a rule QEMU has passed all cores by
+//! then, and continues with the first. But if the main loop is so early that QEMU is still passing
+//! the halted cores behind the last core (`rr_cpu_thread_fn`), QEMU continues right there, and
+//! other cores than usual have that mark left when the timer's core gets its turn. The mark matters
+//! if another timer ends in the next few microseconds: QEMU then looks for due timers before a
+//! marked core's turn, but within an unmarked core's turn, which has no instruction left for the
+//! timer and is lost (`icount_prepare_for_run`). The order of turns would thus depend on the host.
+//! A core whose timer has fired therefore passes its turn once, by a `pause`; at its next turn QEMU
+//! has passed all cores, and no mark is left ([`settle`]).
 //!
-//! All this is off unless [`enable`] is called, and of no use where an instruction
-//! does not take a nanosecond. Where a timer's interrupt waits for its turn because
-//! other cores compute, not all cores had halted, and the clock has not jumped: nothing
-//! is done then. It cannot hide that, of two cores whose timers end at the same time, or
-//! within some 100 ns, the one is first with which QEMU goes on, and that is the host's
-//! choice in the rare cases above. So several cores should not wait for one time.
+//! All of this is off unless [`enable`] is called, and useless where an instruction does not take a
+//! nanosecond. Where a timer's interrupt waits for its turn because other cores compute, not all
+//! cores had halted, and the clock has not jumped: nothing is done then. One effect remains: of two
+//! cores whose timers end at the same time, or within some 100 ns, the first is the core QEMU
+//! continues with, and that is the host's choice in the rare cases above. Several cores should
+//! therefore not wait for one time.
 
 use core::arch::asm;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::{clock, cpu};
 
-/// How long after its time a timer's interrupt goes on. Until [`settle`] has read the
-/// clock again it is some 90 instructions, from [`count_before_halt`] to the halt less than 10.
+/// How long after its time a timer's interrupt continues, in nanoseconds. Until [`settle`] has read
+/// the clock again some 90 instructions pass; from [`count_before_halt`] to the halt, less than 10.
 const GRACE_NS: u64 = 128;
 
 static IS_ENABLED: AtomicBool = AtomicBool::new(false);
@@ -54,9 +50,8 @@ pub fn enable() {
     IS_ENABLED.store(true, Ordering::Relaxed);
 }
 
-/// Returns [`GRACE_NS`] after `at_ns`, the time for which this core's timer was
-/// armed; at once if that is past, or if the timer is early. All other cores have
-/// a turn before.
+/// Returns [`GRACE_NS`] after `at_ns`, the time of this core's timer; at once if already past, or
+/// if the timer is early. All other cores have a turn before.
 #[inline]
 pub(super) fn settle(at_ns: u64) {
     if !IS_ENABLED.load(Ordering::Relaxed) {
@@ -80,8 +75,7 @@ pub(super) fn count_before_halt() {
     }
 }
 
-/// Executes that many instructions, at most [`GRACE_NS`], and always the same few
-/// besides.
+/// Executes that many instructions, at most [`GRACE_NS`], and always the same few besides.
 fn execute_nops(count: u64) {
     let count = count.min(GRACE_NS);
     // SAFETY: the jump goes to one of the `nop`s, of one byte each, or to the end,

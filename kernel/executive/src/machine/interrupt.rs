@@ -1,8 +1,8 @@
-//! From an interrupt's vector to the function that handles it.
+//! Dispatches an interrupt, by its vector, to its handler.
 //!
-//! The machine layer knows nothing of scheduling: the start of the kernel [`install`]s
-//! the functions to call. They run with interrupts disabled, on the core's
-//! handler stack, and may use locks but must not wait for anything else.
+//! The machine layer knows nothing of scheduling: the start of the kernel [`install`]s the
+//! functions to call. Handlers run with interrupts disabled, on the core's handler stack, and may
+//! use locks but must not wait for anything else.
 
 use core::arch::global_asm;
 use core::panic::Location;
@@ -31,31 +31,30 @@ unsafe extern "C" {
     safe static interrupt_stubs: u8;
 }
 
-/// Handlers of the layer above, which the machine layer calls.
+/// The handlers of the layer above, called by the machine layer.
 pub struct Handlers {
     /// The local timer has fired.
     pub timer: fn(&mut Interrupted),
     /// Another core asked for attention.
     pub wake: fn(&mut Interrupted),
-    /// The code that was running asks for its own end.
+    /// The running code asks for its own end.
     pub end: fn(&mut Interrupted),
     /// The core's heartbeat, with the time: looks in on the run.
     pub beat: fn(&Core, u64),
-    /// The code that was running cannot go on. If the handler returns, it has
-    /// exchanged the context.
+    /// The running code cannot continue. If the handler returns, it has exchanged the context.
     pub exception: fn(&CpuException<'_>, &mut Interrupted),
-    /// The work of a context that begins anew; it returns, with interrupts
-    /// disabled, the context to leave it for.
+    /// The work of a restarted context; returns, with interrupts disabled, the context to continue
+    /// instead.
     pub work: fn() -> Parked,
-    /// Takes a context that this core has no use for.
+    /// Takes a context not needed by this core.
     pub release: fn(Parked),
 }
 
-/// The proof of being in a handler: the context that was running is saved.
+/// The proof of being in a handler: the interrupted context is saved.
 pub struct Interrupted(());
 
 impl Interrupted {
-    /// Returns the address of the instruction that was interrupted.
+    /// Returns the address of the interrupted instruction.
     pub fn instruction(&self) -> u64 {
         let registers = this_core::get().context().registers();
         // SAFETY: an `Interrupted` exists in handlers only, where the context of
@@ -70,15 +69,15 @@ impl Interrupted {
         unsafe { (*registers).rsp }
     }
 
-    /// Has this core go on with `next` when the handler returns, and returns
-    /// the context that was interrupted.
+    /// Makes this core continue with `next` when the handler returns, and returns the interrupted
+    /// context.
     pub fn exchange(&mut self, next: Parked) -> Parked {
         // SAFETY: an `Interrupted` exists in handlers only.
         unsafe { this_core::exchange_context(next) }
     }
 
-    /// Has this core go on with `next` when the handler returns, and nothing ever with the
-    /// context that was interrupted.
+    /// Makes this core continue with `next` when the handler returns; nothing ever continues the
+    /// interrupted context.
     pub fn abandon(&mut self, next: Parked) -> AbandonedContext {
         AbandonedContext::new(self.exchange(next))
     }
@@ -86,19 +85,19 @@ impl Interrupted {
 
 static HANDLERS: SetOnce<Handlers> = SetOnce::new();
 
-/// The handler of devices' messages, which is told the line. Apart from the others, so that an
-/// image without drivers has none.
+/// The handler for devices' messages, called with the line's number. Separate from the others, so
+/// that an image without drivers has no such handler.
 static DEVICES: SetOnce<fn(u8, &mut Interrupted)> = SetOnce::new();
 
-/// Names the handler of devices' messages. The first call counts.
+/// Names the handler for devices' messages. The first call counts.
 pub fn install_devices(handler: fn(u8, &mut Interrupted)) {
-    // Each driver names the same one.
+    // Each driver names the same handler.
     DEVICES.set(handler);
 }
 
 /// Names the functions that handle interrupts. The first call counts.
 pub fn install(handlers: Handlers) {
-    // A second call would come from a second boot, which there is not.
+    // A second call could only come from a second boot, and the kernel boots once.
     HANDLERS.set(handlers);
 }
 
@@ -124,6 +123,8 @@ extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegi
             local_apic::acknowledge();
             (handlers.wake)(&mut Interrupted(()));
         }
+        // Raised by an instruction (`cpu::ask_for_end`), so the local APIC expects no
+        // acknowledgement.
         (Ok(vector::END), Some(handlers)) => (handlers.end)(&mut Interrupted(())),
         (Ok(vector::SPURIOUS), _) => {}
         (Ok(line @ vector::DEVICE..vector::OTHER), _) => {
@@ -139,13 +140,14 @@ extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegi
     this_core::get().context().registers()
 }
 
-/// With so many answers in a row at which its interrupts are disabled, an accused core has
-/// disabled them for good. On a busy host, a line to the serial port may outlast several: it is
-/// written with interrupts disabled, and a core runs there for some milliseconds an answer.
+/// The number of answers in a row with disabled interrupts after which an accused core has disabled
+/// them for good. On a busy host, a line to the serial port may outlast several answers: the line
+/// is written with interrupts disabled, and a core runs there for some milliseconds between
+/// answers.
 const LAST_ANSWER: u32 = 8;
 
-/// Handles one exception and returns the registers to resume, or null for those of the code
-/// that was interrupted.
+/// Handles one exception and returns the registers to resume, or null for the registers of the
+/// interrupted code.
 extern "C" fn handle_exception(registers: *mut SavedRegisters) -> *mut SavedRegisters {
     // SAFETY: `interrupt.s` passes the registers it pushed to the exception's
     // own stack, where nobody else looks.
@@ -163,7 +165,7 @@ extern "C" fn handle_exception(registers: *mut SavedRegisters) -> *mut SavedRegi
     };
     if answers > 0 {
         if pushed.are_interrupts_enabled() || answers < LAST_ANSWER {
-            // The host has not let this core run. It takes its interrupts now, or soon.
+            // The host has not let this core run. The core takes its interrupts now, or soon.
             return core::ptr::null_mut();
         }
         exception.name = "interrupts disabled for seconds";
@@ -172,7 +174,7 @@ extern "C" fn handle_exception(registers: *mut SavedRegisters) -> *mut SavedRegi
     this_core::get().context().registers()
 }
 
-/// Has the kernel look in on the run. In a heartbeat of this core.
+/// Makes the kernel look in on the run. Called in a heartbeat of this core.
 pub fn look_in(core: &Core, now_ns: u64) {
     if let Some(handlers) = HANDLERS.get() {
         (handlers.beat)(core, now_ns);
@@ -184,7 +186,7 @@ pub fn begin_work() -> ! {
     work()
 }
 
-/// Where every context begins anew.
+/// The start of every restarted context.
 pub extern "C" fn work() -> ! {
     let handlers = HANDLERS
         .get()

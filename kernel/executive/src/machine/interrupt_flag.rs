@@ -1,8 +1,8 @@
-//! Disabling and enabling interrupts, with the time in between measured on request.
+//! Disables and enables interrupts, and measures the time in between on request.
 //!
-//! Code of an app's that has used up its stack must fall alone. So a call of the kernel's falls
-//! before it disables interrupts, which all do here: [`disable`] touches as much of the stack as
-//! a section without them needs.
+//! When app code has used up its stack, only the app may fail. A call into the kernel must
+//! therefore fail before it disables interrupts: [`disable`], the common way to do so, touches as
+//! much of the stack as a section without interrupts needs.
 
 use core::panic::Location;
 
@@ -10,15 +10,15 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::{counted_time, cpu, interrupts_off};
 
-/// Whether no core halts.
+/// Whether cores never halt.
 static STAYS_AWAKE: AtomicBool = AtomicBool::new(false);
 
-/// Has no core halt from now on, for processors whose timers that might stop.
+/// Stops all cores from halting from now on, for processors whose timers might stop in a halt.
 pub fn stay_awake() {
     STAYS_AWAKE.store(true, Ordering::Relaxed);
 }
 
-/// Reports whether no core halts.
+/// Reports whether cores never halt.
 pub fn stays_awake() -> bool {
     STAYS_AWAKE.load(Ordering::Relaxed)
 }
@@ -35,7 +35,7 @@ pub fn disable() -> bool {
     were_enabled
 }
 
-/// Disables interrupts where they are known to be enabled, and no app's function is being called.
+/// Disables interrupts where they are known to be enabled, and no app's function is running.
 #[track_caller]
 pub fn disable_enabled() {
     cpu::clear_interrupt_flag();
@@ -61,11 +61,11 @@ pub fn restore(were_enabled: bool) {
     }
 }
 
-/// Enables interrupts and halts until one has been handled; leaves them enabled. Where cores stay
-/// awake it may return at once, as from an interrupt that changes nothing.
+/// Enables interrupts and halts until one has been handled; leaves them enabled. If cores stay
+/// awake, may return at once, as from an interrupt without effect.
 ///
-/// To be called with interrupts disabled: then no interrupt that the caller has checked
-/// for can leave the processor halted with work to do.
+/// To be called with interrupts disabled: no interrupt already checked for by the caller can then
+/// leave the processor halted with work to do.
 pub fn enable_and_halt() {
     interrupts_off::note_enabled();
     if stays_awake() {

@@ -1,12 +1,12 @@
-//! How long interrupts stay disabled at a stretch.
+//! Measures how long interrupts stay disabled at a stretch.
 //!
-//! While they are, no decision of the scheduler can take effect on that core, so
-//! the longest such section bounds what every latency includes. It is measured
-//! on request (`measure=interrupts`): the two readings of the clock cost more
-//! than many of the sections that they measure.
+//! While interrupts are disabled, no decision of the scheduler can take effect on that core; every
+//! latency therefore includes up to the longest such section. Measured on request
+//! (`measure=interrupts`): the two readings of the clock cost more than many of the measured
+//! sections.
 //!
-//! A section begins where code or an interrupt disables interrupts and ends
-//! where they are enabled again; it may lead through several contexts.
+//! A section begins where code or an interrupt disables interrupts and ends where interrupts are
+//! enabled again; a section may lead through several contexts.
 
 use core::panic::Location;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -34,8 +34,8 @@ pub(super) fn note_enabled() {
     }
 }
 
-// Not a part of each place that disables interrupts: few runs measure, and an image has
-// many such places and little room.
+// Not inlined into each place that disables interrupts: few runs measure, and an image has many
+// such places and little room.
 
 #[cold]
 #[inline(never)]
@@ -61,8 +61,8 @@ fn measure_to_here() {
     }
 }
 
-/// Returns the longest section of all cores so far, in ticks of the time stamp
-/// counter, and where it began; and starts over.
+/// Returns the longest section of all cores so far, in ticks of the time stamp counter, and its
+/// place of origin; then starts over.
 pub fn take_longest() -> Option<(u64, &'static Location<'static>)> {
     let sections = this_core::all().iter().map(|core| {
         let meter = core.meter();

@@ -1,9 +1,8 @@
-//! The machine layer: everything that is particular to x86_64 and a PC.
+//! The machine layer: all code specific to x86_64 and a PC.
 //!
-//! With `memory` and the `entry!` macro it is the only part of the kernel that
-//! contains `unsafe`. It names nothing above it: its users pass it the
-//! functions that it is to call. Each module states the invariant that its
-//! SAFETY comments cite.
+//! Apart from `memory` and the `entry!` macro, only this layer of the kernel contains `unsafe`. The
+//! machine layer names nothing above itself: its users pass in the functions to call. Each module
+//! states the invariant cited by its SAFETY comments.
 
 pub mod abandoned;
 mod accusation;

@@ -1,18 +1,17 @@
-//! Sections of apps' code that one core at a time executes, and that are not preempted.
+//! Sections of app code, executed by one core at a time and never preempted.
 //!
-//! Unlike a [`SpinLock`](super::spinlock::SpinLock), this can be given to code that is
-//! not trusted. Interrupts stay enabled in a section, so what happens there is the
-//! app's: a fault is contained, a budget ends it. Only preemption is put off until the
-//! section ends, as a holder that were preempted would block every core that wants the
-//! lock. It is put off for [`LONGEST_SECTION`] at most: the section of a holder that never
-//! returns delays other instances for that time, and no longer.
+//! Unlike a [`SpinLock`](super::spinlock::SpinLock), a section lock can be given to untrusted code.
+//! Interrupts stay enabled in a section, so events there are the app's: a fault is contained, a
+//! budget ends the section. Only preemption is postponed until the section ends, since a preempted
+//! holder would block every core waiting for the lock. The delay is [`LONGEST_SECTION`] at most: a
+//! holder that never returns delays other instances for that time, and no longer.
 //!
-//! Waiting cores take turns in a circle: who leaves gives the turn to the next core that waits. So
-//! one that waits sees each other core in the lock once at most. A context that waits can be
-//! preempted; it gives up its turn with its core.
+//! Waiting cores take turns in a circle: the leaving core gives the turn to the next waiting core.
+//! A waiting core therefore sees each other core in the lock once at most. A waiting context can be
+//! preempted; the context then gives up its turn with its core.
 //!
-//! **Section invariant**: while the lock of a context's `SectionNote` is not null, it is that of a
-//! frame of [`with`] on the context's stack that has not returned, and borrowed by it.
+//! **Section invariant**: while the lock of a context's `SectionNote` is not null, the lock belongs
+//! to, and is borrowed by, a frame of [`with`] on the context's stack that has not returned.
 
 use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
@@ -24,13 +23,13 @@ use super::this_core::{self, Core};
 use super::timer::{self, Alarm};
 use super::{clock, cpu, interrupt_flag, local_apic, vector};
 
-/// The bit of a lock's state that says so.
+/// The bit of a lock's state for a held lock.
 const IS_HELD: u32 = 1;
 
 const LONGEST_NS: u64 = LONGEST_SECTION.subsec_nanos() as u64;
 
-/// Waits for a lock, and calls `section` in it. Returns how long that took; `None`, without a call,
-/// if the caller is in a section.
+/// Waits for a lock, and calls `section` with the lock held. Returns the duration of the call in
+/// nanoseconds; `None`, without a call, if the caller is in a section already.
 pub fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     if with_core(|core| is_in_section(core.context())) {
         return None;
@@ -45,7 +44,7 @@ pub fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     Some(took_ns)
 }
 
-/// Does `work` on the core that it gets.
+/// Does `work` on the current core, with interrupts disabled.
 fn with_core<R>(work: impl FnOnce(&'static Core) -> R) -> R {
     let were_enabled = interrupt_flag::disable();
     let result = work(this_core::get());
@@ -57,7 +56,8 @@ fn is_in_section(context: &Context) -> bool {
     !context.sections().lock.load(Relaxed).is_null()
 }
 
-/// Enters a section, or waits for the turn of the core. Interrupts are disabled.
+/// Enters a section, or queues the core for its turn. Interrupts are disabled. Reports whether the
+/// section was entered.
 fn enter(lock: &LockWords, core: &Core) -> bool {
     let here = core.index + 1;
     let state = lock.state.load(Relaxed);
@@ -71,7 +71,7 @@ fn enter(lock: &LockWords, core: &Core) -> bool {
     let (word, bit) = bit_of(core.index);
     match enters {
         true => lock.waiting[word].fetch_and(!bit, Relaxed),
-        // Its line is left to the holder while nothing changes.
+        // The cache line is left to the holder while nothing changes.
         false if waits(lock, core.index) => 0,
         false => lock.waiting[word].fetch_or(bit, Relaxed),
     };
@@ -81,17 +81,18 @@ fn enter(lock: &LockWords, core: &Core) -> bool {
     enters
 }
 
-/// Ends a section, and does what was put off. Interrupts are disabled.
+/// Ends a section, and does any postponed preemption. Interrupts are disabled.
 fn leave(lock: &LockWords, core: &Core) {
     release(lock, core.index);
     let note = core.context().sections();
     note.lock.store(core::ptr::null_mut(), Release);
     if note.put_off_ns.swap(0, Relaxed) != 0 {
+        // By an interrupt to this core: only a handler can exchange contexts.
         local_apic::send(core.apic_id(), vector::WAKE);
     }
 }
 
-/// Gives the lock back, and the turn to the next core that waits.
+/// Releases the lock, and passes the turn to the next waiting core.
 fn release(lock: &LockWords, here: u32) {
     let cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
     let mut others = (here + 1..cores).chain(0..here);
@@ -109,7 +110,8 @@ const fn bit_of(core: u32) -> (usize, u64) {
     ((core / 64) as usize, 1 << (core % 64))
 }
 
-/// Gives the turn up of a context that loses its core, if it waits. Interrupts are disabled.
+/// Gives up the turn of a context about to lose its core, if the context waits. Interrupts are
+/// disabled.
 pub fn stop_waiting(context: &Context) {
     let note = context.sections();
     let Some(core) = note.waits_on.load(Relaxed).checked_sub(1) else {
@@ -123,7 +125,7 @@ pub fn stop_waiting(context: &Context) {
     }
 }
 
-/// Ends the section of a context that was abandoned in it. Interrupts are disabled.
+/// Ends the section of an abandoned context. Interrupts are disabled.
 pub(super) fn end(context: &Context) {
     stop_waiting(context);
     let note = context.sections();
@@ -134,8 +136,8 @@ pub(super) fn end(context: &Context) {
     note.put_off_ns.store(0, Relaxed);
 }
 
-/// Puts off the preemption of what runs on this core, `core`, if it is in a section.
-/// Reports whether it is put off. In an interrupt handler.
+/// Postpones the preemption of the context running on this core, `core`, if the context is in a
+/// section. Reports whether the preemption is postponed. Called in an interrupt handler.
 pub fn puts_off(core: &Core, now_ns: u64) -> bool {
     let note = core.context().sections();
     if !is_in_section(core.context()) || note.waits_on.load(Relaxed) != 0 {
@@ -157,7 +159,7 @@ pub fn puts_off(core: &Core, now_ns: u64) -> bool {
     now_ns < end_ns
 }
 
-/// Reports whether a preemption on this core has been put off. In an interrupt handler.
+/// Reports whether a preemption on this core has been postponed. Called in an interrupt handler.
 pub fn has_put_off(core: &Core) -> bool {
     core.context().sections().put_off_ns.load(Relaxed) != 0
 }

@@ -1,10 +1,10 @@
-//! A lock for data that interrupt handlers share with everything else.
+//! A lock for data shared by interrupt handlers and all other code.
 //!
-//! The holder runs with interrupts disabled on its core: a handler that wants
-//! the lock could otherwise wait for the very code that it interrupted. So a
-//! lock is held for a bounded, short time and never across an app's function.
+//! The holder runs with interrupts disabled on its core: otherwise a handler waiting for the lock
+//! could wait for the very code it interrupted. A lock is therefore held for a bounded, short time
+//! and never across an app's function.
 //!
-//! Tickets make it fair: with m cores a core waits for at most m - 1 others.
+//! Tickets make the lock fair: with m cores, a core waits for at most m - 1 others.
 
 use core::cell::UnsafeCell;
 use core::ops::{Deref, DerefMut};
@@ -12,10 +12,10 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::{cpu, interrupt_flag};
 
-/// Data that one core at a time may use, with interrupts disabled.
+/// Data for use by one core at a time, with interrupts disabled.
 ///
-/// **Ticket invariant**: exactly one ticket equals `serving`; its holder alone
-/// touches `data`, from taking the ticket's turn until it serves the next.
+/// **Ticket invariant**: exactly one ticket equals `serving`; its holder alone touches `data`, from
+/// taking the ticket's turn until serving the next.
 pub struct SpinLock<T> {
     next: AtomicU32,
     serving: AtomicU32,
@@ -26,11 +26,11 @@ pub struct SpinLock<T> {
 // sharing the lock moves the data between cores, for which `T: Send` suffices.
 unsafe impl<T: Send> Sync for SpinLock<T> {}
 
-/// Access to the data of a [`SpinLock`] until dropped.
+/// Access to the data of a [`SpinLock`], until dropped.
 pub struct SpinLockGuard<'a, T> {
     lock: &'a SpinLock<T>,
     interrupts_were_enabled: bool,
-    /// The interrupt flag is the core's: the guard must be dropped where it was made.
+    /// The interrupt flag belongs to the core, so the guard must be dropped where it was made.
     _not_send: core::marker::PhantomData<*const ()>,
 }
 
@@ -44,9 +44,9 @@ impl<T> SpinLock<T> {
         }
     }
 
-    /// Waits until the data is free and takes it.
+    /// Waits until the data is free and takes the data.
     ///
-    /// Must not be called by its holder: that waits forever.
+    /// Must not be called by the holder, who would wait forever.
     #[track_caller]
     pub fn lock(&self) -> SpinLockGuard<'_, T> {
         let interrupts_were_enabled = interrupt_flag::disable();
@@ -55,7 +55,8 @@ impl<T> SpinLock<T> {
         guard
     }
 
-    /// Like [`lock`](Self::lock), where interrupts are disabled, and leaves them so.
+    /// Takes the data like [`lock`](Self::lock), with interrupts already disabled, and leaves them
+    /// so.
     pub fn lock_uninterrupted(&self) -> SpinLockGuard<'_, T> {
         let ticket = self.next.fetch_add(1, Ordering::Relaxed);
         while self.serving.load(Ordering::Acquire) != ticket {
@@ -64,7 +65,7 @@ impl<T> SpinLock<T> {
         self.guard(false)
     }
 
-    /// Takes the data if it is free.
+    /// Takes the data if free.
     #[track_caller]
     pub fn try_lock(&self) -> Option<SpinLockGuard<'_, T>> {
         let interrupts_were_enabled = interrupt_flag::disable();
@@ -85,8 +86,7 @@ impl<T> SpinLock<T> {
         None
     }
 
-    /// Returns how often the data has been taken, modulo 2^32: the tickets that
-    /// were given out.
+    /// Returns how often the data has been taken, modulo 2^32: the number of tickets given out.
     pub fn acquisitions(&self) -> u32 {
         self.next.load(Ordering::Relaxed)
     }

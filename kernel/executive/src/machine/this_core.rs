@@ -1,8 +1,8 @@
 //! Each core's own data, found through the gs segment.
 //!
-//! **Own-core invariant**: the gs base of a started core points to its [`Core`],
-//! which is never freed. Other cores may look at a [`Core`] too, through
-//! [`get`]: everything that changes in it is atomic.
+//! **Own-core invariant**: the gs base of a started core points to the core's [`Core`], which is
+//! never freed. Other cores may look at a [`Core`] too, through [`get`]: all changing fields are
+//! atomic.
 
 use core::arch::asm;
 use core::panic::Location;
@@ -16,20 +16,20 @@ use super::cpu;
 use super::descriptors::{self, TaskState};
 use fass::platform::SetOnce;
 
-/// The stacks with which a core begins: their tops, each with a guard page below,
-/// and the context that it runs first.
+/// The initial stacks of a core: their tops, each with a guard page below, and the core's first
+/// context.
 pub struct CoreStacks {
-    /// The context that the core runs first.
+    /// The context the core runs first.
     pub first_context: Parked,
-    /// Runs interrupt handlers.
+    /// The stack for interrupt handlers.
     pub handler: u64,
-    /// Run exceptions: ordinary, double fault, non-maskable, machine check.
+    /// The stacks for exceptions: ordinary, double fault, non-maskable, machine check.
     pub exceptions: [u64; 4],
 }
 
 /// A meter of how long a core's interrupts stay disabled, in ticks of the time stamp counter.
 pub(super) struct CoreMeter {
-    /// When the current section began; 0 if there is none.
+    /// When the current section began, in ticks; 0 if none is in progress.
     pub(super) began: AtomicU64,
     pub(super) began_at: AtomicPtr<Location<'static>>,
     pub(super) longest: AtomicU64,
@@ -47,19 +47,44 @@ impl CoreMeter {
     }
 }
 
-/// A core's part in the turns of those that compute ([`turns`](super::turns)).
+/// A core's part in the time slices of computing cores ([`turns`](super::turns)).
+///
+/// ```text
+///              1                2               4                5
+///      None --------> Comes --------> Fresh --------> Computes --------> Waits
+///       | ^                             ^              |    ^              |
+///       | |              3              |              |    |      6       |
+///       | |                             |              |    +--------------+
+///       +-|-----------------------------+              |                   |
+///         |                     7 (from any part)      v                   v
+///         +----------------------------------------------------------------+
+/// ```
+///
+/// 1. `turns::come`: an interrupt handler has chosen a new worker for the core.
+/// 2. `turns::join`, called by `turns::enter` before a function begins.
+/// 3. `turns::join`: as 2, where no interrupt came before, or to continue a suspended instance.
+/// 4. `turns::wait`, the first turn, once no core has the turn and none is urgent: a short turn if
+///    other cores are fresh, too.
+/// 5. `turns::pass`, at the end of an interrupt after the turn's alarm has fired.
+/// 6. `turns::wait`, likewise, once no core is fresh and no other waiting core is next.
+/// 7. `turns::leave` as the instance halts, watches the clock or is preempted; `turns::rest` as the
+///    core has nothing to compute.
+///
+/// A core keeps its part from one instance to the next, also after a fault. No part returns to
+/// Fresh but through None. If a core takes over the turn of a silent core, both parts are Computes
+/// for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum TimeSlicePart {
-    /// It takes no part.
+    /// The core takes no part.
     None,
-    /// It has been given an instance, and is on its way to it.
+    /// The core has got an instance in an interrupt, and is about to start the instance.
     Comes,
-    /// It waits for its first turn.
+    /// The core waits for its first turn.
     Fresh,
-    /// It has the turn.
+    /// The core has the turn.
     Computes,
-    /// It waits for its next turn.
+    /// The core waits for its next turn.
     Waits,
 }
 
@@ -71,46 +96,47 @@ pub struct Core {
     /// The position among the cores: 0 is the boot processor.
     pub index: u32,
     apic_id: u32,
-    /// The group of cores that it is in, a number that the layer above chooses.
+    /// The core's group, a number chosen by the layer above.
     pub group: AtomicU32,
-    /// Its place in the group, likewise.
+    /// The core's place in its group, likewise.
     pub place: AtomicU32,
     exception_stacks: [u64; 4],
     task_state: AtomicPtr<TaskState>,
-    /// The context that runs here.
+    /// The context running here.
     context: AtomicPtr<Context>,
-    /// A context that ran here last and has nothing more to do, or null.
+    /// The context that ran here last, without further work, or null.
     spare: AtomicPtr<Context>,
-    /// Another core has assigned work to this one.
+    /// Another core has assigned work to this core.
     pub wake: AtomicBool,
-    /// This core watches `wake`: it needs no interrupt to see it.
+    /// This core watches `wake`, so a wake-up needs no interrupt.
     pub(super) watches: AtomicBool,
-    /// Decisions are followed at the end of the interrupt that is being handled.
+    /// Decisions are followed at the end of the current interrupt.
     pub follows: AtomicBool,
-    /// Its [`TimeSlicePart`] in the turns.
+    /// The core's [`TimeSlicePart`] in the turns.
     part: AtomicU8,
-    /// The times at which this core's timer shall fire, each `u64::MAX` if never.
+    /// The times for this core's timer to fire, in nanoseconds on the clock, each `u64::MAX` if
+    /// never.
     pub alarms: [AtomicU64; 4],
-    /// Whether the timer is armed at the end of the interrupt that is being handled.
+    /// Whether the timer is armed only at the end of the current interrupt.
     pub(super) arms_later: AtomicBool,
     /// The number of timer interrupts taken.
     pub timer_interrupts: AtomicU64,
-    /// When this core took its last interrupt, by its timer or from another core.
+    /// When this core took its last interrupt, from its timer or another core, in nanoseconds on
+    /// the clock.
     pub interrupted_ns: AtomicU64,
     pub(super) accusation: AccusationBox,
-    /// The time between two heartbeats of this core, 0 if it has none.
+    /// The time between two heartbeats of this core in nanoseconds, 0 if there are none.
     pub heartbeat_ns: AtomicU64,
     interrupts_off: CoreMeter,
-    /// By how much the counter has been behind another core's, in ticks.
+    /// How far the counter has been behind another core's, in ticks.
     pub(super) behind_ticks: AtomicU64,
-    /// Whether it is an efficiency core.
+    /// Whether this is an efficiency core.
     pub(super) is_efficient: AtomicBool,
-    /// The instance that runs here, in two words that the layer above chooses; for reports of
-    /// panics.
+    /// The running instance, in two words chosen by the layer above; for reports of panics.
     pub running: [AtomicU64; 2],
 }
 
-/// Where `interrupt.s` finds the handler stack.
+/// The offset where `interrupt.s` finds the handler stack.
 pub(super) const HANDLER_STACK_OFFSET: usize = core::mem::offset_of!(Core, handler_stack);
 
 static CORES: SetOnce<Box<[Core]>> = SetOnce::new();
@@ -145,12 +171,12 @@ pub fn create(cores: impl Iterator<Item = (u32, CoreStacks)>) {
         is_efficient: AtomicBool::new(false),
         running: [const { AtomicU64::new(u64::MAX) }; 2],
     });
-    // A second call would come from a second boot, which there is not.
+    // A second call could only come from a second boot, and the kernel boots once.
     CORES.set(cores.collect());
 }
 
-/// Makes the processor that executes this the core with APIC id `apic_id`: loads its
-/// segments and interrupt stacks.
+/// Makes the calling processor the core with APIC id `apic_id`: loads its segments and interrupt
+/// stacks.
 pub(super) fn load(apic_id: u32) -> &'static Core {
     const GS_BASE: u32 = 0xc000_0101;
     let core = all()
@@ -178,10 +204,10 @@ pub(super) fn load(apic_id: u32) -> &'static Core {
     core
 }
 
-/// Returns the data of the core that executes this.
+/// Returns the data of the calling core.
 ///
-/// The answer stays right only while the caller cannot move to another core:
-/// with interrupts disabled, or in code that is not preempted.
+/// The answer stays right only while the caller cannot move to another core: with interrupts
+/// disabled, or in code without preemption.
 pub fn get() -> &'static Core {
     let address: u64;
     // SAFETY: reads the first field of the core's data (own-core invariant).
@@ -196,8 +222,8 @@ pub fn is_ready() -> bool {
     CORES.get().is_some()
 }
 
-/// Returns the first word of what runs on the core that executes this, in the sense of
-/// [`Core::note_running`]. Interrupts are disabled.
+/// Returns the first word of the calling core's running instance, as set by [`Core::note_running`].
+/// Interrupts are disabled.
 pub fn running() -> Option<u64> {
     let word = is_ready().then(|| get().running[0].load(Ordering::Relaxed));
     word.filter(|word| *word != u64::MAX)
@@ -213,12 +239,12 @@ unsafe extern "C" {
     fn resume_context() -> !;
 }
 
-/// Resumes the context with these registers.
+/// Resumes the context with the given registers.
 ///
 /// # Safety
 ///
-/// They are those of a context that does not run and that this core has made its own;
-/// interrupts are disabled.
+/// The registers belong to a context that does not run and now belongs to this core; interrupts are
+/// disabled.
 unsafe fn resume(registers: *mut SavedRegisters) -> ! {
     // SAFETY: the caller's condition is what `interrupt.s` asks for.
     unsafe {
@@ -231,26 +257,26 @@ unsafe fn resume(registers: *mut SavedRegisters) -> ! {
     }
 }
 
-/// Has this core go on with `next` when the current interrupt's handler
-/// returns, and returns the context that was interrupted.
+/// Makes this core continue with `next` when the current interrupt's handler returns, and returns
+/// the interrupted context.
 ///
 /// # Safety
 ///
-/// The caller is a handler of an interrupt; or of an exception, then what it
-/// returns must not be resumed.
+/// The caller is a handler of an interrupt; or of an exception, in which case the returned context
+/// must not be resumed.
 pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
     let last = get().run_next(next);
     // SAFETY: the context runs no more: `interrupt.s` now resumes `next`.
     unsafe { Parked::from_context(last) }
 }
 
-/// Leaves the context that runs, for good, for `next`. The context left becomes
-/// this core's spare context.
+/// Leaves the running context, for good, for `next`. The context left becomes this core's spare
+/// context.
 ///
 /// # Safety
 ///
 /// 1. The caller runs on a context's own stack, with interrupts disabled.
-/// 2. Nothing that lives on that stack is used any more.
+/// 2. Nothing on that stack is used any more.
 /// 3. This core's spare context has been taken by [`take_spare_context`].
 pub(super) unsafe fn leave_context(next: Parked) -> ! {
     let core = get();
@@ -263,8 +289,7 @@ pub(super) unsafe fn leave_context(next: Parked) -> ! {
     unsafe { resume(registers) }
 }
 
-/// Takes the context that was left here last, to be restarted or to be given
-/// away. Interrupts are disabled.
+/// Takes the context last left here, to be restarted or given away. Interrupts are disabled.
 pub fn take_spare_context() -> Option<Parked> {
     let spare = get().spare.swap(core::ptr::null_mut(), Ordering::Relaxed);
     // SAFETY: a pointer that is not null comes from `leave_context`.
@@ -290,19 +315,19 @@ impl Core {
         }
     }
 
-    /// Notes the core's part in the turns.
+    /// Sets the core's part in the turns.
     pub(super) fn set_part(&self, part: TimeSlicePart) {
         self.part.store(part as u8, Ordering::Relaxed);
     }
 
-    /// Returns the context that runs on this core.
+    /// Returns the context running on this core.
     pub fn context(&self) -> &'static Context {
         // SAFETY: the pointer comes from a `&'static Context` (`create`, `run_next`).
         unsafe { &*self.context.load(Ordering::Relaxed) }
     }
 
-    /// Notes that this core runs `next` from the coming switch on, and returns
-    /// the context that it has run.
+    /// Notes that this core runs `next` from the coming switch on, and returns the previous
+    /// context.
     fn run_next(&self, next: Parked) -> &'static Context {
         let last = self.context();
         let next = next.into_context();
@@ -320,14 +345,14 @@ impl Core {
         !self.spare.load(Ordering::Relaxed).is_null()
     }
 
-    /// Notes what runs here, as two numbers.
+    /// Notes the running instance, as two numbers.
     pub fn note_running(&self, fields: [u64; 2]) {
         for (place, field) in self.running.iter().zip(fields) {
             place.store(field, Ordering::Relaxed);
         }
     }
 
-    /// Returns what this core has measured of its sections without interrupts.
+    /// Returns this core's meter of sections without interrupts.
     pub(super) const fn meter(&self) -> &CoreMeter {
         &self.interrupts_off
     }
@@ -337,7 +362,7 @@ impl Core {
         self.is_efficient.load(Ordering::Relaxed)
     }
 
-    /// Returns the id that interrupts are addressed to.
+    /// Returns the id for addressing interrupts to this core.
     pub const fn apic_id(&self) -> u32 {
         self.apic_id
     }

@@ -1,15 +1,15 @@
 //! Each core's alarms, all on its one hardware timer.
 //!
-//! An *alarm* is a time at which the core shall be interrupted, for one of a
-//! few fixed purposes. The hardware timer is armed for the earliest. It may
-//! fire a little early or late: what is due is decided by the clock alone.
+//! An *alarm* is a time to interrupt the core, for one of a few fixed purposes. The hardware timer
+//! is armed for the earliest alarm. The hardware may fire a little early or late: the clock alone
+//! decides whether an alarm is due.
 
 use core::sync::atomic::Ordering;
 
 use super::this_core::{self, Core};
 use super::{clock, counted_time, interrupt_flag, local_apic};
 
-/// The purpose of an alarm; each core has one of each.
+/// The purpose of an alarm; each core has one alarm of each purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alarm {
     /// The scheduler's next event.
@@ -26,18 +26,18 @@ pub enum Alarm {
 pub fn set(alarm: Alarm, at_ns: u64) {
     let were_enabled = interrupt_flag::disable();
     let core = this_core::get();
-    // Writing the timer costs a virtual machine an exit: only if there is need.
+    // Writing the timer costs a virtual machine an exit: only when the alarm changes.
     if core.alarms[alarm as usize].swap(at_ns, Ordering::Relaxed) != at_ns {
         arm(core);
     }
     interrupt_flag::restore(were_enabled);
 }
 
-/// Makes sure that the alarm of this core, `core`, is not later than `at_ns`. It may be
-/// earlier: for an alarm whose handler looks at the clock again, that costs an
-/// interrupt now and then instead of a write of the timer each time.
+/// Ensures that the alarm of this core, `core`, is not later than `at_ns`. The alarm may be
+/// earlier: if its handler looks at the clock again, an early alarm costs an interrupt now and then
+/// instead of a write of the timer each time.
 ///
-/// Inlined, as each hop with a budget asks.
+/// Inlined, as each start of an instance with a budget calls this.
 #[inline(always)]
 pub fn set_no_later(core: &Core, alarm: Alarm, at_ns: u64) {
     if core.alarms[alarm as usize].load(Ordering::Relaxed) > at_ns {
@@ -45,8 +45,8 @@ pub fn set_no_later(core: &Core, alarm: Alarm, at_ns: u64) {
     }
 }
 
-/// Takes an alarm that is due at `now_ns`: reports whether it was, and if so
-/// sets it to never. To be followed by [`arm_earliest`].
+/// Takes an alarm due at `now_ns`: reports whether the alarm was due, and if so sets the alarm to
+/// never. To be followed by [`arm_earliest`].
 pub fn take_due(alarm: Alarm, now_ns: u64) -> bool {
     let slot = &this_core::get().alarms[alarm as usize];
     let due = slot.load(Ordering::Relaxed) <= now_ns;
@@ -69,8 +69,8 @@ pub fn arm_earliest() {
     arm(core);
 }
 
-/// Begins a timer's interrupt: removes from its time what depends on the host, see
-/// [`counted_time`]. Until [`arm_earliest`] ends it, alarms that are set only become known.
+/// Begins a timer's interrupt: makes its time independent of the host, see [`counted_time`]. Until
+/// [`arm_earliest`] ends the interrupt, alarms set meanwhile are only noted.
 pub(super) fn settle() {
     let core = this_core::get();
     counted_time::settle(earliest_ns(core));
@@ -90,7 +90,7 @@ fn arm(core: &Core) {
     }
 }
 
-/// Returns the time of the core's earliest alarm, `u64::MAX` if it has none.
+/// Returns the time of the core's earliest alarm in nanoseconds, `u64::MAX` if there is none.
 fn earliest_ns(core: &Core) -> u64 {
     let times = core.alarms.iter().map(|at| at.load(Ordering::Relaxed));
     times.min().unwrap_or(u64::MAX)

@@ -1,42 +1,42 @@
-//! Turns of computing cores, where instructions are counted.
+//! Turns of computing cores, for machines where instructions are counted.
 //!
-//! With `-icount` QEMU executes one core at a time, and a core's *visit* lasts until the
-//! next timer of any core ends, or until the core halts, executes a `pause`, interrupts
-//! another core or arms the timer that is the next to end. A function that computes does
-//! nothing of that. For as long as no timer ends, all others wait: those that compute,
-//! those that have been woken, and those whose own timer has ended. And where a timer's end
-//! cuts a visit short, QEMU 7.2 may pass over the core behind it
+//! With `-icount` QEMU executes one core at a time. A core's *visit* lasts until the next timer of
+//! any core ends, or until the core halts, executes a `pause`, interrupts another core or arms the
+//! timer due next. A computing function does none of these. For as long as no timer ends, all other
+//! cores wait: the computing ones, the woken ones, and those whose own timer has ended. And where a
+//! timer's end cuts a visit short, QEMU 7.2 may skip the core behind
 //! ([`counted_time`](super::counted_time)), so timers alone give nobody a fair share.
 //!
-//! So the cores that compute take *turns*, by a rule of the kernel's own:
+//! The computing cores therefore take *turns*, by a rule of the kernel's own:
 //!
-//! - At most one core has the turn. It ends after [`TURN_NS`], by the core's own timer.
-//! - A core without it waits for it, in the interrupt's handler or before it calls a
-//!   function: it executes a `pause` whenever it is visited. An interrupt does not wait:
-//!   the core handles it at once, and goes on waiting.
-//! - A core that has just got something to compute is *fresh*, and goes before those that
-//!   have had a turn. If others are fresh, too, its first turn is a short one
-//!   ([`FIRST_TURN_NS`]): what takes no longer need not wait for what does.
+//! - At most one core has the turn. The turn ends after [`TURN_NS`], by the core's own timer.
+//! - A core without the turn waits, in the interrupt's handler or before calling a function: the
+//!   core executes a `pause` at every visit. An interrupt does not wait: the core handles the
+//!   interrupt at once, and resumes waiting.
+//! - A core with a new instance to compute is *fresh*, and goes before cores that have already had
+//!   a turn. If other cores are fresh, too, the first turn is a short one ([`FIRST_TURN_NS`]):
+//!   short functions need not wait for long functions.
 //! - No turn begins while any core handles an interrupt or wakes others.
-//! - A core that has the turn and takes no interrupts keeps it for some milliseconds only.
+//! - A core with the turn that takes no interrupts keeps the turn for some milliseconds only.
 //!
-//! It follows that at any time all cores but one are soon through with a visit, and that one
-//! is after [`TURN_NS`] at the latest. Then all are visited before the next turn begins. So
-//! an interrupt, and the start of an instance, wait for little more than a turn, or two,
-//! however many cores compute; and each of n that compute gets an n-th of the clock.
+//! It follows that at any time all cores but one soon finish a visit, and the remaining core does
+//! so after [`TURN_NS`] at the latest. Then all are visited before the next turn begins. An
+//! interrupt, and the start of an instance, therefore wait for little more than a turn, or two,
+//! however many cores compute; and each of n computing cores gets an n-th of the clock.
 //!
-//! The time for which an instance waits for its turn does not count as its execution: it
-//! uses up no budget. It does pass on the clock, for all.
+//! The time an instance waits for its turn does not count as execution and uses up no budget. The
+//! clock advances meanwhile, for all.
 //!
-//! Core 0's background computes, too, and has no turn: it gives way. Every [`FIRST_TURN_NS`] a
-//! timer ends its visit, whatever it does, and it goes on once no core is fresh
-//! ([`begin_background`]). Where it has interrupts disabled it gives way once for each piece of
-//! text and each look at the scheduler ([`look_up`]).
+//! Core 0's background computes, too, and has no turn: the background gives way. Every
+//! [`FIRST_TURN_NS`] a timer ends the background's visit, whatever the background does, and the
+//! background continues once no core is fresh ([`begin_background`]). With interrupts disabled the
+//! background gives way once for each piece of text and each look at the scheduler ([`look_up`]).
 //!
-//! A core that halts for an instance or watches the clock (`occupation`, `Event::wait`)
-//! takes no part. All this is off unless [`enable`] is called: real cores compute at the
-//! same time, and a core that is alone need not share. The statics here need no order
-//! among each other: instructions of one core at a time are executed.
+//! A core halting for an instance or watching the clock (`occupation`, `Event::wait`) takes no
+//! part. The parts of a core, and the changes between them, are in `this_core::TimeSlicePart`. All
+//! turns are off unless [`enable`] is called: real cores compute at the same time, and a lone core
+//! need not share. The statics here need no order among each other: only one core at a time
+//! executes instructions.
 
 use core::panic::Location;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -45,14 +45,14 @@ use super::this_core::{self, Core, TimeSlicePart};
 use super::timer::{self, Alarm};
 use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
 
-/// How long a turn is. Its end costs some 250 instructions.
+/// The length of a turn, in nanoseconds. The end of a turn costs some 250 instructions.
 const TURN_NS: u64 = 8_000;
 
-/// How long the first turn of a fresh core is, if others are fresh, too.
+/// The length of a fresh core's first turn, in nanoseconds, if other cores are fresh, too.
 const FIRST_TURN_NS: u64 = 2_000;
 
-/// How often a core that waits looks for the turn before it takes it from a core that
-/// has it and does not pass it: one that takes no interrupts. Some milliseconds.
+/// How often a waiting core looks for the turn before taking over the turn of a core that does not
+/// pass the turn because it takes no interrupts. Some milliseconds.
 const MOST_LOOKS: u32 = 100_000;
 
 static IS_ENABLED: AtomicBool = AtomicBool::new(false);
@@ -60,21 +60,21 @@ static IS_ENABLED: AtomicBool = AtomicBool::new(false);
 /// No core.
 const NONE: u32 = u32::MAX;
 
-/// The core that has the turn.
+/// The core with the turn.
 static HAS_TURN: AtomicU32 = AtomicU32::new(NONE);
 
-/// The core that has it next, if that waits and none is fresh.
+/// The core with the next turn, if still waiting and no core is fresh.
 static NEXT: AtomicU32 = AtomicU32::new(NONE);
 
-/// How many cores are fresh, or about to be.
+/// The number of cores fresh, or about to be.
 static FRESH: AtomicU32 = AtomicU32::new(0);
 
-/// How many cores handle an interrupt, or wake others.
+/// The number of cores handling an interrupt, or waking others.
 static URGENT: AtomicU32 = AtomicU32::new(0);
 
-/// Makes cores take turns from now on, if there are several. To be called before the others have
-/// started: one that handles an interrupt meanwhile would end what it has not begun, and the count of
-/// those that do would never be 0 again.
+/// Makes cores take turns from now on, if there are several cores. To be called before the other
+/// cores start: a core handling an interrupt during the call would end an urgent section without
+/// having begun one, and the count of urgent cores would never be 0 again.
 pub fn enable() {
     IS_ENABLED.store(this_core::all().len() > 1, Ordering::Relaxed);
 }
@@ -83,7 +83,7 @@ fn is_enabled() -> bool {
     IS_ENABLED.load(Ordering::Relaxed)
 }
 
-/// Notes that this core does what no turn may come before.
+/// Begins an urgent section: no turn may begin before its end.
 #[inline]
 pub fn begin_urgent() {
     if is_enabled() {
@@ -91,7 +91,7 @@ pub fn begin_urgent() {
     }
 }
 
-/// Notes that it has done it.
+/// Ends this core's urgent section.
 #[inline]
 pub fn end_urgent() {
     if is_enabled() {
@@ -99,8 +99,8 @@ pub fn end_urgent() {
     }
 }
 
-/// Notes in an interrupt that this core goes on with an instance after it. Until then no turn
-/// of another core begins, which the instance would have to wait for.
+/// Notes in an interrupt that this core continues with an instance afterwards. Until then no turn
+/// of another core begins, so the instance need not wait for such a turn.
 #[inline]
 pub fn come(core: &Core) {
     if is_enabled() && core.part() == TimeSlicePart::None {
@@ -108,10 +108,10 @@ pub fn come(core: &Core) {
     }
 }
 
-/// Whether core 0's background computes; it does nothing else while it halts.
+/// Whether core 0's background computes; otherwise the background only halts.
 static BACKGROUND: AtomicBool = AtomicBool::new(false);
 
-/// Notes that the background computes from now on, and has it give way, by and by. Interrupts are
+/// Notes that the background computes from now on, and makes it give way regularly. Interrupts are
 /// enabled.
 pub fn begin_background() {
     if is_enabled() {
@@ -130,11 +130,11 @@ pub fn end_background() {
     }
 }
 
-/// Yields to cores that were just given an instance, until an interrupt is pending. The background
-/// does so again in a short while. Interrupts are disabled.
+/// Yields to cores with a new instance, until an interrupt is pending. The background does so again
+/// after a short while. Interrupts are disabled.
 fn give_way(core: &Core) {
-    // One visit for all others: one that has been woken becomes fresh in it. And one more behind:
-    // a core that begins its turn arms its timer, which ends its visit.
+    // One visit for all others, during which a woken core becomes fresh. And one more at the end: a
+    // core that begins its turn arms its timer, and arming ends its visit.
     cpu::relax();
     while FRESH.load(Ordering::Relaxed) != 0 && !local_apic::is_interrupt_pending() {
         cpu::relax();
@@ -143,21 +143,21 @@ fn give_way(core: &Core) {
     keep_giving_way(core);
 }
 
-/// Sets the timer by which the background gives way.
+/// Sets the timer that makes the background give way.
 fn keep_giving_way(core: &Core) {
     if core.index == 0 && BACKGROUND.load(Ordering::Relaxed) {
         timer::set(Alarm::Hold, clock::now_ns().saturating_add(FIRST_TURN_NS));
     }
 }
 
-/// Gives all other cores a visit, in work for people that may have interrupts disabled.
+/// Gives all other cores a visit, during work for people that may have interrupts disabled.
 pub fn look_up() {
     if is_enabled() {
         cpu::relax();
     }
 }
 
-/// Makes this core fresh unless it takes part already: it goes on with an instance.
+/// Makes this core fresh unless the core takes part already: the core continues with an instance.
 /// Interrupts are disabled.
 #[inline]
 pub fn join(core: &Core) {
@@ -166,7 +166,7 @@ pub fn join(core: &Core) {
     }
 }
 
-/// Ends this core's part: it has nothing to compute. Its alarm is left as it is.
+/// Ends this core's part: the core has nothing to compute. Leaves the core's alarm as it is.
 /// Interrupts are disabled.
 #[inline]
 pub fn leave(core: &Core) {
@@ -175,16 +175,16 @@ pub fn leave(core: &Core) {
     }
 }
 
-/// Ends the alarm of an instance's hold. One of the core's turn stays, or that would have no end.
-/// Interrupts are disabled.
+/// Ends the alarm of an instance's hold. An alarm of the core's turn stays, or the turn would have
+/// no end. Interrupts are disabled.
 pub fn end_hold(core: &Core) {
     if core.part() != TimeSlicePart::Computes {
         timer::set(Alarm::Hold, u64::MAX);
     }
 }
 
-/// Like [`leave`], and sees to it that the core is not interrupted for a turn's end. Core 0 goes
-/// back to its background.
+/// Ends this core's part like [`leave`], and prevents an interrupt for a turn's end. Core 0 returns
+/// to its background.
 #[inline]
 pub fn rest(core: &Core) {
     if is_enabled() {
@@ -196,8 +196,8 @@ pub fn rest(core: &Core) {
     }
 }
 
-/// Returns when the instance may compute, on any core: waits for a turn, and handles the
-/// interrupts that come meanwhile. Interrupts are disabled before and after.
+/// Returns when the instance may compute, on any core: waits for a turn, and handles interrupts
+/// while waiting. Interrupts are disabled before and after.
 #[inline]
 pub fn enter() {
     if is_enabled() && !this_core::get().context().is_background() {
@@ -213,6 +213,8 @@ fn enter_in_turn() {
         if core.part() == TimeSlicePart::Computes {
             return;
         }
+        // Not measured as a section without interrupts: the wait ends as soon as an interrupt is
+        // pending.
         interrupts_off::note_enabled();
         let has_turn = wait(core);
         interrupts_off::note_disabled(Location::caller());
@@ -225,8 +227,8 @@ fn enter_in_turn() {
     }
 }
 
-/// Like [`enter`], for an instance that this core goes on with outside any interrupt: as
-/// soon as interrupts are enabled, it waits for its turn as after one.
+/// Waits like [`enter`], for an instance continued outside any interrupt: once interrupts are
+/// enabled, the core waits for its turn as after an interrupt.
 #[inline]
 pub fn enter_by_interrupt(core: &Core) {
     if is_enabled() && core.part() == TimeSlicePart::Fresh {
@@ -234,7 +236,8 @@ pub fn enter_by_interrupt(core: &Core) {
     }
 }
 
-/// Like [`leave`], for an instance that watches the clock. Interrupts are enabled.
+/// Ends this core's part like [`leave`], for an instance that watches the clock. Interrupts are
+/// enabled.
 pub fn stand_back() {
     if is_enabled() {
         interrupt_flag::disable();
@@ -243,7 +246,7 @@ pub fn stand_back() {
     }
 }
 
-/// Like [`enter`], for that instance afterwards.
+/// Waits for a turn like [`enter`], for the same instance afterwards.
 pub fn come_back() {
     if is_enabled() {
         interrupt_flag::disable();
@@ -252,8 +255,7 @@ pub fn come_back() {
     }
 }
 
-/// Ends an interrupt: if this core has to wait for its turn, waits, for that or for
-/// another interrupt.
+/// Ends an interrupt: if this core has to wait, waits for its turn or for another interrupt.
 #[inline]
 pub(super) fn end_interrupt() {
     if is_enabled() {
@@ -273,6 +275,7 @@ fn end_interrupt_in_turn() {
             return;
         }
         TimeSlicePart::None | TimeSlicePart::Comes => return,
+        // With the alarm still set, the turn has not ended: another interrupt came.
         TimeSlicePart::Computes if timer::is_set(Alarm::Hold) => return,
         TimeSlicePart::Computes => pass(core),
         TimeSlicePart::Fresh | TimeSlicePart::Waits => {}
@@ -281,6 +284,7 @@ fn end_interrupt_in_turn() {
 }
 
 /// Ends this core's turn.
+// In a circle, from the next core on, so that each computing core gets the same share.
 fn pass(core: &Core) {
     let (before, from_here) = this_core::all().split_at(core.index as usize);
     let mut others = from_here.iter().skip(1).chain(before);
@@ -289,8 +293,8 @@ fn pass(core: &Core) {
     set_part(core, TimeSlicePart::Waits);
 }
 
-/// Waits until this core has the turn, or until an interrupt is pending. Reports whether
-/// it has the turn.
+/// Waits until this core has the turn, or until an interrupt is pending. Reports whether this core
+/// has the turn.
 fn wait(core: &Core) -> bool {
     let since_ns = clock::now_ns();
     let mut looks = 0;
@@ -311,8 +315,8 @@ fn wait(core: &Core) -> bool {
     has_turn
 }
 
-/// Begins this core's turn, if it may, or if it `takes_over` that of another. Returns how
-/// long it is.
+/// Begins this core's turn, if allowed, or if this core `takes_over` another core's turn. Returns
+/// the length of the turn in nanoseconds.
 fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
     let holder = HAS_TURN.load(Ordering::Relaxed);
     if (holder != NONE && !takes_over) || URGENT.load(Ordering::Relaxed) != 0 {
@@ -324,7 +328,7 @@ fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
     begun.is_ok().then_some(length_ns)
 }
 
-/// Returns how long this core's turn is, if it has the next one.
+/// Returns the length of this core's turn in nanoseconds, if this core has the next turn.
 fn length_of_turn(core: &Core) -> Option<u64> {
     let fresh = FRESH.load(Ordering::Relaxed);
     let next = this_core::all().get(NEXT.load(Ordering::Relaxed) as usize);
@@ -341,7 +345,7 @@ fn length_of_turn(core: &Core) -> Option<u64> {
 fn set_part(core: &Core, part: TimeSlicePart) {
     let before = core.part();
     if before == TimeSlicePart::Computes && part != TimeSlicePart::Computes {
-        // Unless the turn has been taken over.
+        // Unless another core has taken over the turn.
         let (mine, order) = (core.index, Ordering::Relaxed);
         let _ = HAS_TURN.compare_exchange(mine, NONE, order, order);
     }

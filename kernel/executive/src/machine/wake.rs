@@ -1,4 +1,4 @@
-//! How one core makes another look for work.
+//! Wake-ups: how one core makes another look for work.
 
 use core::sync::atomic::Ordering;
 
@@ -6,11 +6,11 @@ use super::this_core::{self, Core};
 use super::{local_apic, turns, vector};
 
 impl Core {
-    /// Makes this core look for work, by an interrupt unless it watches for the
-    /// word or is the core that executes this.
+    /// Makes this core look for work, by an interrupt unless the core watches for the wake-up or is
+    /// the calling core.
     pub fn wake_up(&self) {
-        // In one order with what `begin_watch` does: either this core sees there
-        // that it is to wake up, or this sees here that it does not watch yet.
+        // In one order with `begin_watch`: either the watching core sees there that it is to wake
+        // up, or the caller sees here that the core does not watch yet.
         self.wake.store(true, Ordering::SeqCst);
         if self.index != this_core::get().index && !self.watches.load(Ordering::SeqCst) {
             turns::begin_urgent();
@@ -19,12 +19,12 @@ impl Core {
         }
     }
 
-    /// Tells the others that this core watches `wake` from now on.
+    /// Tells all other cores that this core watches `wake` from now on.
     pub fn begin_watch(&self) {
         self.watches.store(true, Ordering::SeqCst);
     }
 
-    /// Tells the others that this core no longer watches `wake`.
+    /// Tells all other cores that this core no longer watches `wake`.
     pub fn end_watch(&self) {
         self.watches.store(false, Ordering::SeqCst);
     }

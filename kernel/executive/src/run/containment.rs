@@ -1,26 +1,25 @@
-//! Faults of apps, kept from harming anyone else.
+//! Containment of app faults: a faulty subtask harms nobody else.
 //!
-//! A subtask that panics, causes an exception or exceeds its budget ends its DAG:
-//! what it may have left half done can belong to that DAG alone. If that DAG survives
-//! the fault, it costs the job only. The fault is reported with DAG, subtask, job,
-//! core, cause and place, and all other DAGs go on.
+//! A subtask that panics, causes an exception or exceeds its budget ends its DAG: work left half
+//! done can belong to that DAG alone. If the DAG survives the fault, only the job is lost. A report
+//! states the fault with DAG, subtask, job, core, cause and place, and all other DAGs continue.
 //!
-//! The core leaves the context that it happened in for another one, within an interrupt, and
-//! the context goes back into the stock. Until the machine is reset a fault keeps all that the
-//! function owned on the heap, and the app's locks that it held.
+//! Within an interrupt the core leaves the faulty context for another one, and the faulty context
+//! goes back into the stock. Until the machine is reset, the function's heap memory and the app's
+//! locks held by the function stay lost.
 //!
-//! # The report: noted at the fault, told by core 0's background
+//! # The report: noted at the fault, printed by core 0's background
 //!
-//! To make a report's text takes some 100 us, so nobody waits for that. The instance is ended
-//! first, and what is known of its fault becomes a *note* of fixed size. That takes about as long as
-//! the step of the scheduler that it comes with, and all else is left to the background, with
+//! Making a report's text takes some 100 us, so nobody waits for the text. The kernel first ends
+//! the instance and keeps the known facts of its fault as a *note* of fixed size. Both take about
+//! as long as the accompanying step of the scheduler; all the rest is left to the background, with
 //! interrupts enabled. [`PLACES`] notes can wait; further faults are counted, and the journal has
 //! them.
 //!
-//! That is possible because code that may be at fault is told apart by the
-//! interrupt flag: apps run with interrupts enabled, while code that holds a
-//! lock of the kernel's, or handles an interrupt, has them disabled. A fault there, or
-//! outside any subtask, is the kernel's and ends the run (see `panic`).
+//! Containment is possible because the interrupt flag tells possibly faulty code apart: apps run
+//! with interrupts enabled, while kernel code that holds a lock or handles an interrupt has
+//! interrupts disabled. A fault in kernel code, or outside any subtask, is the kernel's own and
+//! ends the run (see `panic`).
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
@@ -41,22 +40,22 @@ use crate::text::backtrace::{Backtrace, CodeLocation};
 use fass::edge::Excerpt;
 use front::json;
 
-/// How much of a panic's message is shown, of its place, and of a name, in bytes. With these a
+/// The most bytes shown of a panic's message, of its place, and of a name. Within these limits a
 /// report's machine line stays together, see `console`.
 const MESSAGE_BYTES: usize = 400;
 const PLACE_BYTES: usize = 200;
 const NAME_BYTES: usize = 60;
 
-/// The cause of a fault whose instance has exceeded its budget.
+/// The cause of a fault by an instance that has exceeded its budget.
 const OVERRUN: &str = "budget overrun";
 
-/// How many notes can wait to be told.
+/// The number of notes that can wait for their report.
 const PLACES: usize = 8;
 
-/// How long a run that is over awaits the end of an instance that a note is of.
+/// How long a finished run waits, in nanoseconds, for the end of an instance named in a note.
 const LONGEST_END_NS: u64 = 100_000_000;
 
-/// A contained fault, as its report states it.
+/// A contained fault, with the fields of its report.
 struct FaultNote {
     instance: Instance,
     cause: &'static str,
@@ -67,11 +66,11 @@ struct FaultNote {
     stack_used: u64,
     stack_bytes: u64,
     calls: Backtrace,
-    /// `None` until the instance is ended.
+    /// `None` until the instance has ended.
     cost: Option<FaultCost>,
 }
 
-/// A place for a note. Its representation has zeros where it is empty, so that no image holds them.
+/// A place for a note. An empty place is all zeros in memory, so no image stores it.
 #[repr(u8)]
 #[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
 enum NotePlace {
@@ -79,12 +78,12 @@ enum NotePlace {
     Full(FaultNote),
 }
 
-/// The notes that wait, a ring.
+/// The waiting notes, a ring.
 struct NoteQueue {
     places: [NotePlace; PLACES],
     oldest: usize,
     count: usize,
-    /// How many faults found no place since one was taken.
+    /// How many faults found no place since the last note was taken.
     left_out: u64,
 }
 
@@ -95,10 +94,10 @@ static WAITING: SpinLock<NoteQueue> = SpinLock::new(NoteQueue {
     left_out: 0,
 });
 
-/// Whether there are any, so that a look at none is short.
+/// Whether any note waits: makes the usual question cheap.
 static HAS_WAITING: AtomicBool = AtomicBool::new(false);
 
-/// Ends the instance that panics, if it is a subtask's; else returns.
+/// Ends the panicking instance, if a subtask panics; otherwise returns.
 pub fn end_panicked(info: &PanicInfo<'_>) {
     if !this_core::is_ready() || !interrupt_flag::are_enabled() {
         return;
@@ -115,17 +114,17 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
     cpu::ask_for_end();
 }
 
-/// Keeps the note of a panic. Apart, for the calls are read from the stack pointer of the caller on,
-/// whose frame is small.
+/// Keeps the note of a panic. A separate function, because the calls are read from the stack
+/// pointer of the caller, whose frame is small.
 #[inline(never)]
 fn keep_panic(
     (instance, context): (Instance, &Context),
     info: &PanicInfo<'_>,
     location: CodeLocation,
 ) {
-    // The message is made into text before any lock is taken, as that is the
-    // app's code once more. A panic in it comes here a second time. There may be no
-    // memory left, so none is taken from here on.
+    // The message becomes text before any lock is taken, as its formatting is the app's code once
+    // more. A panic there comes here a second time. There may be no memory left, so nothing is
+    // allocated from here on.
     let message = match context.note_fault() {
         false => Excerpt::of(info.message()),
         true => Excerpt::of("it panicked again while its message was made"),
@@ -137,7 +136,7 @@ fn keep_panic(
     interrupt_flag::enable();
 }
 
-/// Ends this core's instance, which has asked for that after it was found at fault.
+/// Ends this core's instance, found at fault before and now asking for its own end.
 pub fn end_at_fault(interrupted: &mut Interrupted) {
     let core = this_core::get();
     if core.context().is_at_fault()
@@ -147,8 +146,8 @@ pub fn end_at_fault(interrupted: &mut Interrupted) {
     }
 }
 
-/// Ends the instance that caused an exception, if it is a subtask's, and reports
-/// whether it was.
+/// Ends the instance that caused an exception, if a subtask did, and reports whether that was the
+/// case.
 pub fn end_faulty(exception: &CpuException<'_>, interrupted: &mut Interrupted) -> bool {
     if !exception.is_of_interruptible_code() || !this_core::is_ready() {
         return false;
@@ -190,18 +189,21 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     end_interrupted(instance, interrupted);
 }
 
-/// Ends this core's instance, whose context a handler has interrupted. Its note is kept already, for
-/// this may be the end of the run, which awaits its notes; the rest of it is known now.
+/// Ends this core's instance after a handler interrupted its context. The note exists already,
+/// because this may be the end of the run, and the run awaits its notes; the remaining facts are
+/// added now.
 fn end_interrupted(instance: Instance, interrupted: &mut Interrupted) {
     let abandoned = interrupted.abandon(contexts::new_worker());
     let (cost, budget_ns) = execution::fail(&abandoned).unwrap_or((FaultCost::Dag, u64::MAX));
+    // Given back only after `fail` has recovered the runner: another core may reuse the stack at
+    // once.
     contexts::give_back(abandoned.recover());
     WAITING
         .lock_uninterrupted()
         .settle(instance, cost, budget_ns);
 }
 
-/// Returns where a panic was raised, as `file:line:column`.
+/// Returns the place of a panic, as `file:line:column`.
 pub fn place_of(info: &PanicInfo<'_>) -> impl Display {
     let place = info.location();
     fmt::from_fn(move |f| match place {
@@ -210,7 +212,7 @@ pub fn place_of(info: &PanicInfo<'_>) -> impl Display {
     })
 }
 
-/// Has a note wait to be told, or counts it.
+/// Queues a note for its report, or counts the fault if the queue is full.
 fn keep(note: FaultNote) {
     let mut waiting = WAITING.lock();
     if waiting.count == PLACES {
@@ -223,8 +225,8 @@ fn keep(note: FaultNote) {
     HAS_WAITING.store(true, Ordering::Relaxed);
 }
 
-/// Tells of the contained fault that was noted first, and reports whether there was one. Nothing
-/// is allocated.
+/// Prints the report of the oldest contained fault, and reports whether there was one. Allocates
+/// nothing.
 pub fn tell_fault() -> bool {
     if !HAS_WAITING.load(Ordering::Relaxed) {
         return false;
@@ -239,14 +241,14 @@ pub fn tell_fault() -> bool {
     note.is_some()
 }
 
-/// Drops the note of the contained fault that was noted first, and reports whether there was one.
+/// Drops the note of the oldest contained fault, and reports whether there was one.
 pub fn forget_fault() -> bool {
     HAS_WAITING.load(Ordering::Relaxed) && WAITING.lock().take().0.is_some()
 }
 
-/// Takes all faults of a run that is over, each by [`tell_fault`] or [`forget_fault`], as its names
-/// are known no longer. The last one may just be ending on another core; a note of what never ends
-/// is dropped.
+/// Takes all faults of a finished run, each by [`tell_fault`] or [`forget_fault`], because the
+/// names are about to be forgotten. The last faulty instance may still be ending on another core; a
+/// note whose instance never ends is dropped.
 pub fn take_last_faults(take: fn() -> bool) {
     let until_ns = clock::now_ns() + LONGEST_END_NS;
     while HAS_WAITING.load(Ordering::Relaxed) {
@@ -266,7 +268,7 @@ impl NoteQueue {
         HAS_WAITING.store(false, Ordering::Relaxed);
     }
 
-    /// Adds the cost of the latest fault of an instance, and the budget that it has exceeded.
+    /// Adds the cost of an instance's latest fault, and the exceeded budget.
     fn settle(&mut self, instance: Instance, cost: FaultCost, budget_ns: u64) {
         for place in &mut self.places {
             if let NotePlace::Full(note) = place
@@ -282,7 +284,7 @@ impl NoteQueue {
         }
     }
 
-    /// Takes the oldest note, once its instance is ended, and how many faults found no place.
+    /// Takes the oldest note, once its instance has ended, and how many faults found no place.
     fn take(&mut self) -> (Option<FaultNote>, u64) {
         let place = &mut self.places[self.oldest];
         let taken = match place {
@@ -302,8 +304,8 @@ impl NoteQueue {
 }
 
 impl FaultNote {
-    /// Notes what is known of a fault of this core's instance, at an instruction. Interrupts are
-    /// disabled.
+    /// Notes the known facts about a fault of this core's instance, at an instruction. Interrupts
+    /// are disabled.
     fn new(
         instance: Instance,
         cause: &'static str,

@@ -1,14 +1,14 @@
-//! The stock of contexts that instances run in.
+//! The stock of contexts in which instances run.
 //!
-//! A preempted instance keeps its context, stack and all. At any time a core
-//! runs one context and keeps at most one to spare, and each subtask has at most
-//! one suspended instance: so twice the cores and once the subtasks are enough. That many are
-//! made at a commit, never later. A core that ends what it runs, because of a fault, takes
-//! another one for that moment, and gives the first one back. Contexts are never freed;
-//! the next commit uses them again.
+//! A preempted instance keeps its context, stack included. At any time a core runs one context and
+//! keeps at most one spare, and each subtask has at most one suspended instance: twice the number
+//! of cores plus the number of subtasks is therefore enough. A commit creates so many contexts;
+//! nothing creates more later. When a fault ends a core's instance, the core takes another context
+//! for a moment, then gives the first back. Contexts are never freed; the next commit uses them
+//! again.
 //!
-//! All stacks are as large as the largest that the first commit states: any context may run any
-//! subtask. Those that the cores begin with have room to grow to that.
+//! All stacks have the largest size stated in the first commit, since any context may run any
+//! subtask. The cores' first contexts have room to grow to that size.
 
 use alloc::vec::Vec;
 
@@ -20,18 +20,18 @@ use crate::machine::spinlock::SpinLock;
 use crate::machine::{interrupt, this_core};
 use crate::memory;
 
-/// The stack of a context for subtasks that state none, in bytes.
+/// The stack size of a context for subtasks that state none, in bytes.
 const STACK_BYTES: u64 = 64 * 1024;
 
-/// The stack of the context that runs the app's main function, in bytes. That evaluates
+/// The stack size of the context for the app's main function, in bytes. The main function evaluates
 /// whole runs, also in builds without optimization.
 const MAIN_STACK_BYTES: u64 = 256 * 1024;
 
 struct ContextPool {
     free: Vec<Parked>,
-    /// How many there are, free or not.
+    /// The number of contexts, free or not.
     total: usize,
-    /// How large their stacks are; 0 before the first commit.
+    /// The size of their stacks, in bytes; 0 before the first commit.
     stack_bytes: u64,
 }
 
@@ -41,7 +41,7 @@ static STOCK: SpinLock<ContextPool> = SpinLock::new(ContextPool {
     stack_bytes: 0,
 });
 
-/// Makes the context that a core begins with.
+/// Creates a core's first context.
 pub fn create_first(is_background: bool) -> Result<Parked, MapError> {
     let (bytes, room) = match is_background {
         true => (MAIN_STACK_BYTES, 0),
@@ -55,15 +55,15 @@ fn create(bytes: u64, room: u64, is_background: bool) -> Result<Parked, MapError
     Ok(Parked::new(top, bytes, is_background))
 }
 
-/// Returns the size of the stacks that these subtasks can all run on.
+/// Returns the stack size large enough for every subtask of a task set, in bytes.
 pub fn stack_bytes(task_set: &TaskSet) -> u64 {
     task_set
         .largest_stack_bytes(STACK_BYTES)
         .next_multiple_of(4096)
 }
 
-/// Grows all stacks to so many bytes; only the first call has an effect. Returns how many they
-/// have. To be called while no core runs anything of a DAG.
+/// Grows all stacks to the given number of bytes; only the first call has an effect. Returns the
+/// size in bytes. To be called while no core runs anything of a DAG.
 #[inline(never)]
 pub fn settle(bytes: u64) -> Result<u64, MapError> {
     let settled = STOCK.lock().stack_bytes;
@@ -82,7 +82,7 @@ pub fn settle(bytes: u64) -> Result<u64, MapError> {
     Ok(bytes)
 }
 
-/// Makes sure that there are `total` contexts in the stock or in use from it.
+/// Ensures that `total` contexts exist, either in the stock or taken from the stock.
 pub fn provide(total: usize) -> Result<(), MapError> {
     let stock = STOCK.lock();
     let (existing, bytes) = (stock.total, stock.stack_bytes);
@@ -91,7 +91,7 @@ pub fn provide(total: usize) -> Result<(), MapError> {
     if missing == 0 {
         return Ok(());
     }
-    // Room for all that can ever be free, so that giving back never allocates.
+    // Room for every context that can ever be free, so giving back never allocates.
     let mut grown = Vec::with_capacity(total.max(existing));
     for _ in 0..missing {
         grown.push(create(bytes, 0, false)?);
@@ -110,7 +110,7 @@ pub fn provide(total: usize) -> Result<(), MapError> {
 ///
 /// # Panics
 ///
-/// If there is none, which [`provide`]'s rule excludes.
+/// If the stock is empty, which [`provide`]'s rule excludes.
 fn take_spare() -> Parked {
     STOCK
         .lock_uninterrupted()
@@ -119,21 +119,20 @@ fn take_spare() -> Parked {
         .expect("contexts are provided at commit")
 }
 
-/// Makes a context that works, in place of one that is suspended or abandoned.
-/// Interrupts are disabled.
+/// Prepares a working context, in place of a suspended or abandoned context. Interrupts are
+/// disabled.
 pub fn new_worker() -> Parked {
     let mut context = this_core::take_spare_context().unwrap_or_else(take_spare);
     context.restart(interrupt::work);
     context
 }
 
-/// Puts a context that has nothing to do back into the stock.
+/// Puts a context without work back into the stock.
 pub fn give_back(context: Parked) {
     STOCK.lock().free.push(context);
 }
 
-/// Returns how many contexts there are in all for instances, and how many of
-/// them are in the stock.
+/// Returns how many contexts exist in all for instances, and how many of these are in the stock.
 pub fn count() -> (usize, usize) {
     let stock = STOCK.lock();
     (stock.total, stock.free.len())

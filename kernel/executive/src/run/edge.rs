@@ -1,9 +1,9 @@
-//! The edge of a run: values are recorded for the host, or replayed.
+//! The edge of a run: records values for the host, or replays them.
 //!
-//! All that is known of recordings is behind [`Crossing`](fass::edge::Crossing), which only an
-//! image with a recorded topic has. It is used under the scheduler's lock, or for a moment by a
-//! source that is replayed; the drain belongs to core 0's background alone, so sending disturbs
-//! nobody.
+//! All knowledge of recordings is behind [`Crossing`](fass::edge::Crossing), present only in an
+//! image with a recorded topic. The scheduler's step uses the edge under the scheduler's lock, and
+//! a replayed source uses the edge for a moment; the drain belongs to core 0's background alone, so
+//! sending disturbs nobody.
 
 use fass::edge::{Edge, EdgeMode};
 
@@ -12,12 +12,12 @@ use crate::machine::spinlock::{SpinLock, SpinLockGuard};
 
 static EDGE: SpinLock<Edge> = SpinLock::new(Edge::new());
 
-/// Returns the edge.
+/// Returns the edge, locked.
 pub fn get() -> SpinLockGuard<'static, Edge> {
     EDGE.lock()
 }
 
-/// Takes what the command line says.
+/// Takes the wish stated on the command line.
 pub fn set_wish(wish: EdgeMode) {
     // Nobody has asked for the latest jobs, so they do not fill a console.
     if !matches!(wish, EdgeMode::Latest { .. }) || debug_port::is_there() {

@@ -1,4 +1,4 @@
-//! Signs of life: interrupts that a core takes now and then, also when nothing else is due.
+//! Signs of life: interrupts taken by a core now and then, even when nothing else is due.
 
 use core::sync::atomic::Ordering;
 
@@ -6,15 +6,16 @@ use crate::machine::clock;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
 
-/// The time between two signs of life of core 0. Without any alarm anywhere a
-/// virtual machine whose time is virtual would stand still forever.
+/// The time between two signs of life of core 0, in nanoseconds. Without any alarm on any core a
+/// virtual machine with virtual time would stop forever.
 const FIRST_NS: u64 = 1_000_000_000;
 
-/// The time between two of core 1, which notices by them a core 0 that takes no interrupts.
+/// The same time for core 1, in nanoseconds. By its heartbeats core 1 notices when core 0 takes no
+/// interrupts.
 pub const SECOND_NS: u64 = 2_000_000_000;
 
-/// Gives every core a heartbeat each `period_ns`; if 0, core 0 its ordinary one
-/// and the others none.
+/// Gives every core a heartbeat each `period_ns` nanoseconds; if 0, core 0 and core 1 get their
+/// ordinary heartbeats and the others none.
 pub fn set_heartbeats(period_ns: u64) {
     for core in this_core::all() {
         let ordinary_ns = match core.index {
@@ -28,32 +29,33 @@ pub fn set_heartbeats(period_ns: u64) {
             period_ns
         };
         core.heartbeat_ns.store(own_ns, Ordering::Relaxed);
+        // Each other core sets its own alarm: only the core itself can write its timer.
         core.wake_up();
     }
     beat(this_core::get(), clock::now_ns());
 }
 
-/// Returns the time between two heartbeats of core 0, which executes this.
+/// Returns the time between two heartbeats of core 0, the calling core.
 pub fn own_heartbeat_ns() -> u64 {
     this_core::get().heartbeat_ns.load(Ordering::Relaxed)
 }
 
-/// Gives core 0, which executes this outside any instance, a heartbeat each
-/// `period_ns`.
+/// Gives core 0, the calling core, a heartbeat each `period_ns` nanoseconds. Called outside any
+/// instance.
 pub fn set_own_heartbeat(period_ns: u64) {
     let core = this_core::get();
     core.heartbeat_ns.store(period_ns, Ordering::Relaxed);
     beat(core, clock::now_ns());
 }
 
-/// Begins the core's heartbeat if it has one now and had none before.
+/// Begins the core's heartbeat if the core has a period and no alarm set yet.
 pub fn keep_beating(core: &Core) {
     if !timer::is_set(Alarm::Heartbeat) {
         beat(core, clock::now_ns());
     }
 }
 
-/// Sets the core's alarm for its next heartbeat, if it has one.
+/// Sets the core's alarm for its next heartbeat, if the core has a period.
 pub fn beat(core: &Core, now_ns: u64) {
     let next_ns = match core.heartbeat_ns.load(Ordering::Relaxed) {
         0 => u64::MAX,

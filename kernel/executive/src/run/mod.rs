@@ -1,9 +1,9 @@
-//! Execution of jobs: from a release to a completion, no code runs but this module and those below.
+//! Execution of jobs: from a release to a completion, only this module and the modules below run.
 //!
-//! `platform` takes what an app commits. `execution` holds the scheduler and brings each core
-//! to what it decides, `worker` is each core's loop, `containment` ends what is at fault.
-//! `contexts` keeps stacks. `heartbeat` has a core take interrupts now and then; `occupation`
-//! holds a core for an instance that only stands for work.
+//! `platform` takes an app's commit. `execution` holds the scheduler and makes each core follow the
+//! scheduler's decisions; `worker` is each core's loop; `containment` ends a faulty instance.
+//! `contexts` keeps stacks. `heartbeat` makes a core take interrupts now and then; `occupation`
+//! occupies a core for an instance without real work. The crate's documentation shows the locks.
 
 pub mod containment;
 pub mod contexts;

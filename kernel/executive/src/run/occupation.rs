@@ -1,10 +1,10 @@
-//! How an instance that only stands for work occupies its core.
+//! Occupies a core on behalf of an instance without real work.
 
 use crate::machine::context::Context;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, cpu, interrupt_flag, this_core, turns};
 
-/// Occupies the calling instance's core for `ns` of execution, halted in between.
+/// Occupies the calling instance's core for `ns` nanoseconds of execution, halting in between.
 pub(crate) fn hold(ns: u64) {
     let executed = ExecutionTimer::from_now();
     loop {
@@ -19,13 +19,13 @@ pub(crate) fn hold(ns: u64) {
         }
         turns::leave(core);
         timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
-        // If this is preempted it is here: it then goes round again, on the
-        // core where it continues, and sets that core's alarm.
+        // A preemption happens here: the loop then goes round again on the core where the instance
+        // continues, and sets that core's alarm.
         interrupt_flag::enable_and_halt();
     }
 }
 
-/// Occupies the calling instance's core for `ns` of execution, computing.
+/// Occupies the calling instance's core for `ns` nanoseconds of execution, computing.
 pub(crate) fn spin(ns: u64) {
     let executed = ExecutionTimer::from_now();
     while executed.ns() < ns {
@@ -44,7 +44,7 @@ struct ExecutionTimer {
 
 impl ExecutionTimer {
     fn from_now() -> Self {
-        // A suspension between the two would be in neither, and so pass for execution.
+        // A suspension between the two readings would be in neither, and so count as execution.
         let were_enabled = interrupt_flag::disable();
         let context = this_core::get().context();
         let timer = Self {
@@ -57,8 +57,8 @@ impl ExecutionTimer {
     }
 
     fn ns(&self) -> u64 {
-        // The clock first: a suspension in between then counts too much in the next
-        // line, which the next look sets right, and not too little, as execution.
+        // The clock first: a suspension in between then counts too much in the next line, corrected
+        // by the next reading, and not too little, as execution.
         let elapsed_ns = clock::now_ns().saturating_sub(self.start_ns);
         let suspended_ns = self.context.suspended_ns() - self.suspended_before_ns;
         elapsed_ns.saturating_sub(suspended_ns)

@@ -1,4 +1,4 @@
-//! The kernel as the platform that `fass` runs on.
+//! The kernel as a platform for `fass`.
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
@@ -16,17 +16,17 @@ use crate::machine::{clock, interrupt_flag, section, this_core};
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
-    /// The terms of the commits to come; the cores are those that have come up.
+    /// The terms of future commits; their cores are the cores brought up.
     terms: SpinLock<RunConfig>,
-    /// How long a decision waits for further events of the same instant.
+    /// How long a decision waits for further events of the same instant, in nanoseconds.
     coincidence_ns: AtomicU64,
-    /// Whether a commit is the kernel's own, to measure overheads with.
+    /// Whether a commit belongs to the kernel itself, for measuring overheads.
     calibrates: AtomicBool,
     /// The number of the latest plan.
     plan: AtomicU64,
 }
 
-/// The platform that apps on this machine are built for.
+/// The platform for all apps on this machine.
 pub static KERNEL: Kernel = Kernel {
     terms: SpinLock::new(RunConfig::of_cores(1)),
     coincidence_ns: AtomicU64::new(0),
@@ -35,18 +35,18 @@ pub static KERNEL: Kernel = Kernel {
 };
 
 impl Kernel {
-    /// Changes the terms of the commits to come.
+    /// Changes the terms of future commits.
     pub fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         change(&mut self.terms.lock());
     }
 
-    /// Makes the commits to come the kernel's own, of which nobody is told, or the app's again.
+    /// Marks future commits as the kernel's own, with no record and no report, or as the app's
+    /// again.
     pub fn set_calibration(&self, calibrates: bool) {
         self.calibrates.store(calibrates, Ordering::Relaxed);
     }
 
-    /// Chooses how long decisions of the runs to come wait for further events of
-    /// the same instant.
+    /// Chooses how long decisions of future runs wait for further events of the same instant.
     pub fn set_coincidence_ns(&self, coincidence_ns: u64) {
         self.coincidence_ns.store(coincidence_ns, Ordering::Relaxed);
     }

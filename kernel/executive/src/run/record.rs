@@ -1,7 +1,7 @@
-//! The record of a boot: where its bytes go.
+//! The record of a boot: the destination of its bytes.
 //!
-//! QEMU's debug port takes them, and where there is none the console, in lines of base 64. The
-//! console has little room during a run, so values that go there are sent when it is over.
+//! QEMU's debug port takes the bytes; without such a port the console does, in lines of base 64.
+//! The console has little room during a run, so values for the console are sent after the run.
 
 use alloc::boxed::Box;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -19,10 +19,10 @@ type File = BootRecord<RecordSink>;
 
 static RECORD: SpinLock<Option<File>> = SpinLock::new(None);
 
-/// Whether it is sent during a run, too, so that it is there if the run dies.
+/// Whether to send the record during a run, too, to have it even if the run dies.
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
-/// The way of its bytes out of the machine.
+/// The way for the record's bytes out of the machine.
 pub(super) enum RecordSink {
     Port,
     Console(Box<RecordLines>),
@@ -37,7 +37,7 @@ impl Sink for RecordSink {
     }
 }
 
-/// Begins to keep a record.
+/// Begins a record.
 pub fn start(is_live: bool) {
     IS_LIVE.store(is_live, Ordering::Relaxed);
     *RECORD.lock() = Some(BootRecord::new(match debug_port::is_there() {
@@ -46,8 +46,8 @@ pub fn start(is_live: bool) {
     }));
 }
 
-/// Lends the record, if one is kept. Meanwhile it is out of its lock, which has interrupts off, for
-/// sending takes long.
+/// Lends the record, if one is kept. The record leaves its lock for that time, because sending
+/// takes long and the lock keeps interrupts disabled.
 pub(super) fn with<T>(work: impl FnOnce(Option<&mut File>) -> T) -> T {
     let mut record = RECORD.lock().take();
     let result = work(record.as_mut());
@@ -55,13 +55,15 @@ pub(super) fn with<T>(work: impl FnOnce(Option<&mut File>) -> T) -> T {
     result
 }
 
-/// Sends something of a run that goes on, or has the signals of a replay raised; `false`: there
-/// is nothing.
+/// Sends a part of a run in progress, or raises the signals of a replay; `false` means: nothing
+/// left.
 pub fn step(outgoing: &mut Outgoing) -> bool {
     let has_port = debug_port::is_there();
     with(|mut record| {
         let to = record
             .as_deref_mut()
+            // Without a port the values wait for the end of the run: the console has little room
+            // before.
             .filter(|_| has_port)
             .map(BootRecord::file);
         let is_sent = (outgoing.as_mut()).is_some_and(|drain| drain.step(to));
@@ -76,8 +78,8 @@ fn take_events(record: &mut File) -> bool {
     })
 }
 
-/// Sends what is left of a run that is over, but whose journals are still there, or what is kept
-/// of jobs before a fault, and says what came of a replay, and how complete the recording is.
+/// Sends the rest of a finished run while the journals still exist, or the jobs kept from before a
+/// fault, and reports the outcome of a replay and how complete the recording is.
 pub fn end_recording(outgoing: Outgoing, is_over: bool) {
     let mut edge = edge::get();
     let outcome = edge.end_run(is_over);
@@ -104,7 +106,7 @@ pub fn end_recording(outgoing: Outgoing, is_over: bool) {
     });
 }
 
-/// Sends how a run has ended.
+/// Sends a run's result.
 pub fn end_run(run: &Run) {
     with(|record| {
         if let Some(record) = record {

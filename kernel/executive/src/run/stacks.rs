@@ -1,8 +1,8 @@
-//! How much of its stack each subtask has used, on request (`measure=stacks`).
+//! Measures how much of its stack each subtask has used, on request (`measure=stacks`).
 //!
-//! After each instance its stack is looked at, and painted again, so the figure is this
-//! subtask's, with what the kernel itself does on that stack. It takes some microseconds an
-//! instance, with interrupts disabled.
+//! After each instance the kernel inspects the stack and paints it again, so the figure belongs to
+//! this subtask, and includes the kernel's own use of the stack. The inspection takes some
+//! microseconds for each instance, with interrupts disabled.
 
 use alloc::boxed::Box;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -14,15 +14,15 @@ use crate::machine::spinlock::SpinLock;
 
 static MEASURES: AtomicBool = AtomicBool::new(false);
 
-/// The most that each subtask of the last commit has used, by vertex.
+/// The largest number of bytes used by each subtask of the last commit, by vertex.
 static USED: SpinLock<&[AtomicU64]> = SpinLock::new(&[]);
 
-/// Has stacks measured from the next commit on.
+/// Turns measuring on, from the next commit on.
 pub fn enable() {
     MEASURES.store(true, Ordering::Relaxed);
 }
 
-/// Has the subtasks of a plan measured, if that is wished.
+/// Measures the subtasks of a plan, if requested.
 pub(super) fn watch(plan: &mut Plan) {
     if MEASURES.load(Ordering::Relaxed) {
         measure(plan);
@@ -32,7 +32,7 @@ pub(super) fn watch(plan: &mut Plan) {
 #[cold]
 #[inline(never)]
 fn measure(plan: &mut Plan) {
-    // Of each commit that is measured these words stay: its bodies may outlive the run.
+    // Each measured commit leaks these words: its bodies may outlive the run.
     let used: Box<[AtomicU64]> = (0..plan.task_set.vertices()).map(|_| 0.into()).collect();
     let used: &'static [AtomicU64] = Box::leak(used);
     for (most, body) in used.iter().zip(plan.bodies.iter_mut().flatten()) {
@@ -45,7 +45,7 @@ fn measure(plan: &mut Plan) {
     *USED.lock() = used;
 }
 
-/// Returns what was found of the last commit's subtasks; nothing if it was not wished.
+/// Returns the figures of the last commit's subtasks; empty if not requested.
 pub fn used() -> &'static [AtomicU64] {
     *USED.lock()
 }

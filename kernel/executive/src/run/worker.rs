@@ -1,4 +1,41 @@
-//! The worker of each core: it runs what the scheduler assigns to it, else it halts.
+//! The worker of each core: runs the instances assigned by the scheduler, and halts when there are
+//! none.
+//!
+//! # The states of a worker's context
+//!
+//! ```text
+//!             1                 2                     6
+//!   stock --------> looking ----------> running ----------> suspended
+//!     ^             |  ^  | <----------  |   ^                  |
+//!     |      8      |  |  |      3       |   |        7         |
+//!     +-------------+  |  | 4            |   +------------------+
+//!     |              5 |  v              |
+//!     |              resting             |
+//!     |                        9         |
+//!     +----------------------------------+
+//! ```
+//!
+//! 1. A core begins with its first context, or an interrupt handler exchanges contexts and restarts
+//!    a free context ([`contexts::new_worker`](super::contexts::new_worker)); [`work`] looks for an
+//!    instance.
+//! 2. `find_work` or `complete` returned [`CoreWork::Run`]: an instance starts, or proceeds after a
+//!    wait. A waiting instance has no context.
+//! 3. The subtask's function returned, and [`execution::complete`] looks for the next work.
+//! 4. The scheduler has no work for the core ([`CoreWork::Rest`]); never on core 0 during a run,
+//!    whose parked background continues instead (8).
+//! 5. `Core::wake` is set, by another core's `wake_up` or by the core's own interrupt.
+//! 6. An interrupt on the core preempts the instance (`ClusterRun::follow`), unless a section of an
+//!    app's lock postpones the preemption.
+//! 7. A core of the cluster continues the context: in an interrupt (`follow`), or as another worker
+//!    returns [`CoreWork::Continue`].
+//! 8. The scheduler has a suspended context or the background for the core
+//!    ([`CoreWork::Continue`]). The worker's context becomes the core's spare, or returns to the
+//!    stock.
+//! 9. A contained fault ends the instance ([`containment`](super::containment)).
+//!
+//! Impossible: looking to suspended, as interrupts are disabled; resting to suspended, as an
+//! interrupt only wakes a resting worker; and leaving the states by an error: a fault outside any
+//! instance ends the run.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,9 +46,9 @@ use crate::machine::this_core::{self, Core};
 use crate::machine::{clock, cpu, interrupt_flag, turns};
 use crate::text::console;
 
-/// Runs what is assigned to the core that it is on, from one instance to the
-/// next, preempted now and then and resumed on any core. Returns the
-/// context that the core is to go on with instead, with interrupts disabled.
+/// Runs the instances assigned to the current core, one after another. Interrupts may preempt the
+/// calling context and another core may resume it. Returns, with interrupts disabled, the context
+/// to continue on this core instead.
 pub fn work() -> Parked {
     interrupt_flag::disable();
     let mut work = find_work();
@@ -30,7 +67,7 @@ pub fn work() -> Parked {
     }
 }
 
-/// Finds what this core, which has computed nothing, is to do. Interrupts are disabled.
+/// Finds the next work of this core, which has computed nothing so far. Interrupts are disabled.
 fn find_work() -> CoreWork {
     let work = execution::find_work();
     if let CoreWork::Run(_) = &work {
@@ -39,7 +76,7 @@ fn find_work() -> CoreWork {
     work
 }
 
-/// Calls a subtask's function, with interrupts enabled meanwhile.
+/// Calls a subtask's function, with interrupts enabled during the call.
 fn run(mut runner: RunnerLoan) -> CoreWork {
     interrupt_flag::enable();
     runner.run();
@@ -48,22 +85,23 @@ fn run(mut runner: RunnerLoan) -> CoreWork {
     execution::complete(runner, finish_ns)
 }
 
-/// Makes the cores other than the first of each cluster watch for work instead of halting when
-/// they have none.
+/// Makes idle cores watch for work instead of halting, except each cluster's first core.
 pub fn watch_when_idle() {
     WATCHES.store(true, Ordering::Relaxed);
 }
 
 static WATCHES: AtomicBool = AtomicBool::new(false);
 
-/// Sends waiting text and halts in between, until this core is to look for work.
-/// Interrupts are disabled before and after.
+/// Sends waiting text, and halts between bytes, until this core shall look for work. Interrupts are
+/// disabled before and after.
 fn rest(core: &Core) {
-    // A core that keeps time has to hear of earlier events and of letters, by an interrupt.
+    // A time-keeping core must hear of earlier events and of letters by an interrupt: no watching.
     if WATCHES.load(Ordering::Relaxed) && !execution::keeps_time(core) {
         watch(core);
     }
     while !core.wake.swap(false, Ordering::AcqRel) {
+        // A byte may take the port 87 us: with interrupts enabled the core follows decisions
+        // meanwhile.
         if console::has_pending() {
             interrupt_flag::enable();
             console::send_pending_byte();
@@ -74,8 +112,8 @@ fn rest(core: &Core) {
     }
 }
 
-/// Watches for another core's word that there is work, which then needs no
-/// interrupt. Interrupts are disabled before and after, and enabled meanwhile.
+/// Watches for another core's wake-up, so the other core need not send an interrupt. Interrupts are
+/// disabled before and after, and enabled during the watch.
 fn watch(core: &Core) {
     core.begin_watch();
     interrupt_flag::enable();
@@ -87,15 +125,14 @@ fn watch(core: &Core) {
     interrupt_flag::disable();
     core.end_watch();
     heartbeat::keep_beating(core);
-    // It was spared the interrupt that arms it where it is the first of a cluster now.
+    // A core that became a cluster's first core while watching got no interrupt to arm its timer.
     if execution::keeps_time(core) {
         execution::arm_next_event();
     }
 }
 
-/// Waits until the run has ended, as the background of core 0: whenever there is
-/// work for the core, this is suspended. `when_idle` reports whether it has more to
-/// do at once.
+/// Waits, as core 0's background, until the run has ended. Core 0 suspends the background whenever
+/// there is work for the core. `when_idle` reports whether more remains to be done at once.
 pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
     while !execution::is_finished() {
         turns::begin_background();
@@ -105,6 +142,7 @@ pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
         }
         turns::end_background();
         interrupt_flag::disable();
+        // Asked again with interrupts disabled, to lose no wake-up between question and halt.
         if execution::is_finished() {
             interrupt_flag::enable();
         } else {

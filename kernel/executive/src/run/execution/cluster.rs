@@ -1,15 +1,14 @@
-//! The clusters that the cores are divided into: what each has for itself.
+//! The clusters of a divided machine: the state each cluster has for itself.
 //!
-//! Each event on a core takes its cluster's lock, steps its cluster's scheduler and
-//! writes into its cluster's journal; so the hot path of one cluster touches no word of
-//! another's. The first core of a cluster keeps its time.
+//! Each event on a core takes its cluster's lock, steps its cluster's scheduler and writes into its
+//! cluster's journal; the hot path of a cluster therefore touches no word of another cluster. The
+//! first core of a cluster keeps the cluster's time.
 //!
-//! Where the cores are not divided there is one cluster. How they are divided is in
-//! [`divided`](super::divided).
+//! Undivided cores form one cluster. [`divided`](super::divided) divides the cores.
 //!
-//! Requests of one cluster to others (signals, pauses, modes, the end) are
-//! [letters](sched_dag::lifecycle::Mailboxes): the other cluster's first core is woken, which takes
-//! them in a step of its own. That takes no lock, so nobody waits.
+//! Requests from a cluster to others (signals, pauses, modes, the end) are
+//! [letters](sched_dag::lifecycle::Mailboxes): the sender wakes the other cluster's first core, and
+//! this core takes the letters in a step of its own. Letters need no lock, so nobody waits.
 
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
@@ -25,48 +24,48 @@ use crate::machine::this_core::{self, Core};
 #[repr(align(128))]
 pub(super) struct ClusterState {
     pub(super) execution: SpinLock<Option<ClusterRun>>,
-    /// When the first core's timer shall next step the scheduler, on the clock;
+    /// When the first core's timer shall next step the scheduler, on the clock, in nanoseconds;
     /// `u64::MAX` if never.
     next_event_ns: AtomicU64,
-    /// Whether nothing is left to be done.
+    /// Whether the cluster has nothing left to do.
     pub(super) is_finished: AtomicBool,
-    /// Jobs of DAGs with a limit that have ended in this run.
+    /// The number of jobs ended in this run, of DAGs with a limit of jobs.
     pub(super) jobs_ended: AtomicU64,
-    /// Whether there may be a letter.
+    /// Whether letters may be waiting.
     pub(super) has_letters: AtomicBool,
     pub(super) first_core: AtomicU32,
 }
 
-/// Cluster 0: of all cores, if they are not divided.
+/// Cluster 0: of all cores, if the cores are not divided.
 pub(super) static FIRST: ClusterState = ClusterState::new();
 
-/// The other ones that there can be, made when cores are divided for the first time.
+/// All other possible clusters, created when cores are divided for the first time.
 pub(super) static OTHERS: SetOnce<alloc::boxed::Box<[ClusterState]>> = SetOnce::new();
 
-/// How many there are besides cluster 0.
+/// The number of clusters besides cluster 0.
 pub(super) static BESIDES: AtomicUsize = AtomicUsize::new(0);
 
 /// The seat of a cluster's first core.
 pub(super) const FIRST_SEAT: CoreId = CoreId(0);
 
 impl ClusterState {
-    /// Returns the number of the core in a seat among all cores.
+    /// Returns the number among all cores of the core in a seat.
     pub(super) fn core(&self, seat: CoreId) -> u32 {
         self.first_core.load(Ordering::Relaxed) + seat.0
     }
 
-    /// Reports whether there may be a letter.
+    /// Reports whether letters may be waiting.
     #[inline]
     pub(super) fn may_have_letters(&self) -> bool {
         self.has_letters.load(Ordering::Relaxed)
     }
 
-    /// Returns when the timer shall next step the scheduler; `u64::MAX` if never.
+    /// Returns when the timer shall next step the scheduler, in nanoseconds; `u64::MAX` if never.
     pub(super) fn next_event_ns(&self) -> u64 {
         self.next_event_ns.load(Ordering::Acquire)
     }
 
-    /// Notes that, and whether nothing is left to be done.
+    /// Publishes the time of the next step, and whether the cluster has nothing left to do.
     pub(super) fn publish(&self, at_ns: u64, is_finished: bool) {
         self.next_event_ns.store(at_ns, Ordering::Release);
         self.is_finished.store(is_finished, Ordering::Release);
@@ -89,17 +88,17 @@ pub(super) fn all() -> impl Iterator<Item = &'static ClusterState> {
     (0..count()).map(nth)
 }
 
-/// Returns how many there are.
+/// Returns the number of clusters.
 pub fn count() -> usize {
     BESIDES.load(Ordering::Relaxed) + 1
 }
 
-/// Reports whether there are several.
+/// Reports whether there are several clusters.
 pub(super) fn are_divided() -> bool {
     count() > 1
 }
 
-/// Returns a cluster; cluster 0 if there is no such one.
+/// Returns a cluster by number; cluster 0 if the number names none.
 #[inline]
 pub(super) fn nth(number: usize) -> &'static ClusterState {
     match number {
@@ -114,27 +113,27 @@ fn another(number: usize) -> &'static ClusterState {
     others.get(number - 1).unwrap_or(&FIRST)
 }
 
-/// Returns the cluster that a core is in.
+/// Returns a core's cluster.
 #[inline]
 pub(super) fn cluster_of(core: &Core) -> &'static ClusterState {
     nth(core.group.load(Ordering::Relaxed) as usize)
 }
 
-/// Returns the number of a cluster's first core; those in its journal count from that.
+/// Returns the number of a cluster's first core; the cluster's journal counts cores from there.
 pub fn first_core(number: usize) -> u32 {
     nth(number).core(FIRST_SEAT)
 }
 
-/// Has this core belong to another cluster, whose lock is held, and returns its own seat, which it
-/// is to take again. Its seat, if it has one there, is then counted from that cluster's first core.
+/// Seats this core in another cluster, whose lock is held, and returns the core's own seat, to be
+/// restored afterwards. The new seat is counted from the other cluster's first core.
 pub(super) fn visit(cluster: &ClusterState) -> u32 {
     let core = this_core::get();
-    // As journals have it, and back in the number that it is added to.
+    // In 16 bits, as in journals; adding the first core's number gives this core's number again.
     let seat = (core.index.wrapping_sub(cluster.core(FIRST_SEAT))) & u32::from(u16::MAX);
     core.place.swap(seat, Ordering::Relaxed)
 }
 
-/// Some of the cores, as bits.
+/// A set of cores, as bits.
 #[derive(Debug, Default)]
 pub(super) struct CoreSet([u64; 4]);
 
@@ -143,10 +142,10 @@ impl CoreSet {
         self.0[(core / 64) as usize] |= 1 << (core % 64);
     }
 
-    /// Makes each of the cores look for work.
+    /// Makes each core of the set look for work.
     #[inline]
     pub(super) fn wake(&self) {
-        // Mostly nobody is to be told.
+        // Mostly the set is empty.
         if self.0.iter().fold(0, |all, word| all | word) != 0 {
             self.wake_some();
         }
@@ -164,11 +163,11 @@ impl CoreSet {
     }
 }
 
-/// The mailboxes of a run; all clusters have the same ones. None where cores are not divided.
+/// The mailboxes of a run, shared by all clusters. `None` if the cores are not divided.
 pub(super) type Letters = Option<Arc<lifecycle::Mailboxes>>;
 
-/// Sends a request to the other clusters that it concerns, adds the cores that have to take it, and
-/// reports whether it does not concern the cluster itself.
+/// Sends a request to all other concerned clusters, adds the cores that have to take the letters,
+/// and reports whether the request does not concern the sending cluster.
 pub(super) fn send_to_others(
     letters: &Letters,
     from: ClusterId,
@@ -178,7 +177,7 @@ pub(super) fn send_to_others(
     letters.as_ref().is_some_and(|letters| {
         letters.send(Some(from), request, |cluster| {
             let there = nth(cluster.index());
-            // What was left before is seen by the core that takes the letters.
+            // The core that takes the letters also sees everything written before this store.
             there.has_letters.store(true, Ordering::Release);
             woken.insert(there.core(FIRST_SEAT));
         })

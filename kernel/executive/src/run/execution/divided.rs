@@ -1,4 +1,4 @@
-//! Dividing the cores into clusters, and questions that concern several of them.
+//! Division of the cores into clusters, and questions about several clusters at once.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -13,7 +13,8 @@ use super::cluster::{BESIDES, ClusterState, Letters, OTHERS, nth};
 use super::{ClusterRun, cluster};
 use crate::machine::this_core;
 
-/// Divides the cores as a task set says, and what serves requests. None of them runs anything.
+/// Divides the cores, and the handling of requests, as a task set says. No core runs anything of a
+/// DAG.
 pub(super) fn divide(
     task_set: &TaskSet,
     lifecycle: Option<Box<dyn Lifecycle>>,
@@ -29,7 +30,7 @@ pub(super) fn divide(
     let cores = this_core::all();
     let count = task_set.clusters().count();
     if count > 1 && OTHERS.get().is_none() {
-        // Each has a core at least; and the cores that no cluster has are one, too.
+        // Each cluster has at least one core, and the cores without a cluster form one more.
         OTHERS.set((1..cores.len()).map(|_| ClusterState::new()).collect());
     }
     BESIDES.store(count - 1, Ordering::Relaxed);
@@ -49,7 +50,7 @@ pub(super) fn divide(
     Ok(parts)
 }
 
-/// Returns the cluster of a DAG; cluster 0 if there is no run that has it.
+/// Returns a DAG's cluster; cluster 0 if no run has the DAG.
 #[inline]
 pub(super) fn of_dag(dag: DagId) -> &'static ClusterState {
     match cluster::are_divided() {
@@ -70,19 +71,21 @@ fn among_several(dag: DagId) -> &'static ClusterState {
     nth(dag.map_or(0, |dag| dag.cluster().index()))
 }
 
-/// Reports whether all jobs of the run have ended. Each cluster's word about itself is a sign
-/// only: while one is looked at, a letter from it may make another go on. So all are then
-/// looked at once more while none of them can do anything.
+/// Reports whether all jobs of the run have ended. A cluster's own word is only a sign: while this
+/// function looks at another cluster, a letter from there may give the first cluster new work. All
+/// clusters are therefore checked a second time, while none of them can act.
 pub fn is_finished() -> bool {
     cluster::all().all(|cluster| cluster.is_finished.load(Ordering::Acquire))
         && (!cluster::are_divided() || rest(0))
 }
 
-/// Reports whether the clusters from a place on are at rest, at one moment for all.
+/// Reports whether all clusters from a number on are at rest, all at the same moment.
 fn rest(place: usize) -> bool {
     if place == cluster::count() {
         return true;
     }
+    // The lock stays held during the recursion, so all clusters stand still at once. Ascending
+    // order, and nobody else holds two clusters' locks: no deadlock.
     let cluster = nth(place);
     let execution = cluster.execution.lock();
     let scheduler = execution

@@ -1,12 +1,12 @@
-//! Loans of runners: where that of each subtask is, so that a fault does not lose it.
+//! Loans of runners: the kernel knows where each subtask's runner is, so no fault loses a runner.
 //!
-//! A *loan* is what one uses a runner by. It moves between the runner's place and the core that
-//! runs an instance. If a fault ends that, the loan is somewhere on the stack of a context that
-//! was left for good. So it is noted at the commit where each runner is, and the loan is made
-//! again.
+//! A *loan* is the handle for using a runner. The loan moves between the runner's place and the
+//! core running an instance. If a fault ends the instance, the loan is somewhere on the stack of an
+//! abandoned context. The commit therefore notes where each runner is, and after a fault the loan
+//! is made again.
 //!
-//! **Loan invariant**: of each runner there is one loan that anything will ever use. While the
-//! runner is of a core's current instance, it is on the stack of the context that runs there.
+//! **Loan invariant**: of each runner exactly one loan will ever be used. While the runner belongs
+//! to a core's current instance, the loan is on the stack of the context running there.
 
 use alloc::boxed::Box;
 use core::ops::{Deref, DerefMut};
@@ -18,14 +18,14 @@ use super::CoreRunner;
 use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 
-/// A runner that is to be [given back](Self::give_back).
+/// Exclusive access to a runner, until [given back](Self::give_back).
 pub struct RunnerLoan(NonNull<CoreRunner>);
 
 // SAFETY: by the loan invariant it is the one way to the runner, which is `Send`.
 unsafe impl Send for RunnerLoan where CoreRunner: Send {}
 
 impl RunnerLoan {
-    /// Returns the runner itself.
+    /// Ends the loan and returns the runner.
     pub(super) fn give_back(self) -> CoreRunner {
         // SAFETY: `lend` has leaked a box, and by the loan invariant this ends its one loan.
         *unsafe { Box::from_raw(self.0.as_ptr()) }
@@ -50,19 +50,19 @@ impl DerefMut for RunnerLoan {
     }
 }
 
-/// Where all runners are, by vertex.
+/// The places of all runners, by vertex.
 pub(super) struct RunnerTable(Box<[Option<NonNull<CoreRunner>>]>);
 
 // SAFETY: the addresses are used for loans only, which are `Send`.
 unsafe impl Send for RunnerTable {}
 
 impl RunnerTable {
-    /// Makes room for so many vertices.
+    /// Makes room for a number of vertices.
     pub(super) fn new(vertices: usize) -> Self {
         Self((0..vertices).map(|_| None).collect())
     }
 
-    /// Lends a runner, and notes where it is.
+    /// Lends a runner, and notes its place.
     pub(super) fn lend(&mut self, runner: CoreRunner) -> RunnerLoan {
         let vertex = runner.vertex.index();
         let place = NonNull::from(Box::leak(Box::new(runner)));
@@ -70,7 +70,8 @@ impl RunnerTable {
         RunnerLoan(place)
     }
 
-    /// Takes the runner of a core's current instance back, whose context was `_left` there.
+    /// Recovers the runner of a core's current instance after the core has left the instance's
+    /// context, `_left`.
     pub(super) fn recover(
         &self,
         placement: &mut Placement<RunnerLoan, Parked>,

@@ -1,14 +1,13 @@
-//! The scheduler with the bodies that it decides about: one for each cluster of a run.
+//! The scheduler, with the bodies of its subtasks: one for each cluster of a run.
 //!
-//! Every event passes through here, under the cluster's one lock: a completion, by the
-//! core that finished, or the timer, on the cluster's first core. Each makes one step of the
-//! scheduler (completions, releases, one dispatch) and notes what each core is
-//! to run; [`sched_dag::placement`] then brings each core there. Where the cores are not
-//! divided, all are one cluster.
+//! Every event passes through here under the cluster's one lock: a completion, on the finishing
+//! core, or the timer, on the cluster's first core. Each event makes one step of the scheduler
+//! (completions, releases, one dispatch) and notes the instance each core is to run;
+//! [`sched_dag::placement`] then makes each core follow. Undivided cores form one cluster.
 //!
 //! To a scheduler and a placement, a core is its *seat*: its number within the cluster.
 //!
-//! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
+//! Times inside are on the scheduler's time: nanoseconds since the run's `epoch_ns`.
 
 mod cluster;
 mod divided;
@@ -49,37 +48,36 @@ pub use step::{complete, device_interrupt, fail, find_work, interrupt};
 pub enum CoreWork {
     /// Call the subtask's function for the instance.
     Run(RunnerLoan),
-    /// Go on with this context.
+    /// Continue this context.
     Continue(Parked),
-    /// Nothing.
+    /// No work.
     Rest,
 }
 
-/// A run as one cluster has it, from its launch until it is taken out.
+/// One cluster's part of a run, from the launch until the run is taken out.
 struct ClusterRun {
     engine: Engine<RunnerLoan, Parked>,
     loans: RunnerTable,
     cluster: &'static cluster::ClusterState,
-    /// The context of core 0 when nothing is assigned to it, while it is parked.
+    /// Core 0's background context, while parked because core 0 has an instance.
     background: Option<Parked>,
-    /// When the next dispatch is due, on the clock, if it waits for further events
-    /// of the instant in hand.
+    /// When the next dispatch is due, on the clock, if the dispatch waits for further events of the
+    /// current instant.
     dispatch_due_ns: Option<u64>,
-    /// How long a dispatch waits for further events of the same instant.
+    /// How long a dispatch waits for further events of the same instant, in nanoseconds.
     coincidence_ns: u64,
-    /// Whether a completion may be all of a step: no dispatch is owed, nor ever
-    /// waits.
+    /// Whether a completion alone may be the whole step: no dispatch is owed, and none ever waits.
     may_hand_off: bool,
     signals: RequestQueue,
-    /// In the first cluster.
+    /// The proven bounds, kept in the first cluster only.
     proven: ProvenBounds,
 }
 
 /// Time 0 of the run, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Reports, as an error, that a plan is prepared or runs. To be asked before anything is done for
-/// another one, as an instance may commit, too.
+/// Reports, as an error, an already prepared or running plan. Asked before anything is done for
+/// another plan, as an instance may commit, too.
 pub fn refuse_another() -> Result<(), LaunchError> {
     match cluster::nth(0).execution.lock().is_some() {
         true => Err(LaunchError::new(
@@ -89,8 +87,8 @@ pub fn refuse_another() -> Result<(), LaunchError> {
     }
 }
 
-/// Prepares a plan to be run; a dispatch waits for so long for further events of the same
-/// instant. Takes all memory that the run will need.
+/// Prepares a plan to be run; a dispatch waits `coincidence_ns` for further events of the same
+/// instant. Takes all memory for the run.
 pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result<(), LaunchError> {
     let options = terms.scheduler;
     port::provide(&plan.task_set, options)?;
@@ -98,7 +96,7 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
     let task_set = &plan.task_set;
     let (letters, parts) = divided::divide(task_set, lifecycle)?;
     let heap = crate::memory::heap::usage();
-    // Each cluster's journal gets its share of what is free now.
+    // Each cluster's journal gets an equal share of the heap now free.
     let share = task_set.clusters().count();
     let free_bytes = (heap.capacity_bytes - heap.in_use_bytes) / share;
     let most_events = terms.most_events / share as u64;
@@ -132,8 +130,8 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
     Ok(())
 }
 
-/// Sets time 0 of the prepared run, from which the releases count. Returns the
-/// number of jobs to come, or `None` if nothing is prepared.
+/// Sets time 0 of the prepared run, the origin of all releases. Returns the number of jobs to come,
+/// or `None` if nothing is prepared.
 pub fn set_epoch(epoch_ns: u64) -> Option<u64> {
     let task_set = task_set()?;
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
@@ -148,7 +146,7 @@ pub fn set_epoch(epoch_ns: u64) -> Option<u64> {
     Some(task_set.dags().iter().map(jobs_of).sum())
 }
 
-/// Takes the run out when it has ended, and drops what it has left behind.
+/// Takes out the ended run, and drops the remaining bodies and values.
 pub fn take_run() -> Option<Run> {
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
     let mut parts: Vec<ClusterRun> = parts.collect();

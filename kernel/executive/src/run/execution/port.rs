@@ -1,6 +1,6 @@
-//! The machine below a cluster's engine: its clock, its edge, and the cores to wake.
+//! The machine below a cluster's engine: clock, edge, and waking of cores.
 //!
-//! The stacks of a run are taken at its commit: as many as its DAGs can need at once.
+//! A run takes its stacks at the commit: as many as its DAGs can need at once.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -27,12 +27,12 @@ pub(super) struct SmpPort<'a> {
     pub(super) cluster: &'static ClusterState,
     pub(super) id: ClusterId,
     pub(super) letters: &'a Letters,
-    /// The other cores that have to look at what they should run.
+    /// The other cores due to look at their assigned work.
     pub(super) woken: &'a mut CoreSet,
 }
 
 impl PlatformPort<RunnerLoan> for SmpPort<'_> {
-    /// The edge tells of these, where a topic is recorded.
+    /// The edge hears of these events, if a topic is recorded.
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
     fn now_ns(&self) -> u64 {
@@ -44,14 +44,14 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
         time_ns.wrapping_add(EPOCH_NS.load(Ordering::Relaxed))
     }
 
-    /// Start and finish are stamped with interrupts disabled, so that no preemption can stand
-    /// between a stamp and what it says.
+    /// Stamps the start with interrupts disabled, as for the finish, so that no preemption comes
+    /// between a stamp and the stamped event.
     #[inline(always)]
     fn start(&mut self, _: CoreId, loan: &mut RunnerLoan, _: u64) -> u64 {
         begin_turn(loan, loan.budget_ns)
     }
 
-    /// The time in which it waits is not of its budget.
+    /// Keeps the rest of the budget: waiting time does not count as execution.
     fn wait(&mut self, _: CoreId, loan: &mut RunnerLoan, ended_ns: u64) {
         let ended_ns = self.on_clock(ended_ns);
         loan.budget_left_ns = match this_core::get().context().budget_end_ns() {
@@ -92,8 +92,8 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 }
 
-/// This core begins with a turn of a runner's instance, which may execute for so long. Returns when,
-/// on the run's time.
+/// Begins a turn of a runner's instance on this core, with `budget_ns` nanoseconds of execution
+/// left. Returns the start, in nanoseconds on the run's time.
 #[inline(always)]
 fn begin_turn(loan: &RunnerLoan, budget_ns: u64) -> u64 {
     let core = this_core::get();
@@ -111,21 +111,22 @@ fn begin_turn(loan: &RunnerLoan, budget_ns: u64) -> u64 {
     instance_time_ns(now_ns)
 }
 
-/// A subtask's [runner](fass::platform::SubtaskRunner), and what running an instance of it takes here.
+/// A subtask's [runner](fass::platform::SubtaskRunner), with the data for running an instance on
+/// this machine.
 ///
-/// There is one for each subtask, as a subtask has one started instance at a time
-/// (R2). Between its place and the core that runs it moves a [`RunnerLoan`].
+/// Each subtask has one, because a subtask has at most one started instance at a time (R2). A
+/// [`RunnerLoan`] moves between the runner's place and the core running the instance.
 pub struct CoreRunner {
     pub(super) inner: fass::platform::SubtaskRunner,
     cluster: &'static ClusterState,
-    /// The time that an instance may execute for, `u64::MAX` if there is no limit.
+    /// The execution budget of an instance in nanoseconds, `u64::MAX` if unlimited.
     pub(super) budget_ns: u64,
-    /// The rest of that when its instance began to wait.
+    /// The budget left when the instance began to wait, in nanoseconds.
     budget_left_ns: u64,
 }
 
 impl CoreRunner {
-    /// Returns the cluster that runs it.
+    /// Returns the cluster running this subtask.
     #[inline]
     pub(super) const fn cluster(&self) -> &'static ClusterState {
         self.cluster
@@ -166,7 +167,7 @@ pub(super) fn runners(
     })
 }
 
-/// Makes sure that the stacks which a task set needs are there.
+/// Provides the stacks needed by a task set.
 pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(), LaunchError> {
     let subtasks = task_set.vertices();
     let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
@@ -197,18 +198,19 @@ pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(
     Ok(())
 }
 
-/// Converts a time on the clock to the run's time; one before time 0 becomes that.
+/// Converts a time on the clock to the run's time, in nanoseconds; times before time 0 become 0.
 pub fn since_epoch(time_ns: u64) -> u64 {
     time_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
 }
 
-/// Does the same for when something happened to an instance: none before time 0.
+/// Converts the time of an instance's event likewise, without a check, as no instance runs before
+/// time 0.
 #[inline]
 pub(super) fn instance_time_ns(time_ns: u64) -> u64 {
     time_ns.wrapping_sub(EPOCH_NS.load(Ordering::Relaxed))
 }
 
-/// Returns the seat of the core that executes this. Interrupts are disabled.
+/// Returns the seat of the calling core. Interrupts are disabled.
 pub(super) fn here() -> CoreId {
     seat(this_core::get())
 }
@@ -224,14 +226,14 @@ pub fn keeps_time(core: &Core) -> bool {
     seat(core) == FIRST_SEAT
 }
 
-/// Sets this core's alarm for the next event; it is its cluster's first one. Interrupts are
+/// Sets this core's alarm for the next event; this core is its cluster's first. Interrupts are
 /// disabled, or nothing else runs here.
 pub fn arm_next_event() {
     let cluster = cluster::cluster_of(this_core::get());
     timer::set(Alarm::Schedule, cluster.next_event_ns());
 }
 
-/// Sets the alarms of all clusters. On core 0, before a run.
+/// Sets the alarms of all clusters. Called on core 0, before a run.
 pub fn arm_all() {
     arm_next_event();
     for cluster in cluster::all().skip(1) {

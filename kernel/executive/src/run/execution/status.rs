@@ -1,13 +1,13 @@
-//! Queries and changes of a run while it goes on, for the rest of the kernel and for a person.
+//! Queries and changes of a run in progress, for the rest of the kernel and for a person.
 //!
-//! To be called by core 0's background. Each question and each change holds a
-//! cluster's lock for a bounded time; nothing is allocated.
+//! Called by core 0's background. Each question and each change holds a cluster's lock for a
+//! bounded time; nothing is allocated.
 //!
-//! # What the clusters of a run that has ended leave behind
+//! # After a run: the bodies and values left behind by its clusters
 //!
-//! The bodies, and the values that waited for them, are dropped at once, DAG by DAG: outside any
-//! instance, so a `drop` of the app's that panics or never returns cannot be contained. It can be
-//! named ([`look_at_clearing`]).
+//! The bodies, and the values waiting for them, are dropped at once, DAG by DAG. The drop happens
+//! outside any instance, so an app's `drop` that panics or never returns cannot be contained, but
+//! the report can name its DAG ([`look_at_clearing`]).
 
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
@@ -31,14 +31,14 @@ const _: () = {
         job: 0,
         subtask: SubtaskId(0),
     };
-    // The heap tells by this whose memory it is.
+    // The heap identifies the owner of memory by this bit.
     assert!(EventSubject::of(any).ids == 1 << heap::OWNER_BIT);
 };
 
-/// Stands where the ids of an instance do, for none.
+/// The place of an instance's ids when there is no instance.
 const NOTHING: u64 = u64::MAX;
 
-/// Returns how many jobs have ended in this run, of DAGs with a limit of jobs.
+/// Returns the number of jobs ended in this run, of DAGs with a limit of jobs.
 pub fn jobs_ended() -> u64 {
     let counts = cluster::all().map(|cluster| cluster.jobs_ended.load(Ordering::Relaxed));
     counts.sum()
@@ -50,13 +50,12 @@ pub fn lock_acquisitions() -> u32 {
     counts.fold(0, u32::wrapping_add)
 }
 
-/// Returns when core 0's timer shall next step its scheduler.
+/// Returns when core 0's timer shall next step its scheduler, in nanoseconds on the clock.
 pub fn next_event_ns() -> u64 {
     cluster::nth(0).next_event_ns()
 }
 
-/// Calls `with` with the names of an instance's DAG and subtask, if they can be
-/// had without waiting.
+/// Calls `with` with the names of an instance's DAG and subtask, if available without waiting.
 pub fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
     let place = cluster::nth(0).execution.try_lock();
     let Some(execution) = place.as_ref().and_then(|execution| execution.as_ref()) else {
@@ -69,7 +68,7 @@ pub fn try_names(instance: Instance, with: impl FnOnce(&str, &str)) {
     }
 }
 
-/// Returns the instance that a core runs, without the lock.
+/// Returns a core's running instance, without the lock.
 pub fn running(core: &Core) -> Option<Instance> {
     let [ids, job] = core
         .running
@@ -78,13 +77,13 @@ pub fn running(core: &Core) -> Option<Instance> {
     (ids != NOTHING).then(|| EventSubject { ids, job }.instance())
 }
 
-/// Notes which instance a core runs, for [`running`].
+/// Notes a core's running instance, for [`running`].
 pub(super) fn note_running(core: &Core, subject: Option<EventSubject>) {
     let (ids, job) = subject.map_or((NOTHING, 0), |subject| (subject.ids, subject.job));
     core.note_running([ids, job]);
 }
 
-/// Reports whether the commit has proven a bound of anything in this run.
+/// Reports whether the commit has proven any bound for this run.
 pub fn has_bound() -> bool {
     let place = cluster::nth(0).execution.lock();
     place.as_ref().is_some_and(|execution| {
@@ -97,15 +96,15 @@ pub fn has_bound() -> bool {
     })
 }
 
-/// Looks at the scheduler of a cluster, shortly, if there is one.
+/// Looks briefly at a cluster's scheduler, if there is a run.
 pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
     turns::look_up();
     let mut place = cluster::nth(cluster).execution.lock();
     (place.as_mut()).map(|execution| look(&mut execution.engine.scheduler))
 }
 
-/// Looks at the journal of this core's cluster, if there is one and nobody is at work on it.
-/// Its cores count from the second argument of `look`.
+/// Looks at the journal of this core's cluster, if there is a journal and its lock is free. The
+/// journal counts cores from the second argument of `look`.
 pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
     let cluster = match this_core::is_ready() {
         true => cluster::cluster_of(this_core::get()),
@@ -120,14 +119,14 @@ pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
     })
 }
 
-/// Returns the model of the run, if one goes on.
+/// Returns the model of the current run, if any.
 pub fn task_set() -> Option<Arc<TaskSet>> {
     let place = cluster::nth(0).execution.lock();
     place.as_ref().map(|execution| execution.task_set().clone())
 }
 
-/// Returns the latest deadline of any job, on the run's time; `None` if there is
-/// no run, or no last job.
+/// Returns the latest deadline of any job, on the run's time, in nanoseconds; `None` if there is no
+/// run, or no last job.
 pub fn nominal_end_ns() -> Option<u64> {
     let end_ns = |dag: &Dag| {
         let last = dag.jobs().filter(|_| !dag.is_sporadic())?.checked_sub(1)?;
@@ -145,9 +144,9 @@ pub fn control(dag: DagId, change: fn(DagId) -> Request) {
     serve(None, divided::of_dag(dag), change(dag));
 }
 
-/// Serves a request in a step of a cluster's scheduler, or leaves it for the cluster that it
-/// concerns; one to the plan with a number only if that is the one which runs, and as of time 0 if
-/// it has not begun.
+/// Serves a request in a step of a cluster's scheduler, or sends the request to the concerned
+/// cluster. A request with a plan's number counts only if that plan runs, and as of time 0 if its
+/// run has not begun.
 pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: Request) {
     let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
@@ -167,6 +166,7 @@ pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: 
     let seat = cluster::visit(cluster);
     execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request));
     this_core::get().place.store(seat, Ordering::Relaxed);
+    // Outside the lock, so that no woken core finds the lock taken by this one.
     drop(place);
     woken.wake();
     // The step may want this core, too, which follows at its next interrupt.
@@ -178,15 +178,15 @@ pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: 
 /// The DAG whose bodies are being dropped, and since when.
 static CLEARING: SpinLock<Option<(Arc<TaskSet>, DagId, u64)>> = SpinLock::new(None);
 
-/// Hands over the name of the DAG whose bodies are being dropped, if that goes on, and since when
-/// it does.
+/// Passes `look` the name of the DAG whose bodies are being dropped, if any, and the start of that
+/// drop in nanoseconds on the clock.
 pub fn look_at_clearing<R>(look: impl FnOnce(&str, u64) -> R) -> Option<R> {
     let clearing = CLEARING.try_lock()?;
     let (task_set, dag, since_ns) = clearing.as_ref()?;
     Some(look(task_set.dag(*dag).name(), *since_ns))
 }
 
-/// Drops what the clusters of a run have left behind, and gives back what faults have left.
+/// Drops the bodies left behind by a run's clusters, and recovers the runners lost to faults.
 pub(super) fn clear(executions: &mut [ClusterRun]) {
     let task_set = Arc::clone(executions[0].task_set());
     for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {

@@ -1,18 +1,17 @@
-//! One step of the scheduler, and following what it decides.
+//! One step of the scheduler, and how cores follow its decisions.
 //!
 //! # Events of a core
 //!
-//! A core finds work, starts it, completes it, is interrupted, or ends it because of a fault.
-//! Each of these takes the cluster's lock once, makes a step of the scheduler where
-//! there is something to decide, and wakes the other cores after the lock is
-//! free again.
+//! A core finds work, starts an instance, completes an instance, takes an interrupt, or ends a
+//! faulty instance. Each event takes the cluster's lock once, makes a step of the scheduler if
+//! there is anything to decide, and wakes the other cores after releasing the lock.
 //!
-//! # What else completions do beyond their DAG
+//! # Effects of a completion beyond its DAG
 //!
-//! A completing instance's latest values show, and its requests are taken, signals among them,
-//! under the lock and before the scheduler's step; the step passes them on right after the
-//! completion. A signal from outside makes a step of its own. A request that concerns another
-//! cluster is a letter ([`cluster`]), which counts once that cluster takes it.
+//! Under the lock and before the scheduler's step, a completing instance publishes its latest
+//! values and hands over its requests, signals included; the step passes the requests on right
+//! after the completion. A signal from outside makes a step of its own. A request to another
+//! cluster becomes a letter ([`cluster`]), effective once the other cluster takes the letter.
 
 use core::sync::atomic::Ordering;
 
@@ -37,7 +36,7 @@ use crate::machine::{clock, interrupt_flag, section, turns};
 use crate::run::contexts;
 
 impl ClusterRun {
-    /// Returns the engine, and the port for a step of it.
+    /// Returns the engine, and the port for one step of the engine.
     #[inline(always)]
     pub(super) fn parts<'s>(
         &'s mut self,
@@ -52,8 +51,8 @@ impl ClusterRun {
         (&mut self.engine, port)
     }
 
-    /// Makes one step of the scheduler, and says which other cores have to
-    /// look at what they should run.
+    /// Makes one step of the scheduler, and adds to `woken` the other cores due to look at their
+    /// assigned work.
     #[inline(always)]
     pub(super) fn step(
         &mut self,
@@ -71,9 +70,11 @@ impl ClusterRun {
         self.end_step(now_ns, woken);
     }
 
-    /// Ends the wait whose limit has come, if that is all of a step, and reports whether it is.
+    /// Ends a wait whose limit has come, if the step consists of nothing else, and reports whether
+    /// that was so.
     #[inline]
     fn wake(&mut self, now_ns: u64, woken: &mut CoreSet) -> bool {
+        // While a dispatch is owed, the whole step has to be taken.
         if !self.engine.scheduler.has_waits() || !self.may_hand_off {
             return false;
         }
@@ -87,7 +88,7 @@ impl ClusterRun {
 
     #[inline]
     fn end_step(&mut self, now_ns: u64, woken: &mut CoreSet) {
-        // What happens before time 0 releases nothing yet.
+        // Events before time 0 release nothing yet.
         let waits_until_ns = now_ns.saturating_add(self.coincidence_ns);
         let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
         let due_ns = *(self.dispatch_due_ns).get_or_insert(waits_until_ns.max(epoch_ns));
@@ -95,6 +96,8 @@ impl ClusterRun {
             self.may_hand_off = false;
         } else {
             self.dispatch_due_ns = None;
+            // With a coincidence time, every later completion may have to wait as well: no
+            // hand-offs.
             self.may_hand_off = self.coincidence_ns == 0;
             let (engine, mut port) = self.parts(woken);
             engine.decide(since_epoch(now_ns), &mut port);
@@ -102,14 +105,14 @@ impl ClusterRun {
         self.announce(woken);
     }
 
-    /// Returns the cluster that it is the run of.
+    /// Returns the cluster of this part of the run.
     #[inline]
     pub(super) const fn cluster(&self) -> &'static ClusterState {
         self.cluster
     }
 
-    /// Publishes the next event, and sees to it that the first core waits for it: that is to
-    /// be woken if it has to be for that, and core 0 if nothing is left to be done here.
+    /// Publishes the next event and ensures that the cluster's first core waits for the event:
+    /// wakes the first core if necessary, and core 0 if nothing is left to do here.
     #[inline(always)]
     fn announce(&self, woken: &mut CoreSet) {
         let cluster = self.cluster();
@@ -119,6 +122,8 @@ impl ClusterRun {
         if here() == FIRST_SEAT {
             timer::set(Alarm::Schedule, cluster.next_event_ns());
         } else if cluster.next_event_ns() < earlier_ns || is_over() {
+            // Another core's timer cannot be written from here: the first core arms its own when
+            // woken.
             woken.insert(cluster.core(FIRST_SEAT));
         }
         if is_over() {
@@ -126,9 +131,9 @@ impl ClusterRun {
         }
     }
 
-    /// Shows all cores when the next event is, and whether nothing is left to be done.
+    /// Publishes to all cores the time of the next event, and whether nothing is left to do.
     ///
-    /// Inlined into each step: as a call the way to a preemption takes six instructions more.
+    /// Inlined into each step: as a call, the way to a preemption takes six instructions more.
     #[inline(always)]
     pub(super) fn publish(&self) {
         let next = self.engine.scheduler.next_event_ns();
@@ -142,7 +147,7 @@ impl ClusterRun {
         self.cluster().publish(next_ns, is_finished);
     }
 
-    /// Finds what this core, which runs nothing, is to do.
+    /// Finds the next work for this core, which runs nothing.
     pub(super) fn find_work(&mut self, core: &Core) -> CoreWork {
         let here = seat(core);
         let mut none = CoreSet::default();
@@ -155,7 +160,7 @@ impl ClusterRun {
                 note_running(core, self.current(here.index()).map(EventSubject::of));
                 CoreWork::Continue(context)
             }
-            // Only core 0 has a background, and only while it does other work.
+            // Only core 0 has a background, parked only while core 0 does other work.
             NextWork::Nothing => {
                 note_running(core, None);
                 let background = self.background.take_if(|_| core.index == 0);
@@ -164,21 +169,21 @@ impl ClusterRun {
         }
     }
 
-    /// Returns the instance that a core has, by its seat.
+    /// Returns a core's current instance, by seat.
     fn current(&self, seat: usize) -> Option<Instance> {
         let vertex = self.engine.placement.current(seat)?;
         Some(self.engine.scheduler.instance_of(vertex))
     }
 
-    /// Makes the core whose interrupt is being handled leave what it should no
-    /// longer run. Returns the seat of the core that waits for that, if there is one.
+    /// Makes the interrupted core leave its instance if another is wanted. Returns the seat of the
+    /// core waiting for the suspended instance, if any.
     pub(super) fn follow(&mut self, interrupted: &mut Interrupted, now_ns: u64) -> Option<CoreId> {
         let core = this_core::get();
         let here = seat(core).index();
         let is_background = core.context().is_background();
         let leaves_background = is_background && self.engine.placement.is_wanted(here);
         if !self.engine.placement.must_suspend(here) && !leaves_background {
-            // Idle cores other than 0 have no background context to leave: wake them.
+            // Idle cores other than core 0 have no background context to leave: wake them.
             if self.engine.placement.is_wanted(here) {
                 core.wake.store(true, Ordering::Relaxed);
             }
@@ -186,7 +191,7 @@ impl ClusterRun {
         }
         let suspended = self.engine.placement.detach(here);
         if let Some(vertex) = suspended {
-            // Not when the interrupt came: its step has left events since then.
+            // Not the interrupt's time: its step has left events since then.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.engine.scheduler.instance_of(vertex);
             self.engine.scheduler.log.journal.write(
@@ -212,6 +217,8 @@ impl ClusterRun {
         };
         note_running(core, self.current(here).map(EventSubject::of));
         let last = interrupted.exchange(next);
+        // Another core may resume `last` once the lock is free: this core is on its handler stack
+        // and touches that context no more.
         match suspended {
             Some(vertex) => {
                 last.note_suspended(now_ns);
@@ -242,11 +249,11 @@ impl ClusterRun {
     }
 }
 
-/// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
+/// Finds the next work for this core, which runs nothing. Interrupts are disabled.
 pub fn find_work() -> CoreWork {
     let core = this_core::get();
     let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
-    // Behind a fault that was the run's last event, that may have been taken out.
+    // Behind a fault that was the run's last event, the run may have been taken out.
     let work = match place.as_mut() {
         Some(execution) => execution.find_work(core),
         None => CoreWork::Rest,
@@ -255,7 +262,7 @@ pub fn find_work() -> CoreWork {
     take_turns(core, work)
 }
 
-/// Leaves the turns to others if this core does not compute.
+/// Gives up this core's turn if the core does not compute.
 fn take_turns(core: &Core, work: CoreWork) -> CoreWork {
     match &work {
         CoreWork::Run(_) => {}
@@ -265,8 +272,8 @@ fn take_turns(core: &Core, work: CoreWork) -> CoreWork {
     work
 }
 
-/// Reports that this core has run its instance, and finds what it is to do
-/// next. Interrupts are disabled.
+/// Reports this core's instance as completed, and finds the core's next work. Interrupts are
+/// disabled.
 pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     let here = here();
     let mut place = finished.cluster().execution.lock_uninterrupted();
@@ -297,9 +304,9 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     take_turns(core, work)
 }
 
-/// Ends this core's instance because of a fault, and with it its DAG or its job. Returns which, and
-/// how many nanoseconds the instance might execute for. Its context was `left` here. Interrupts are
-/// disabled.
+/// Ends this core's instance because of a fault, and with the instance its DAG or its job. Returns
+/// the cost, and the instance's budget in nanoseconds. The core has left the instance's context,
+/// `left`. Interrupts are disabled.
 pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     let core = this_core::get();
     let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
@@ -307,8 +314,8 @@ pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     let here = seat(core);
     let placement = &mut execution.engine.placement;
     let lost = (execution.loans).recover(placement, here.index(), left)?;
-    // Not when the interrupt came: a step may have left events since then. Nor may what follows
-    // stand before this event.
+    // Not the interrupt's time: a step may have left events since then. Nor may later events
+    // precede this one.
     let clock_ns = clock::now_ns();
     let ended_ns = since_epoch(clock_ns);
     note_running(core, None);
@@ -323,8 +330,8 @@ pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     Some((cost, budget_ns))
 }
 
-/// Makes a step of the scheduler if `is_event`, and follows its decisions on this
-/// core. In an interrupt handler.
+/// Makes a step of the scheduler if `is_event`, and follows its decisions on this core. Called in
+/// an interrupt handler.
 pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     let core = this_core::get();
     let cluster = cluster::cluster_of(core);
@@ -336,6 +343,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     if (is_event || cluster.may_have_letters()) && !execution.wake(now_ns, &mut woken) {
         execution.step(now_ns, &mut woken, |_| ());
     }
+    // A section of an app's lock postpones the preemption; the alarm or the section's end retries.
     if !section::puts_off(core, now_ns)
         && let Some(waiting) = execution.follow(interrupted, now_ns)
     {
@@ -345,8 +353,8 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     woken.wake();
 }
 
-/// Lets a driver take what its device has, and follows on this core what that has decided: no other
-/// interrupt is needed. In an interrupt handler.
+/// Lets a driver serve its device, and follows the resulting decisions on this core, so no further
+/// interrupt is needed. Called in an interrupt handler.
 pub fn device_interrupt(interrupted: &mut Interrupted, now_ns: u64, driver: impl FnOnce()) {
     let core = this_core::get();
     core.follows.store(true, Ordering::Relaxed);
@@ -355,11 +363,11 @@ pub fn device_interrupt(interrupted: &mut Interrupted, now_ns: u64, driver: impl
     interrupt(interrupted, now_ns, false);
 }
 
-/// The requests of a run that are on their way to its scheduler.
+/// A run's requests on their way to its scheduler.
 pub(super) struct RequestQueue {
-    /// The number of the plan that runs.
+    /// The number of the running plan.
     pub(super) plan: u64,
-    /// Whether the run has begun, so that there is time.
+    /// Whether the run has begun: before, there is no time.
     pub(super) has_begun: bool,
     pub(super) letters: Letters,
 }
@@ -375,27 +383,27 @@ impl RequestQueue {
 }
 
 impl ClusterRun {
-    /// Begins to pass signals on, those from before at time 0.
+    /// Begins to pass signals on; signals from before the run count at time 0.
     pub(super) fn begin_signals(&mut self) {
         self.signals.has_begun = true;
-        // What was raised before is to DAGs of this cluster.
+        // All signals raised before are to DAGs of this cluster.
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
         engine.tell((0, here()), &mut port, |_| ());
     }
 }
 
-/// Takes a signal from outside all instances to a DAG of the plan with a number. One
-/// that comes between the commit and the run counts as of time 0.
+/// Takes a signal from outside all instances, to a DAG of the plan with a number. A signal between
+/// the commit and the run counts as of time 0.
 ///
 /// # Panics
 ///
-/// If an instance does so.
+/// If an instance calls this function.
 #[track_caller]
 pub fn raise(plan: u64, dag: DagId) {
     let were_enabled = interrupt_flag::disable();
     let core = this_core::get();
-    // A driver may, whatever its message has interrupted.
+    // A driver may, whichever instance its message has interrupted.
     let is_driver = core.follows.load(Ordering::Relaxed);
     let is_instance = !is_driver && status::running(core).is_some();
     if !is_instance {
@@ -409,15 +417,15 @@ pub fn raise(plan: u64, dag: DagId) {
     );
 }
 
-/// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
-/// are disabled. One for another cluster is a letter.
+/// Takes a signal from outside, like [`raise`], in an interrupt or where an interrupt could be:
+/// interrupts are disabled. A signal for another cluster becomes a letter.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
     let cluster = cluster::cluster_of(this_core::get());
     status::serve(Some(plan), cluster, Request::Signal(dag));
 }
 
-/// Takes the answer to a wait of the plan with a number, from wherever it comes: an instance, an
-/// interrupt's handler, or the background. One for another cluster is a letter.
+/// Takes the answer to a wait of the plan with a number, from anywhere: an instance, an interrupt
+/// handler, or the background. An answer for another cluster becomes a letter.
 pub fn answer(plan: u64, wait: WaitId) {
     let were_enabled = interrupt_flag::disable();
     let cluster = cluster::cluster_of(this_core::get());
