@@ -1,15 +1,15 @@
-//! Memory that a device reads and writes.
+//! Memory for a device to read and write.
 //!
 //! **DMA invariant**: a [`DmaMemory`] is whole pages of the heap, where addresses are physical
-//! ones; nothing else has them, and they are never given back, as a device cannot be made to
-//! forget an address.
+//! addresses; nothing else has these pages, and they are never given back, as a device cannot be
+//! made to forget an address.
 
 use core::alloc::Layout;
 
 /// A device's page.
 const PAGE: usize = 4096;
 
-/// Memory that a device reads and writes, for good.
+/// Memory read and written by a device, for good.
 pub struct DmaMemory {
     start: u64,
     length: usize,
@@ -21,7 +21,7 @@ macro_rules! access {
         ///
         /// # Panics
         ///
-        /// Panics if the word is not within, or not aligned.
+        /// Panics if the word is outside the memory, or not aligned.
         #[inline]
         #[must_use]
         pub fn $read(&self, offset: usize) -> $kind {
@@ -34,7 +34,7 @@ macro_rules! access {
         ///
         /// # Panics
         ///
-        /// Panics if the word is not within, or not aligned.
+        /// Panics if the word is outside the memory, or not aligned.
         #[inline]
         pub fn $write(&mut self, offset: usize, value: $kind) {
             let place = self.place(offset, size_of::<$kind>()) as *mut $kind;
@@ -45,8 +45,8 @@ macro_rules! access {
 }
 
 impl DmaMemory {
-    /// Takes zeroed memory, rounded up to whole pages, before the commit. `None`: there is no
-    /// more.
+    /// Takes zeroed memory, rounded up to whole pages, before the commit. Returns `None` if no
+    /// memory is left.
     pub fn new(length: usize) -> Option<Self> {
         let length = length.max(1).checked_next_multiple_of(PAGE)?;
         let layout = Layout::from_size_align(length, PAGE).ok()?;
@@ -58,7 +58,7 @@ impl DmaMemory {
         })
     }
 
-    /// Returns the address by which the device reaches it.
+    /// Returns the memory's address for the device.
     pub const fn address(&self) -> u64 {
         self.start
     }

@@ -7,16 +7,16 @@ use fass::platform::SetOnce;
 use super::pci::{BUSES, Configuration, Place};
 use super::registers::Registers;
 
-/// The bytes of a function's configuration space, and those of a bus.
+/// The bytes of a function's configuration space, and of a bus.
 const FUNCTION: u64 = 4096;
 const BUS: u64 = 256 * FUNCTION;
 
-/// Where the firmware's tables say that it is; 0: nowhere.
+/// The start of the space by the firmware's tables; 0 if there is none.
 static PLACE: AtomicU64 = AtomicU64::new(0);
 
 static ECAM: SetOnce<Ecam> = SetOnce::new();
 
-/// Notes where the machine has it. It is mapped when a driver asks.
+/// Notes the start of the machine's configuration space. The space is mapped when a driver asks.
 pub fn note_place(start: Option<u64>) {
     PLACE.store(start.unwrap_or(0), Ordering::Relaxed);
 }
@@ -26,7 +26,7 @@ pub fn note_place(start: Option<u64>) {
 pub enum EcamError {
     /// The firmware's tables name no such memory.
     Absent,
-    /// There is something else.
+    /// The place belongs to something else.
     Taken(u64),
 }
 
@@ -46,7 +46,8 @@ impl core::fmt::Display for EcamError {
     }
 }
 
-/// Returns the machine's, mapped at the first call: an app that does not ask has no cost of it.
+/// Returns the machine's configuration space, mapped at the first call: an app without drivers pays
+/// nothing.
 ///
 /// # Errors
 ///
@@ -67,13 +68,14 @@ pub fn configuration() -> Result<&'static Ecam, EcamError> {
 pub struct Ecam(Registers);
 
 impl Ecam {
-    /// Maps the space that begins at an address, that of bus 0; none if there is something else.
+    /// Maps the space starting at an address with bus 0; `None` if the place belongs to something
+    /// else.
     pub fn new(start: u64) -> Option<Self> {
         let end = start.checked_add(BUSES as u64 * BUS)?;
         Registers::map(start..end).map(Self)
     }
 
-    /// Returns the registers of a function, if its bus is one of the first.
+    /// Returns the registers of a function, if its bus is among the first.
     fn of(&self, place: Place) -> Option<Registers> {
         self.0.part(u64::from(place.0) * FUNCTION, FUNCTION)
     }

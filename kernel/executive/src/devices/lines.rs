@@ -14,10 +14,10 @@ use crate::run::execution;
 
 /// A driver's answer to its device's message.
 pub trait DeviceLine: Sync {
-    /// Takes what the device has, and releases DAGs or answers waits, by
+    /// Takes the device's data, and releases DAGs or answers waits, by
     /// [`Signal::raise`](fass::shared::Signal::raise) and
-    /// [`DeviceDriver::answer`](fass::shared::DeviceDriver::answer). In an interrupt: it returns
-    /// soon, allocates nothing, and must not panic.
+    /// [`DeviceDriver::answer`](fass::shared::DeviceDriver::answer). Called in an interrupt:
+    /// returns soon, allocates nothing, and must not panic.
     fn interrupt(&self, now_ns: u64);
 }
 
@@ -59,18 +59,18 @@ impl core::fmt::Display for LineError {
     }
 }
 
-/// A message that is tied to a driver.
+/// A message tied to a driver.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     place: Place,
     number: u16,
     vector: u8,
-    /// Its entry in a table in memory, if the function has one.
+    /// The message's entry in a table in memory, if the function has one.
     entry: Option<(Registers, u64)>,
 }
 
-/// Ties a message of a function to a driver, and has the function send it to a core, given by its
-/// number. The function sends once it [may reach memory](Function::enable_reach).
+/// Ties a message of a function to a driver, and makes the function send the message to a core,
+/// given by its number. The function sends once it [may reach memory](Function::enable_reach).
 ///
 /// # Errors
 ///
@@ -125,12 +125,12 @@ fn take(driver: &'static dyn DeviceLine) -> Result<u8, LineError> {
     free.map(|(vector, _)| vector).ok_or(LineError::NoLine)
 }
 
-/// A line whose message a core sends, to itself or another.
+/// A line for messages sent by a core, to itself or another core.
 #[derive(Clone, Copy, Debug)]
 pub struct Bell(u8);
 
 impl Bell {
-    /// Ties it to a driver.
+    /// Ties the line to a driver.
     ///
     /// # Errors
     ///
@@ -139,13 +139,13 @@ impl Bell {
         take(driver).map(Self)
     }
 
-    /// Has the driver called on a core, as soon as interrupts are enabled there.
+    /// Makes a core call the driver, as soon as interrupts are enabled there.
     pub fn ring(self, core: &Core) {
         local_apic::send(core.apic_id(), self.0);
     }
 }
 
-/// Returns the local APIC's id of a core, to which a message can be sent.
+/// Returns the local APIC's id of a core, if messages can reach the core.
 fn reached(core: u32) -> Result<u8, LineError> {
     let core = (this_core::all().get(core as usize)).ok_or(LineError::NoCore(core))?;
     let id = u8::try_from(core.apic_id()).ok();
@@ -161,8 +161,8 @@ impl Line {
         })
     }
 
-    /// Has the message sent to another core from now on. To be called between runs, while the
-    /// device has nothing to say: a message on its way may be lost.
+    /// Sends the message to another core from now on. To be called between runs, while the device
+    /// has nothing to say: a message on its way may be lost.
     ///
     /// # Errors
     ///
@@ -176,7 +176,7 @@ impl Line {
             let sent = sent.and_then(|function| function.send(self.number, message));
             return sent.map(drop).map_err(LineError::Function);
         };
-        // Masked while its parts do not fit each other.
+        // Masked while its parts do not match each other.
         table.write32(offset + 12, 1);
         table.write32(offset, message.address);
         table.write32(offset + 4, 0);

@@ -1,12 +1,13 @@
-//! Devices: PCI functions, their registers, memory that they reach, and their interrupts.
+//! Devices: PCI functions, their registers, the memory within their reach, and their interrupts.
 //!
 //! A driver finds its [function](pci::Function), maps its [registers](registers::Registers), gives
-//! it [memory](dma::DmaMemory), and ties its messages to a [line](lines): an interrupt takes what
-//! the device has, and releases a DAG or ends a wait; it never runs an app's code. An app without
-//! a driver has none of this in its image.
+//! it [memory](dma::DmaMemory), and ties its messages to a [line](lines): the interrupt handler
+//! takes data from the device, and releases a DAG or ends a wait, but never runs a subtask's code.
+//! The image of an app without a driver contains none of this code.
 //!
-//! To let a device reach memory is the one step that the compiler cannot judge, as it writes where
-//! it is told. So [`enable_reach`](pci::Function::enable_reach) is the one unsafe call of a driver.
+//! The compiler cannot judge one step: letting a device reach memory, as the device writes wherever
+//! told. [`enable_reach`](pci::Function::enable_reach) is therefore the only unsafe call of a
+//! driver.
 
 pub mod dma;
 pub mod ecam;

@@ -1,14 +1,14 @@
-//! PCI functions: found, their ranges of registers sized, their messages addressed (PCI Local Bus
-//! Specification 3.0, chapter 6).
+//! PCI functions: finds them, sizes their ranges of registers, and addresses their messages (PCI
+//! Local Bus Specification 3.0, chapter 6).
 //!
-//! A function's statements are not believed: chains have an end, sizes are powers of two, and a
+//! A function's statements are not trusted: chains have an end, sizes are powers of two, and a
 //! table of messages lies within its range.
 
 use core::ops::Range;
 
 /// The configuration space of all functions.
 pub trait Configuration {
-    /// Reads four bytes; ones where there is no function.
+    /// Reads four bytes; all ones if there is no function.
     fn read(&self, place: Place, offset: u16) -> u32;
     /// Writes four bytes.
     fn write(&self, place: Place, offset: u16, value: u32);
@@ -25,13 +25,13 @@ impl core::fmt::Display for Place {
     }
 }
 
-/// The most buses that are looked at.
+/// The most buses searched.
 pub const BUSES: usize = 8;
 
-/// The most capabilities that fit into the 192 bytes in which they are, of 4 bytes each.
+/// The most capabilities: 192 bytes, by 4 bytes each.
 const CAPABILITIES: usize = 48;
 
-/// The largest range of registers that is mapped.
+/// The largest range of registers to be mapped, in bytes.
 const LARGEST: u64 = 1 << 28;
 
 /// Offsets in configuration space.
@@ -44,7 +44,7 @@ mod offset {
     pub(super) const CAPABILITIES: u16 = 0x34;
 }
 
-/// Bits of the command register, and one of the status above it.
+/// Bits of the command register, and one bit of the status above.
 mod command {
     pub(super) const MEMORY: u32 = 1 << 1;
     pub(super) const MASTER: u32 = 1 << 2;
@@ -55,17 +55,17 @@ mod command {
 /// Why a function cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PciError {
-    /// It has no such range of registers in memory, or the firmware gave it no place.
+    /// The function has no such range of registers in memory, or no place from the firmware.
     NoRange(u8),
-    /// A range's size or place cannot be.
+    /// A range has an impossible size or place.
     MalformedRange(u8),
-    /// There is memory, or something else, where a range is.
+    /// The place of a range belongs to memory, or something else.
     Taken(u8),
     /// The function may reach memory: it has a driver, or the firmware has left it so.
     Driven,
-    /// It sends no messages, neither by MSI-X nor by MSI, or not so many.
+    /// The function sends no messages by MSI-X or MSI, or not so many.
     NoMessages,
-    /// Its table of messages is not within its range, or is too short.
+    /// The function's table of messages is outside its range, or too short.
     MalformedTable,
 }
 
@@ -96,20 +96,20 @@ impl core::fmt::Display for PciError {
 #[derive(Clone, Copy)]
 pub struct Function<'c> {
     configuration: &'c dyn Configuration,
-    /// Its place.
+    /// The function's place.
     pub place: Place,
-    /// The numbers of its vendor and of its device.
+    /// The numbers of vendor and device.
     pub id: (u16, u16),
     /// Class, subclass, interface and revision, a byte each.
     pub class: u32,
 }
 
-/// An interrupt as a device sends it: a store to an address (Intel SDM volume 3, 11.11).
+/// An interrupt in the form sent by a device: a store to an address (Intel SDM volume 3, 11.11).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// The address: the core.
+    /// The address of the store: selects the core.
     pub address: u32,
-    /// The word that is stored there: the vector.
+    /// The word stored there: the vector.
     pub data: u16,
 }
 
@@ -118,7 +118,7 @@ pub struct Message {
 pub struct MessageEntry {
     /// The BAR of the table.
     pub bar: u8,
-    /// The entry's place in that range.
+    /// The entry's offset in that range, in bytes.
     pub offset: u64,
 }
 
@@ -133,7 +133,7 @@ pub fn find<'c>(configuration: &'c dyn Configuration, each: &mut dyn FnMut(Funct
             let first = u16::from(bus) << 8 | device << 3;
             for place in (first..first + 8).map(Place) {
                 let Some(function) = Function::at(configuration, place) else {
-                    // Without its first function a device is none.
+                    // A device without its first function does not exist.
                     if place.0 == first {
                         break;
                     }
@@ -142,7 +142,7 @@ pub fn find<'c>(configuration: &'c dyn Configuration, each: &mut dyn FnMut(Funct
                 let [.., header, _] = function.read(offset::HEADER).to_le_bytes();
                 if header & 0x7f == 1 {
                     let [_, secondary, ..] = function.read(offset::BUSES).to_le_bytes();
-                    // A bridge to a bus that is known would lead in a circle.
+                    // A bridge to a known bus would lead in a circle.
                     if known < BUSES && !buses[..known].contains(&secondary) {
                         buses[known] = secondary;
                         known += 1;
@@ -170,7 +170,7 @@ impl<'c> Function<'c> {
         })
     }
 
-    /// Reads four bytes of its configuration space.
+    /// Reads four bytes of the function's configuration space.
     pub fn read(&self, offset: u16) -> u32 {
         self.configuration.read(self.place, offset & 0xffc)
     }
@@ -183,7 +183,7 @@ impl<'c> Function<'c> {
         self.read(offset).to_le_bytes()[usize::from(offset & 3)]
     }
 
-    /// Returns the offsets of its capabilities of a kind, in their order.
+    /// Returns the offsets of the function's capabilities of a kind, in order.
     pub fn capabilities(&self, kind: u8) -> impl Iterator<Item = u16> {
         let has_some = self.read(offset::COMMAND) & command::HAS_CAPABILITIES != 0;
         let first = has_some.then(|| self.byte(offset::CAPABILITIES) & 0xfc);
@@ -195,29 +195,29 @@ impl<'c> Function<'c> {
             .map(u16::from)
     }
 
-    /// Lets it answer at its ranges, and turns its interrupt line off.
+    /// Lets the function answer at its ranges, and turns its interrupt line off.
     pub fn enable(&self) {
         self.command(command::MEMORY | command::NO_LINE);
     }
 
-    /// Lets it reach memory, too, and send messages.
+    /// Lets the function reach memory, too, and send messages.
     ///
     /// # Safety
     ///
-    /// The device writes wherever it is told. So it is told no address but those of
-    /// [`DmaMemory`](super::dma::DmaMemory), and of memory that the driver owns and leaves alone
-    /// until the device is done with it, each with a length within it.
+    /// The device writes wherever told. The driver therefore tells the device only addresses of
+    /// [`DmaMemory`](super::dma::DmaMemory), and of memory owned by the driver and left alone until
+    /// the device has finished, each with a length within that memory.
     pub unsafe fn enable_reach(&self) {
         self.command(command::MEMORY | command::MASTER | command::NO_LINE);
     }
 
-    /// Reports whether it may reach memory.
+    /// Reports whether the function may reach memory.
     pub(super) fn reaches(&self) -> bool {
         self.read(offset::COMMAND) & command::MASTER != 0
     }
 
     fn command(&self, bits: u32) {
-        // The status above is cleared by ones.
+        // Writing ones would clear the status above.
         let kept = self.read(offset::COMMAND) & 0xffff & !command::MASTER;
         self.write(offset::COMMAND, kept | bits);
     }
@@ -230,7 +230,7 @@ impl<'c> Function<'c> {
     pub fn range(&self, bar: u8) -> Result<Range<u64>, PciError> {
         let at = offset::RANGES + 4 * u16::from(bar);
         let low = if bar < 6 { self.read(at) } else { 1 };
-        // Bit 0 is that of ports; a range of 64 bits takes two places.
+        // Bit 0 marks I/O ports; a range of 64 bits takes two places.
         let is_wide = low & 6 == 4;
         if low & 1 != 0 || low & !0xf == 0 && !is_wide {
             return Err(PciError::NoRange(bar));
@@ -240,7 +240,7 @@ impl<'c> Function<'c> {
         }
         let high = if is_wide { self.read(at + 4) } else { 0 };
         let command = self.read(offset::COMMAND) & 0xffff;
-        // While it is asked for its size it must answer nowhere.
+        // While asked for its size, the range must answer nowhere.
         self.write(offset::COMMAND, command & !command::MEMORY);
         let mask = |at, before| {
             self.write(at, u32::MAX);
@@ -270,8 +270,8 @@ impl<'c> Function<'c> {
             .ok_or(PciError::MalformedRange(bar))
     }
 
-    /// Has it send `message` as the one with a number, and turns sending on. Where the messages
-    /// are in memory (MSI-X), the caller writes it to the place that is returned.
+    /// Makes the function send `message` as its message `number`, and turns sending on. If the
+    /// messages are in memory (MSI-X), the caller writes the message to the returned place.
     ///
     /// # Errors
     ///
@@ -292,7 +292,7 @@ impl<'c> Function<'c> {
         }
         let data = if is_wide { at + 12 } else { at + 8 };
         self.write(data, self.read(data) & !0xffff | u32::from(message.data));
-        // On, and one message of those that it could send.
+        // On, with one message of the possible ones.
         self.write(at, control & !(7 << 20) | 1 << 16);
         Ok(None)
     }
@@ -309,7 +309,7 @@ impl<'c> Function<'c> {
         if u32::from(number) >= count || offset + 16 > range.end - range.start {
             return Err(PciError::MalformedTable);
         }
-        // Each entry is masked by itself until it is written.
+        // Each entry stays masked by itself until written.
         self.write(at, control & !MASKED | ON);
         Ok(MessageEntry { bar, offset })
     }

@@ -1,14 +1,14 @@
 //! Registers of a device in memory, uncached.
 //!
-//! **Register invariant**: a [`Registers`] covers pages that are mapped as a device's for good,
-//! and no memory; or memory of a fake device, which is its own for good.
+//! **Register invariant**: a [`Registers`] covers pages mapped as a device's for good, and no
+//! memory; or memory of a fake device, which is its own for good.
 
 use core::ops::Range;
 
 use super::pci::{Function, PciError};
 use crate::memory;
 
-/// A range of registers. Each access is within it.
+/// A range of registers. Each access stays within the range.
 #[derive(Clone, Copy, Debug)]
 pub struct Registers {
     start: u64,
@@ -21,7 +21,7 @@ macro_rules! access {
         ///
         /// # Panics
         ///
-        /// Panics if the register is not within the range, or not aligned.
+        /// Panics if the register is outside the range, or not aligned.
         #[inline]
         #[track_caller]
         #[must_use]
@@ -35,7 +35,7 @@ macro_rules! access {
         ///
         /// # Panics
         ///
-        /// Panics if the register is not within the range, or not aligned.
+        /// Panics if the register is outside the range, or not aligned.
         #[inline]
         #[track_caller]
         pub fn $write(&self, offset: u64, value: $kind) {
@@ -48,8 +48,8 @@ macro_rules! access {
 }
 
 impl Registers {
-    /// Maps a range of a function, before this is let [reach memory](Function::enable_reach): later
-    /// whoever had its registers could have it write anywhere.
+    /// Maps a range of a function, before the function may [reach memory](Function::enable_reach):
+    /// later, any holder of its registers could make it write anywhere.
     ///
     /// # Errors
     ///
@@ -61,12 +61,12 @@ impl Registers {
         }
     }
 
-    /// Maps a range of a function, whatever that may reach.
+    /// Maps a range of a function, regardless of the function's reach.
     pub(super) fn in_bar(function: &Function<'_>, bar: u8) -> Result<Self, PciError> {
         Self::map(function.range(bar)?).ok_or(PciError::Taken(bar))
     }
 
-    /// Makes registers of memory, for a fake device.
+    /// Makes registers from memory, for a fake device.
     #[doc(hidden)]
     pub fn over(memory: &'static mut [u64]) -> Self {
         Self {
@@ -75,7 +75,7 @@ impl Registers {
         }
     }
 
-    /// Maps a range, unless there is something else.
+    /// Maps a range, unless the place belongs to something else.
     pub(super) fn map(range: Range<u64>) -> Option<Self> {
         memory::map_registers(range.clone()).ok()?;
         Some(Self {
@@ -84,7 +84,7 @@ impl Registers {
         })
     }
 
-    /// Returns a part of the range, if it is within.
+    /// Returns a part of the range, if within the range.
     pub fn part(&self, offset: u64, length: u64) -> Option<Self> {
         (offset.checked_add(length)? <= self.length).then_some(Self {
             start: self.start + offset,

@@ -1,9 +1,9 @@
-//! Whether the time stamp counters of all cores agree, found out while the cores start.
+//! Agreement of clocks: checks, while the cores start, whether their time stamp counters agree.
 //!
-//! A *stamp* is the latest reading of any core's counter. A core that sees it, reads its own
-//! counter after that, and finds less, is *behind*: no order of events could explain it. How far
-//! a counter is ahead cannot be told from the time that a stamp takes from core to core, but
-//! then all others are behind it.
+//! A *stamp* is the latest reading of any core's counter. A core that sees a stamp, then reads its
+//! own counter and finds a smaller value, is *behind*: no order of events could explain the
+//! difference. How far a counter is ahead cannot be told from the time a stamp takes from core to
+//! core, but then all other counters are behind.
 
 use core::fmt::{self, Display};
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -11,12 +11,12 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use super::this_core::{self, Core};
 use super::{clock, cpu};
 
-/// The most by which a counter may be behind: less than it takes a core to start what
-/// another one has made ready.
+/// The most nanoseconds a counter may be behind: less than a core takes to start an instance made
+/// ready by another core.
 const MOST_NS: u64 = 1_000;
 
-/// How often a core compares before it begins to work; the boot processor does so as long as
-/// it waits for the others.
+/// How often a core compares before beginning to work; the boot processor compares as long as it
+/// waits for the others.
 const ROUNDS: u32 = 100;
 
 static STAMP: LatestReading = LatestReading(AtomicU64::new(0));
@@ -29,13 +29,13 @@ pub(super) fn compare_often(core: &Core) {
     }
 }
 
-/// Compares the counter of this core, `core`, with the stamp, and notes by how much it is behind.
+/// Compares the counter of this core, `core`, with the stamp, and notes how far it is behind.
 pub(super) fn compare(core: &Core) {
     let behind = STAMP.meet(cpu::time_stamp_after_reads);
     core.behind_ticks.fetch_max(behind, Ordering::Relaxed);
 }
 
-/// Returns by how much the counter of any core has been behind another's, in nanoseconds.
+/// Returns the largest lag of any core's counter behind another's, in nanoseconds.
 #[inline(never)]
 pub fn skew_ns() -> u64 {
     this_core::all().iter().map(behind_ns).max().unwrap_or(0)
@@ -45,13 +45,13 @@ fn behind_ns(core: &Core) -> u64 {
     clock::ticks_to_ns(core.behind_ticks.load(Ordering::Relaxed))
 }
 
-/// Returns the cores whose counters are too far behind, in words, or nothing if there are none.
+/// Names the cores whose counters are too far behind, in words; `None` if there are none.
 pub fn disagreement() -> Option<impl Display> {
     let behind = || this_core::all().iter().map(behind_ns).zip(0..);
     (skew_ns() > MOST_NS).then(|| too_late(behind))
 }
 
-/// Says which of these cores are too far behind; each comes with its index.
+/// Names the cores too far behind; each item is a lag in nanoseconds and the core's index.
 fn too_late<C: Iterator<Item = (u64, u32)>>(cores: impl Fn() -> C) -> impl Display {
     fmt::from_fn(move |out| {
         for (behind_ns, core) in cores().filter(|(behind_ns, _)| *behind_ns > MOST_NS) {
@@ -65,13 +65,13 @@ fn too_late<C: Iterator<Item = (u64, u32)>>(cores: impl Fn() -> C) -> impl Displ
 struct LatestReading(AtomicU64);
 
 impl LatestReading {
-    /// Compares a counter, which `read` reads, with the stamp, and returns by how many ticks
-    /// it is behind. If it is not, its reading is the stamp from now on.
+    /// Compares a counter, read by `read`, with the stamp, and returns how many ticks the counter
+    /// is behind. If not behind, its reading becomes the stamp.
     fn meet(&self, read: impl FnOnce() -> u64) -> u64 {
         let seen = self.0.load(Ordering::Acquire);
         let own = read();
         if own > seen {
-            // Another core's later stamp may be lost here: it leaves its next one soon.
+            // Another core's later stamp may be lost here: that core leaves its next stamp soon.
             self.0.store(own, Ordering::Release);
         }
         seen.saturating_sub(own)

@@ -1,13 +1,13 @@
-//! AVX: registers of 256 bits, where the processor has them.
+//! AVX: registers of 256 bits, on processors with AVX.
 //!
-//! The image is compiled for every 64-bit processor, and an app's function uses AVX after
-//! having asked whether it is on. Saving the upper halves takes other instructions than
-//! saving x87 and SSE alone. They are as long as those, and take their place while the image
-//! is still writable: so no interrupt asks which it has to use, and none is longer. As the
-//! processor knows whether upper halves are in use, those that are not are not written.
+//! The image is compiled for every 64-bit processor, and an app's function uses AVX after asking
+//! whether AVX is on. Saving the upper halves takes other instructions than saving x87 and SSE
+//! alone. Both kinds are equally long, so the AVX instructions replace the others while the image
+//! is still writable: no interrupt asks which kind to use, and no interrupt takes longer. The
+//! processor knows whether upper halves are in use, and does not write unused ones.
 //!
-//! **Avx invariant**: the instructions were exchanged if and only if [`IS_ON`] is set, before
-//! any core takes interrupts, and each core is told to have AVX before it does.
+//! **Avx invariant**: the instructions were exchanged if and only if [`IS_ON`] is set, before any
+//! core takes interrupts, and each core learns of AVX before taking interrupts.
 
 use core::arch::asm;
 use core::arch::x86_64::{__cpuid, __cpuid_count};
@@ -17,7 +17,7 @@ use super::context::VECTOR_BYTES;
 
 static IS_ON: AtomicBool = AtomicBool::new(false);
 
-/// The length of each instruction that is exchanged.
+/// The length of each exchanged instruction, in bytes.
 const LENGTH: usize = 9;
 
 unsafe extern "C" {
@@ -31,7 +31,7 @@ pub fn is_on() -> bool {
     IS_ON.load(Ordering::Relaxed)
 }
 
-/// Turns AVX on, if this processor has it.
+/// Turns AVX on, if this processor has AVX.
 ///
 /// # Safety
 ///
@@ -49,8 +49,8 @@ pub unsafe fn turn_on() {
     IS_ON.store(true, Ordering::Relaxed);
 }
 
-/// Reports whether the processor has AVX, and an instruction that leaves out what is not in
-/// use, as all have but AMD's of 2011 and 2012; and whether the state fits into save areas.
+/// Reports whether the processor has AVX, and an instruction that leaves out unused state, as all
+/// have except AMD's of 2011 and 2012; and whether the state fits into save areas.
 fn is_there() -> bool {
     const XSAVE_AND_AVX: u32 = 1 << 26 | 1 << 28;
     const STATE: u32 = 0xd;
@@ -63,7 +63,7 @@ fn is_there() -> bool {
     has_xsaveopt && (halves.eax + halves.ebx) as usize == VECTOR_BYTES
 }
 
-/// Tells the processor that executes this to have AVX, if it is on. It takes no interrupts yet.
+/// Enables AVX on the calling processor, if on. The processor takes no interrupts yet.
 pub(super) fn enable() {
     if !is_on() {
         return;

@@ -1,34 +1,33 @@
-//! The calls that a stack holds, for the report of a fault.
+//! Backtraces: finds the calls on a stack, for the report of a fault.
 //!
-//! Code is compiled without frame pointers, and images have no unwind tables, for the sake of
-//! speed and of room. So the stack is read word by word: an address in the code right after a
-//! call instruction is taken for one that a call returns to. Some of these words are left over
-//! from calls that have returned, for functions do not write to all of their frame. So each
-//! comes with what it called, where the instruction says it: the host knows where functions
-//! begin, and follows the chain.
+//! Code is compiled without frame pointers, and images have no unwind tables, to save time and
+//! room. The stack is therefore read word by word: any code address right after a call instruction
+//! counts as a return address. Some of these words are left over from calls already finished, for
+//! functions do not write to all of their frame. Each call therefore comes with its callee, if the
+//! instruction names it: the host knows where functions begin, and follows the chain.
 
 use boot_entry::image;
 
 use super::this_core;
 
-/// How many words of a stack are read at most: 8 KiB, for interrupts are disabled meanwhile.
+/// The most words read of a stack: 8 KiB, since interrupts are disabled meanwhile.
 const WORDS: u64 = 1024;
 
-/// The longest call instruction: two of REX and opcode, a ModRM, a SIB, four of displacement,
-/// in the forms that compilers use (Intel SDM 2, `CALL`).
+/// The longest call instruction, in bytes: two of REX and opcode, a ModRM, a SIB, four of
+/// displacement, in the forms used by compilers (Intel SDM 2, `CALL`).
 const LONGEST: usize = 7;
 
-/// A place that a call returns to.
+/// The return address of a call, and its callee.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CallSite {
     /// The address after the call instruction.
     pub returns_to: u64,
-    /// The address of the function that was called; `None` if a register had it.
+    /// The address of the called function; `None` if held in a register or memory.
     pub callee: Option<u64>,
 }
 
-/// Returns the calls on this core's stack from `stack_pointer` on, the innermost first. None
-/// if the address is not of that stack.
+/// Returns the calls on this core's stack from `stack_pointer` on, the innermost first; none if the
+/// address is outside the stack.
 pub fn calls(stack_pointer: u64) -> impl Iterator<Item = CallSite> {
     let core = this_core::is_ready().then(this_core::get);
     let stack = core.and_then(|core| core.context().stack_at(stack_pointer));
@@ -43,7 +42,7 @@ pub fn calls(stack_pointer: u64) -> impl Iterator<Item = CallSite> {
     })
 }
 
-/// Returns the call that returns to `address`, if the code there says so.
+/// Returns the call with return address `address`, if the code before is a call.
 fn before(address: u64) -> Option<CallSite> {
     let text = image::text();
     let start = address.checked_sub(LONGEST as u64)?;
@@ -62,8 +61,8 @@ fn before(address: u64) -> Option<CallSite> {
     })
 }
 
-/// Reads the call instruction at the end of these bytes, if there is one: how far it jumps,
-/// or `None` if a register or memory has the address.
+/// Decodes the call instruction at the end of these bytes, if there is one: the distance of the
+/// jump, or `None` if a register or memory has the address.
 fn decode(bytes: [u8; LONGEST]) -> Option<Option<i64>> {
     match bytes {
         [_, _, 0xe8, a, b, c, d] => Some(Some(i64::from(i32::from_le_bytes([a, b, c, d])))),

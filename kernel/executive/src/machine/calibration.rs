@@ -1,48 +1,49 @@
-//! Measuring the time stamp counter, and the local APIC's timer, by a clock whose rate is known.
+//! Calibration: measures the time stamp counter and the local APIC's timer by a clock of known
+//! rate.
 //!
-//! Where there are two such clocks both are read, and where the processor states the
-//! counter's rate that is compared: each may be wrong on some board, and a wrong clock makes
+//! If the machine has two such clocks, both are read; if the processor states the counter's rate,
+//! the stated rate is compared as well. Each may be wrong on some board, and a wrong clock makes
 //! all times wrong in silence.
 //!
 //! # The clocks of known rate
 //!
-//! In the order in which they are trusted: the ACPI power management timer, the high
-//! precision event timer (HPET), the local APIC's timer where it is QEMU's or KVM's, and
-//! the programmable interval timer (PIT) of the first PCs, which is slow to read.
+//! In the order of trust: the ACPI power management timer, the high precision event timer (HPET),
+//! the local APIC's timer under QEMU or KVM, and the programmable interval timer (PIT) of the first
+//! PCs, which is slow to read.
 
 use boot::acpi::{Platform, PmTimer};
 
 use super::clock::{self, ElapsedTicks};
 use super::{cpu, local_apic, port};
 
-/// How long the rates are measured: so long that what a reading takes, some microseconds
-/// where the host gives it, spoils less than a 10,000th.
+/// How long the rates are measured, in nanoseconds: long enough that the time for a reading, some
+/// microseconds if the host emulates the clock, spoils less than a 10,000th.
 const MEASURE_NS: u64 = 50_000_000;
 
-/// The same where instructions are counted, as there all clocks follow the one count.
+/// The same time where instructions are counted, as all clocks there follow the one count.
 const MEASURE_COUNTED_NS: u64 = 5_000_000;
 
 /// The rate of the time stamp counter, as calibrated.
 #[derive(Clone, Copy, Debug)]
 pub struct TscRate {
-    /// The clock that it was measured by.
+    /// The reference clock of the measurement.
     pub clock: &'static str,
-    /// The rate.
+    /// The rate, in kHz.
     pub khz: u64,
-    /// Another clock or the processor, and the rate by that.
+    /// Another clock or the processor, and its figure for the rate, in kHz.
     pub check: Option<(&'static str, u64)>,
 }
 
 impl TscRate {
-    /// Reports whether the two rates, if there are two, differ by less than 1 %.
+    /// Reports whether the two rates, if both exist, differ by less than 1 %.
     pub fn is_undisputed(&self) -> bool {
         let (_, other_khz) = self.check.unwrap_or(("", self.khz));
         self.khz.abs_diff(other_khz) < self.khz.div_ceil(100)
     }
 }
 
-/// Measures the rates and sets time, with 0 at counter value `base`, by the first of `clocks`
-/// that counts, or by the one called `asked` only. Where time counts instructions, a shorter
+/// Measures the rates and sets time, with 0 at counter value `base`, by the first counting clock of
+/// `clocks`, or only by the clock called `asked`. Where time counts instructions, a shorter
 /// measurement is as exact.
 ///
 /// Needs the local APIC on; uses its timer.
@@ -79,17 +80,17 @@ pub fn calibrate(
     })
 }
 
-/// Returns the counter's rate that the processor states: by CPUID leaf 0x15 it is the
-/// crystal's, which may be left out and is not to be guessed, times a ratio.
+/// Returns the counter's rate stated by the processor, in kHz: by CPUID leaf 0x15 the rate of the
+/// crystal times a ratio. The crystal's rate may be left out and must not be guessed.
 fn stated_khz([denominator, numerator, crystal_hz]: [u32; 3]) -> Option<u64> {
     let hz = u64::from(crystal_hz) * u64::from(numerator);
     let khz = (hz / 1000).checked_div(u64::from(denominator));
     khz.filter(|khz| *khz > 0)
 }
 
-/// All clocks, read as one.
+/// All clocks, read together.
 struct ClockReadings {
-    /// How long that took, by the counter.
+    /// The duration of the reading, in counter ticks.
     width: u64,
     ticks: u64,
     counter: u64,
@@ -97,7 +98,7 @@ struct ClockReadings {
     judge: u32,
 }
 
-/// A clock that counts ticks from its start on.
+/// A clock whose ticks are counted from the start on.
 struct TickCounter<'c> {
     clock: &'c KnownClock,
     judge: Option<&'c KnownClock>,
@@ -118,8 +119,8 @@ impl<'c> TickCounter<'c> {
         }
     }
 
-    /// Measures for so long, and stops the local APIC's timer. Returns with what has elapsed
-    /// that by the other clock, in nanoseconds; nothing if the clock stands still.
+    /// Measures for `long_ns` nanoseconds, and stops the local APIC's timer. Returns the elapsed
+    /// ticks and the elapsed nanoseconds of the other clock; `None` if the clock stands still.
     fn measure(mut self, long_ns: u64) -> Option<(ElapsedTicks, u64)> {
         let start = self.read_all()?;
         while self.clock.ns(self.ticks - start.ticks) < long_ns {
@@ -139,8 +140,8 @@ impl<'c> TickCounter<'c> {
         Some((elapsed, judge_ns))
     }
 
-    /// Looks at the clock, and reports whether it has moved. To be called before it comes
-    /// round.
+    /// Looks at the clock, and reports whether the clock has moved. To be called before the count
+    /// wraps around.
     fn advance(&mut self) -> bool {
         let now = self.clock.read();
         let step = now.wrapping_sub(self.last) & self.clock.mask;
@@ -149,14 +150,13 @@ impl<'c> TickCounter<'c> {
         step != 0
     }
 
-    /// Reads all clocks right after a tick, so that the count between two readings is exact.
-    /// Of several tries takes the one during which least time passed, so that a host which
-    /// takes the processor away in between does no harm. One function for both readings: an
-    /// image has little room.
+    /// Reads all clocks right after a tick, so that the count between two readings is exact. Of
+    /// several tries keeps the fastest, so that a host taking the processor away in between does no
+    /// harm. One function for both readings: an image has little room.
     #[inline(never)]
     fn read_all(&mut self) -> Option<ClockReadings> {
         const TRIES: u32 = 8;
-        /// Many times what the slowest clock needs for all.
+        /// Many times the reads needed by the slowest clock for all tries.
         const MOST_READS: u32 = 100_000;
         let mut best: Option<ClockReadings> = None;
         let mut tries = 0;
@@ -187,40 +187,42 @@ impl<'c> TickCounter<'c> {
     }
 }
 
-/// A clock that counts up to some number of bits, and then from 0 again.
+/// A clock that counts up to a number of bits, and then from 0 again.
 #[derive(Clone, Copy, Debug)]
 pub struct KnownClock {
     /// Its name in the `boot` line and in the word `clock=`.
     pub name: &'static str,
-    /// The time from one count to the next, in femtoseconds.
+    /// The time between two counts, in femtoseconds.
     tick_fs: u64,
-    /// The bits that count.
+    /// The counting bits.
     pub(super) mask: u32,
-    /// Whether others may be compared with it: it needs to be read twice only, at any time.
+    /// Whether other clocks may be compared with this clock: only two reads are needed, at any
+    /// time.
     pub(super) judges: bool,
     source: ClockSource,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum ClockSource {
-    /// At this I/O port.
+    /// At an I/O port.
     PmTimer(u16),
-    /// With registers at this address.
+    /// With registers at an address.
     Hpet(u64),
     LocalApic,
     Pit,
 }
 
-/// The period of the PIT's and the power management timer's common quartz, 14.31818 MHz.
+/// The period of the common quartz of PIT and power management timer, 14.31818 MHz, in
+/// femtoseconds.
 const QUARTZ_FS: u64 = 69_841_279;
 
 impl KnownClock {
-    /// Returns the clocks that this machine may have, the most trusted first.
+    /// Returns this machine's possible clocks, the most trusted first.
     ///
     /// # Safety
     ///
-    /// `platform` is what the machine's tables say, and its registers are mapped uncached and
-    /// writable at their addresses.
+    /// `platform` repeats the machine's tables, and its registers are mapped uncached and writable
+    /// at their addresses.
     pub unsafe fn all(platform: &Platform) -> [Option<Self>; 4] {
         const TCG: [u8; 12] = *b"TCGTCGTCGTCG";
         const KVM: [u8; 12] = *b"KVMKVMKVM\0\0\0";
@@ -256,8 +258,8 @@ impl KnownClock {
         }
     }
 
-    /// Returns the HPET at `base`, whose first register says how long its tick takes (IA-PC
-    /// HPET specification 1.0a, 2.3.4).
+    /// Returns the HPET at `base`, whose first register states the duration of a tick (IA-PC HPET
+    /// specification 1.0a, 2.3.4).
     ///
     /// # Safety
     ///
@@ -276,7 +278,7 @@ impl KnownClock {
         })
     }
 
-    /// Has the clock count, if it needs to be told.
+    /// Starts the clock, if it needs a start.
     pub(super) fn start(&self) {
         match self.source {
             // The local APIC's timer is measured, too, and counts already.
@@ -304,13 +306,13 @@ impl KnownClock {
         }
     }
 
-    /// Returns how long so many counts take: less than 2^32 of them.
+    /// Returns the duration of a number of ticks in nanoseconds; fewer than 2^32 ticks.
     pub(super) const fn ns(&self, ticks: u64) -> u64 {
         ticks * self.tick_fs / 1_000_000
     }
 
-    /// Reads the clock, of which the bits of its mask count. One function for all: it is
-    /// never on a hot path, and an image has little room.
+    /// Reads the clock; only the bits of its mask count. One function for all clocks: never on a
+    /// hot path, and an image has little room.
     #[inline(never)]
     pub(super) fn read(&self) -> u32 {
         match self.source {

@@ -1,11 +1,10 @@
 //! Time: nanoseconds since the kernel's entry, from the time stamp counter.
 //!
-//! The rates of the counter and of the local APIC's timer are measured at boot
+//! The boot measures the rates of the counter and of the local APIC's timer
 //! ([`calibration`](super::calibration)).
 //!
-//! The counters of all cores are compared as these start ([`agreement`](super::agreement)).
-//! Assumed, not checked: their rate is constant, as on every processor with an invariant
-//! counter and under QEMU.
+//! Starting cores compare their counters ([`agreement`](super::agreement)). Assumed, not checked:
+//! the counters' rate is constant, as on every processor with an invariant counter and under QEMU.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -53,14 +52,14 @@ fn scale(value: u64, factor: u64) -> u64 {
     }
 }
 
-/// The advance of each clock in the same time.
+/// The advance of each clock during one span of time.
 pub(super) struct ElapsedTicks {
     pub(super) ns: u64,
     pub(super) counter: u64,
     pub(super) apic: u64,
 }
 
-/// Sets the rates, with time 0 at counter value `base`, from what each clock advanced by.
+/// Sets the rates from the advance of each clock, with time 0 at counter value `base`.
 pub(super) fn set_rates(base: u64, elapsed: &ElapsedTicks) {
     BASE.store(base, Ordering::Relaxed);
     NS_PER_TICK.store(in_2_32(elapsed.ns, elapsed.counter), Ordering::Relaxed);

@@ -1,7 +1,7 @@
 //! The processor's own instructions: interrupt flag, halt, registers, identity.
 //!
-//! Each function is one instruction (or the few that belong together) with a
-//! safe signature where no use of it can break memory safety.
+//! Each function is one instruction (or a few inseparable ones) with a safe signature where no use
+//! of the function can break memory safety.
 
 use core::arch::asm;
 use core::arch::x86_64::__cpuid;
@@ -14,8 +14,8 @@ pub(super) fn is_interrupt_flag_set() -> bool {
     flags & (1 << 9) != 0
 }
 
-/// Clears the interrupt flag. Where the time for which interrupts stay disabled is to be
-/// measured, [`interrupt_flag`](super::interrupt_flag) does so.
+/// Clears the interrupt flag. [`interrupt_flag`](super::interrupt_flag) also does so, and measures
+/// how long interrupts stay disabled.
 pub(super) fn clear_interrupt_flag() {
     // SAFETY: clearing the interrupt flag delays interrupts and changes no memory.
     unsafe { asm!("cli") };
@@ -28,24 +28,24 @@ pub(super) fn set_interrupt_flag() {
     unsafe { asm!("sti") };
 }
 
-/// Sets the interrupt flag and halts until an interrupt has been handled. As `sti` takes
-/// effect only after the next instruction, none can slip in between.
+/// Sets the interrupt flag and halts until an interrupt has been handled. As `sti` takes effect
+/// only after the next instruction, no interrupt can slip in between.
 pub(super) fn set_interrupt_flag_and_halt() {
     // SAFETY: as for `set_interrupt_flag`; halting changes no state.
     unsafe { asm!("sti", "hlt") };
 }
 
-/// Touches the stack where what comes next will not reach beyond: if it is too short for
-/// that, it overflows here and not there.
+/// Touches the stack below everything the following code will use: a stack too short for that code
+/// overflows here and not there.
 pub(super) fn probe_stack() {
     // SAFETY: reads a byte below the stack, which is the stack's own or its guard page's.
     unsafe { asm!("test byte ptr [rsp - {}], 0", const STACK_FOR_A_SECTION, options(nostack)) };
 }
 
-/// More than any section with interrupts disabled takes, in bytes; less than a page.
+/// More than any section with interrupts disabled takes of the stack, in bytes; less than a page.
 const STACK_FOR_A_SECTION: usize = 2048;
 
-/// Interrupts what runs here, which asks for its own end.
+/// Interrupts the running code, at its own request to be ended.
 pub fn ask_for_end() {
     // SAFETY: as for any interrupt: its handler keeps all registers, or never returns.
     unsafe { asm!("int {}", const super::vector::END) };
@@ -61,8 +61,7 @@ pub fn access_nothing() {
 ///
 /// # Safety
 ///
-/// `top` is the upper end of a mapped stack that nobody else uses, a multiple
-/// of 16.
+/// `top` is the upper end of a mapped stack used by nobody else, a multiple of 16.
 pub unsafe fn continue_on_stack<T>(top: u64, argument: &T, function: extern "C" fn(&T) -> !) -> ! {
     // SAFETY: the caller vouches for the stack. The old one is never returned
     // to, so what the argument borrows from it stays as it is. `call` aligns
@@ -87,10 +86,10 @@ pub fn halt_forever() -> ! {
     }
 }
 
-/// Tells the processor that this is a waiting loop.
+/// Tells the processor about a waiting loop.
 ///
-/// Under QEMU's instruction counting it also passes the turn to the next
-/// processor, so a waiting loop without it would starve the others.
+/// Under QEMU's instruction counting this also passes the turn to the next processor, so a waiting
+/// loop without the call would starve the others.
 pub fn relax() {
     core::hint::spin_loop();
 }
@@ -101,21 +100,22 @@ pub fn time_stamp() -> u64 {
     unsafe { core::arch::x86_64::_rdtsc() }
 }
 
-/// Reads the time stamp counter, in ticks, not before what was read from memory so far.
+/// Reads the time stamp counter, in ticks, after all earlier reads from memory.
 pub fn time_stamp_after_reads() -> u64 {
     // SAFETY: LFENCE only orders; every 64-bit processor has it.
     unsafe { core::arch::x86_64::_mm_lfence() };
     time_stamp()
 }
 
-/// Waits until what this core has written is visible to all, before it goes on in any way.
+/// Waits until all earlier writes of this core are visible to every core, before any further
+/// instruction.
 pub fn finish_writes() {
     // SAFETY: the fences only order; every 64-bit processor has them.
     unsafe { asm!("mfence", "lfence", options(nostack)) };
 }
 
-/// Names what the kernel needs and this processor lacks, as far as not every processor of 64
-/// bits has it.
+/// Names a feature needed by the kernel and missing in this processor, among the features not
+/// common to all 64-bit processors.
 pub fn missing_feature() -> Option<&'static str> {
     const LOCAL_APIC: u32 = 1 << 9;
     const NO_EXECUTE: u32 = 1 << 20;
@@ -132,15 +132,16 @@ pub fn has_x2apic() -> bool {
     __cpuid(1).ecx & X2APIC != 0
 }
 
-/// Reports whether the processor states that its counter has one rate, whatever its frequency and
-/// its idle state (Intel's SDM volume 3, 18.17.1).
+/// Reports whether the processor states one constant rate for its counter, whatever its frequency
+/// and its idle state (Intel's SDM volume 3, 18.17.1).
 pub fn has_invariant_counter() -> bool {
     const POWER: u32 = 0x8000_0007;
     __cpuid(0x8000_0000).eax >= POWER && __cpuid(POWER).edx & 1 << 8 != 0
 }
 
 /// Reports whether the processor states that the local APIC's timer counts in all idle states
-/// (CPUID 6, ARAT). Else it may stop where a firmware makes more of a halt (C1E).
+/// (CPUID 6, ARAT). Otherwise the timer may stop where a firmware turns a halt into a deeper state
+/// (C1E).
 pub fn has_timer_in_halt() -> bool {
     const POWER: u32 = 6;
     __cpuid(0).eax >= POWER && __cpuid(POWER).eax & 1 << 2 != 0
@@ -150,7 +151,7 @@ pub fn has_timer_in_halt() -> bool {
 ///
 /// # Safety
 ///
-/// The processor has the register, and reading it changes nothing.
+/// The processor has the register, and reading changes nothing.
 pub unsafe fn read_msr(register: u32) -> u64 {
     let (low, high): (u64, u64);
     // SAFETY: the caller vouches for the register.
@@ -162,14 +163,14 @@ pub unsafe fn read_msr(register: u32) -> u64 {
 ///
 /// # Safety
 ///
-/// The processor has the register, and the value is right for it.
+/// The processor has the register, and the value is right for this register.
 pub unsafe fn write_msr(register: u32, value: u64) {
     let (low, high) = (value & 0xffff_ffff, value >> 32);
     // SAFETY: the caller vouches for register and value.
     unsafe { asm!("wrmsr", in("ecx") register, in("rax") low, in("rdx") high) };
 }
 
-/// Reads the address whose access caused the last page fault.
+/// Reads the address of the access that caused the last page fault.
 pub fn fault_address() -> u64 {
     let address: u64;
     // SAFETY: reading CR2 changes nothing.
@@ -181,15 +182,14 @@ pub fn fault_address() -> u64 {
 ///
 /// # Safety
 ///
-/// `root` maps the image, the current stack and all memory in use to where they
-/// are now.
+/// `root` maps the image, the current stack and all memory in use to their current places.
 pub unsafe fn set_page_table(root: u64) {
     // SAFETY: the caller vouches for the table; the write flushes old entries.
     unsafe { asm!("mov cr3, {}", in(reg) root) };
 }
 
-/// Returns the processor's figures of the time stamp counter (CPUID 0x15): the denominator and the
-/// numerator of its ratio to a crystal, and the crystal's rate in Hz; each 0 if it is left out.
+/// Returns the processor's figures for the time stamp counter (CPUID 0x15): the denominator and the
+/// numerator of its ratio to a crystal, and the crystal's rate in Hz; each 0 if left out.
 pub fn counter_ratio() -> [u32; 3] {
     const LEAF: u32 = 0x15;
     if __cpuid(0).eax < LEAF {
@@ -199,7 +199,7 @@ pub fn counter_ratio() -> [u32; 3] {
     [leaf.eax, leaf.ebx, leaf.ecx]
 }
 
-/// The hypervisor's signature (CPUID 0x4000_0000), if there is one.
+/// Returns the hypervisor's signature (CPUID 0x4000_0000), if there is a hypervisor.
 pub fn hypervisor() -> Option<[u8; 12]> {
     const HYPERVISOR_PRESENT: u32 = 1 << 31;
     if __cpuid(1).ecx & HYPERVISOR_PRESENT == 0 {

@@ -1,18 +1,18 @@
-//! The PC's clock that keeps the date without power (Motorola MC146818A).
+//! The PC's battery-backed clock, which keeps the date (Motorola MC146818A).
 
 use super::port;
 
-/// The registers of second, minute, hour, day, month and year, and that of their form.
+/// The registers of second, minute, hour, day, month and year, and of their format.
 const DATE: [u8; 7] = [0, 2, 4, 7, 8, 9, 0xb];
 
-/// The register of which the top bit says that the others are about to change.
+/// The register whose top bit announces a change of the others.
 const STATUS: u8 = 0xa;
 
-/// How often it is looked at: a change takes 2 ms, and a look some microseconds.
+/// The most looks at the clock: a change takes 2 ms, and a look some microseconds.
 const LOOKS: u32 = 10_000;
 
-/// Returns the seconds since 1970, within one, in this century; `None` if the machine has no such
-/// clock. For the boot processor, before a run.
+/// Returns the seconds since 1970, within one second, in this century; `None` if the machine has no
+/// such clock. For the boot processor, before a run.
 pub fn unix_s() -> Option<u64> {
     let look = |_| {
         let is_steady = register(STATUS) & 0x80 == 0;
@@ -31,11 +31,11 @@ fn register(number: u8) -> u8 {
     unsafe { port::read_u8(0x71) }
 }
 
-/// Returns the Unix time of the registers, if they have a date.
+/// Returns the Unix time of the registers, in seconds, if they hold a date.
 fn seconds([second, minute, hour, day, month, year, form]: [u8; 7]) -> Option<u64> {
     /// The days of a year before each month.
     const BEFORE: [u64; 12] = [0, 31, 59, 90, 120, 151, 181, 212, 243, 273, 304, 334];
-    /// Those before 2000.
+    /// The days from 1970 to 2000.
     const FIRST_DAY: u64 = 10_957;
     let number = |value: u8, most: u8| {
         let (tens, ones) = (value >> 4, value & 0xf);
@@ -45,7 +45,7 @@ fn seconds([second, minute, hour, day, month, year, form]: [u8; 7]) -> Option<u6
     };
     let hour = match form & 2 != 0 {
         true => number(hour, 23)?,
-        // Of 12 hours twice, the top bit has the second half.
+        // With hours 1 to 12, the top bit means afternoon.
         false => number(hour & 0x7f, 12)? % 12 + hour / 0x80 * 12,
     };
     let [second, minute] = [number(second, 59)?, number(minute, 59)?];

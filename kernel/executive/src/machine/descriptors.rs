@@ -1,5 +1,5 @@
-//! Segment and interrupt descriptors: what the processor must be told so that
-//! each interrupt finds its code and its stack (Intel SDM volume 3, 3.4, 6.14, 7.7).
+//! Segment and interrupt descriptors: they tell the processor where each interrupt finds its code
+//! and its stack (Intel SDM volume 3, 3.4, 6.14, 7.7).
 
 use core::arch::asm;
 
@@ -13,22 +13,22 @@ pub(super) const CODE: u16 = 0x08;
 /// The task state segment's selector.
 const TASK_STATE: u16 = 0x18;
 
-/// The stack that each kind of interrupt arrives on, as IST numbers.
+/// The arrival stack of each kind of interrupt, as IST numbers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum InterruptStack {
     /// The running context's save area.
     Context = 1,
-    /// Exceptions that code causes.
+    /// Exceptions caused by code.
     Exception = 2,
-    /// The double fault: the exception stack may be what is broken.
+    /// The double fault: the exception stack itself may be broken.
     DoubleFault = 3,
-    /// The non-maskable interrupt, which may hit any handler.
+    /// The non-maskable interrupt, possible in any handler.
     NonMaskable = 4,
     /// The machine check, likewise.
     MachineCheck = 5,
 }
 
-/// The 64-bit task state segment, of which only the interrupt stacks matter.
+/// The 64-bit task state segment; only the interrupt stacks matter.
 #[repr(C, packed(4))]
 pub(crate) struct TaskState {
     reserved_0: u32,
@@ -75,8 +75,8 @@ impl TaskState {
 ///
 /// # Safety
 ///
-/// `task_state` is this core's, which has interrupts disabled, and `top` is the
-/// end of the save area of the context that it runs or is about to run.
+/// `task_state` belongs to this core, which has interrupts disabled, and `top` is the end of the
+/// save area of the context now running or about to run.
 pub(super) unsafe fn set_context_stack(task_state: *mut TaskState, top: u64) {
     let offset = core::mem::offset_of!(TaskState, interrupt_stacks);
     let place = task_state.wrapping_byte_add(offset).cast::<u64>();
@@ -119,9 +119,8 @@ pub(super) fn load_segments(task_state: *mut TaskState) {
 
 static INTERRUPT_TABLE: SetOnce<Box<[[u64; 2]; 256]>> = SetOnce::new();
 
-/// Loads the interrupt table for this core. From `stubs` on, 16 bytes each, lie those of
-/// exceptions,
-/// those of the vectors in use, and one for all others.
+/// Loads the interrupt table for this core. From `stubs` on, 16 bytes each, lie the stubs of the
+/// exceptions, of the vectors in use, and one for all others.
 pub(crate) fn load_interrupts(stubs: u64) {
     if INTERRUPT_TABLE.get().is_none() {
         let table = Box::new(core::array::from_fn(|vector| {
@@ -142,7 +141,7 @@ pub(crate) fn load_interrupts(stubs: u64) {
     unsafe { asm!("lidt [{}]", in(reg) &pointer) };
 }
 
-/// An interrupt gate (interrupts stay disabled) to `address` (Intel SDM 3, 6.14.1).
+/// Builds an interrupt gate to `address`, with interrupts still disabled (Intel SDM 3, 6.14.1).
 const fn gate(address: u64, vector: usize) -> [u64; 2] {
     let stack = match vector {
         2 => InterruptStack::NonMaskable,

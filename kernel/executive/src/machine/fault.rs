@@ -1,4 +1,4 @@
-//! Exceptions: what the processor says about code that cannot go on.
+//! Exceptions: the processor's reports about code that cannot go on.
 
 use core::fmt;
 
@@ -18,7 +18,7 @@ pub struct CpuException<'a> {
     pub name: &'static str,
     /// The registers at the faulting instruction.
     pub registers: &'a SavedRegisters,
-    /// The address that was accessed, for a page fault.
+    /// The accessed address, for a page fault.
     pub address: Option<u64>,
 }
 
@@ -73,7 +73,7 @@ impl fmt::Display for CpuException<'_> {
 }
 
 impl<'a> CpuException<'a> {
-    /// Names the exception that has pushed `registers`.
+    /// Names the exception whose stub has pushed `registers`.
     pub(super) fn new(registers: &'a SavedRegisters) -> Self {
         let vector = registers.vector;
         let name = usize::try_from(vector)
@@ -88,8 +88,8 @@ impl<'a> CpuException<'a> {
 }
 
 impl CpuException<'_> {
-    /// Reports whether the page below the stack was hit: an absent page within one
-    /// page of the stack pointer, as compiled code touches each page on its way down.
+    /// Reports whether the access hit the page below the stack: an absent page within one page of
+    /// the stack pointer, as compiled code touches each page on its way down.
     fn is_stack_overflow(&self) -> bool {
         const PRESENT: u64 = 1;
         const PAGE: u64 = 4096;
@@ -98,9 +98,8 @@ impl CpuException<'_> {
         registers.error_code & PRESENT == 0 && self.address.is_some_and(is_near)
     }
 
-    /// Reports whether it is the fault of the code that ran, rather than of the
-    /// machine or the kernel: that code had interrupts enabled, as no holder of
-    /// a lock and no handler has.
+    /// Reports whether the running code is at fault, rather than the machine or the kernel: that
+    /// code had interrupts enabled, unlike every holder of a lock and every handler.
     pub fn is_of_interruptible_code(&self) -> bool {
         let is_contained = !matches!(
             self.registers.vector,

@@ -70,6 +70,6 @@ pub fn take_longest() -> Option<(u64, &'static Location<'static>)> {
         (meter.longest.swap(0, Ordering::Relaxed), place)
     });
     let (ticks, place) = sections.max_by_key(|(ticks, _)| *ticks)?;
-    // SAFETY: a pointer that is not null comes from a `&'static` in `begin`.
+    // SAFETY: a pointer that is not null comes from a `&'static` in `measure_from`.
     Some((ticks, unsafe { place.as_ref() }?))
 }

@@ -1,10 +1,10 @@
-//! The interrupt controllers of a PC that interrupt no core here, put to silence: those of the first
+//! Silences the interrupt controllers of a PC that interrupt no core here: the 8259s of the first
 //! PCs, and the I/O APICs.
 
 use super::port;
 
-/// Masks every line of the two 8259s, after moving their vectors away from the
-/// exceptions': a spurious interrupt can come even from a masked controller.
+/// Masks every line of the two 8259s, after moving their vectors away from the exceptions' vectors:
+/// a spurious interrupt can come even from a masked controller.
 pub fn silence_interrupt_controllers() {
     /// Initialisation words (Intel 8259A data sheet): start, vector base,
     /// wiring, mode; then the mask.
@@ -29,14 +29,14 @@ pub fn silence_interrupt_controllers() {
     }
 }
 
-/// Masks every line of the I/O APIC whose registers are at `base`. A firmware may have
-/// left lines on, and their vectors mean nothing here.
+/// Masks every line of the I/O APIC whose registers are at `base`. A firmware may have left lines
+/// on, with vectors of no meaning here.
 ///
 /// # Safety
 ///
 /// `base` is an I/O APIC's address, mapped uncached and writable, and nobody else uses it.
 pub unsafe fn mask_io_apic(base: u64) {
-    /// Registers of the 82093AA (its data sheet, 3.2): which lines there are, and the first one.
+    /// Registers of the 82093AA (its data sheet, 3.2): the number of lines, and the first line.
     const VERSION: u32 = 1;
     const FIRST_LINE: u32 = 0x10;
     const MASKED: u32 = 1 << 16;

@@ -1,14 +1,15 @@
 //! The local APIC: a core's own timer, and interrupts to other cores.
 //!
-//! Each core sees its own, by one of two ways (Intel SDM volume 3, chapter 11): *xAPIC*, by
-//! registers in memory at the same address, with ids of 8 bits; or *x2APIC*, by model-specific
-//! registers, with ids of 32. The firmware leaves a PC with many processors in the latter.
+//! Each core reaches its own local APIC by one of two modes (Intel SDM volume 3, chapter 11):
+//! *xAPIC*, by registers in memory at the same address, with ids of 8 bits; or *x2APIC*, by
+//! model-specific registers, with ids of 32. The firmware leaves a PC with many processors in the
+//! latter mode.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use super::{cpu, vector};
 
-/// The registers' address, set once before any use; 0 where they are model-specific ones.
+/// The registers' address, set once before any use; 0 for model-specific registers.
 static BASE: AtomicU64 = AtomicU64::new(0);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +18,7 @@ enum ApicRegister {
     TaskPriority = 0x80,
     EndOfInterrupt = 0xb0,
     SpuriousVector = 0xf0,
-    /// Of the interrupts that are pending, the part that holds ours.
+    /// The part of the pending interrupts with this kernel's vectors.
     Requests = 0x220,
     CommandLow = 0x300,
     CommandHigh = 0x310,
@@ -32,17 +33,17 @@ enum ApicRegister {
 
 const MASKED: u32 = 1 << 16;
 
-/// The register that has this core's way in its bits (SDM volume 3, 11.4.4 and 11.12.1).
+/// The register with this core's mode in its bits (SDM volume 3, 11.4.4 and 11.12.1).
 const WAY: u32 = 0x1b;
 const ENABLED: u64 = 1 << 11;
 const X2APIC: u64 = 1 << 10;
 
-/// Chooses the way for all cores, and takes it on this one, the boot processor: x2APIC if the
-/// firmware has left it on or `wants_x2apic`.
+/// Chooses the mode for all cores, and enters the mode on this core, the boot processor: x2APIC if
+/// `wants_x2apic`, or if the firmware has left it on.
 ///
 /// # Panics
 ///
-/// If it is wanted, and the processor does not have it.
+/// If x2APIC is wanted, and the processor lacks it.
 ///
 /// # Safety
 ///
@@ -60,17 +61,17 @@ pub unsafe fn choose(base: u64, wants_x2apic: bool) {
     take_way();
 }
 
-/// Reports whether registers are model-specific ones.
+/// Reports whether the registers are model-specific.
 pub fn is_x2apic() -> bool {
     BASE.load(Ordering::Relaxed) == 0
 }
 
-/// Puts this core's local APIC into the way that was chosen.
+/// Puts this core's local APIC into the chosen mode.
 fn take_way() {
     if is_x2apic() {
         // SAFETY: as in `choose`.
         let way = unsafe { cpu::read_msr(WAY) };
-        // From off there is no way but over xAPIC (SDM volume 3, 11.12.5).
+        // From off, the only way leads over xAPIC (SDM volume 3, 11.12.5).
         for way in [way | ENABLED, way | ENABLED | X2APIC] {
             // SAFETY: the processor has x2APIC (`choose`).
             unsafe { cpu::write_msr(WAY, way) };
@@ -78,7 +79,7 @@ fn take_way() {
     }
 }
 
-/// Returns the model-specific register that is `register`.
+/// Returns the number of the model-specific register for `register`.
 const fn specific(register: ApicRegister) -> u32 {
     0x800 + register as u32 / 16
 }
@@ -97,7 +98,7 @@ fn write(register: ApicRegister, value: u32) {
     }
 }
 
-/// Apart, so that the usual way keeps its registers.
+/// A separate function, so that the usual mode keeps its registers.
 #[cold]
 #[inline(never)]
 #[expect(clippy::cast_possible_truncation, reason = "their upper half is 0")]
@@ -106,7 +107,7 @@ fn read_specific(register: u32) -> u32 {
     unsafe { cpu::read_msr(register) as u32 }
 }
 
-/// Apart, as `read_specific` is.
+/// A separate function, like `read_specific`.
 #[cold]
 #[inline(never)]
 fn write_specific(register: u32, value: u32) {
@@ -127,7 +128,7 @@ fn write_mapped(base: u64, register: ApicRegister, value: u32) {
     unsafe { address.write_volatile(value) };
 }
 
-/// Returns the id of the core that executes this.
+/// Returns the id of the calling core.
 pub fn id() -> u32 {
     let id = read(ApicRegister::Id);
     if is_x2apic() { id } else { id >> 24 }
@@ -135,9 +136,9 @@ pub fn id() -> u32 {
 
 const SOFTWARE_ENABLE: u32 = 1 << 8;
 
-/// The writes that turn a local APIC on, with only its timer unmasked. The software enable comes
-/// first: until then, and after an INIT, each entry of the local vector table stays masked,
-/// even if it is written (Intel SDM volume 3, 11.4.7.2).
+/// The writes for turning a local APIC on, with only its timer unmasked. The software enable comes
+/// first: until then, and after an INIT, each entry of the local vector table stays masked, even if
+/// written (Intel SDM volume 3, 11.4.7.2).
 const TURN_ON: [(ApicRegister, u32); 7] = [
     (
         ApicRegister::SpuriousVector,
@@ -168,17 +169,17 @@ pub fn is_interrupt_pending() -> bool {
     read(ApicRegister::Requests) & OURS != 0
 }
 
-/// Ends the interrupt that is being handled.
+/// Ends the current interrupt.
 pub fn acknowledge() {
     write(ApicRegister::EndOfInterrupt, 0);
 }
 
-/// Starts this core's one-shot timer: it fires after `count` ticks, never if 0.
+/// Starts this core's one-shot timer, to fire after `count` ticks; 0 means never.
 pub fn start_timer(count: u32) {
     write(ApicRegister::InitialCount, count);
 }
 
-/// Returns the ticks that are left of the running timer.
+/// Returns the remaining ticks of the running timer.
 pub fn timer_count() -> u32 {
     read(ApicRegister::CurrentCount)
 }
@@ -212,9 +213,8 @@ pub fn send_non_maskable(apic_id: u32) {
     command(apic_id, NON_MASKABLE);
 }
 
-/// Writes an interrupt command. The two halves must not be separated by a
-/// handler's command, so interrupts are disabled meanwhile. One function for all commands: an
-/// image has little room.
+/// Writes an interrupt command. No handler's command may come between the two halves, so interrupts
+/// are disabled meanwhile. One function for all commands: an image has little room.
 #[inline(never)]
 fn command(apic_id: u32, low: u32) {
     const PENDING: u32 = 1 << 12;
@@ -235,8 +235,8 @@ fn command(apic_id: u32, low: u32) {
     }
 }
 
-/// Writes an interrupt command in x2APIC mode, where that is one write. All that this core has
-/// written before is made visible to the other first (SDM volume 3, 11.12.3).
+/// Writes an interrupt command in x2APIC mode, by a single write. First makes all earlier writes of
+/// this core visible to the other core (SDM volume 3, 11.12.3).
 #[cold]
 #[inline(never)]
 fn command_at_once(apic_id: u32, low: u32) {

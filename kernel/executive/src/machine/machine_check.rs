@@ -1,8 +1,8 @@
-//! Machine checks: hardware that has failed, as the processor says (Intel SDM volume 3, 15).
+//! Machine checks: hardware failures reported by the processor (Intel SDM volume 3, 15).
 //!
-//! Errors are kept in *banks*, each with a few model-specific registers. One that cannot be
-//! corrected raises an exception; a processor that was not told to raise it resets the machine
-//! instead, without a word.
+//! The processor keeps errors in *banks*, each with a few model-specific registers. An
+//! uncorrectable error raises an exception; without the order to raise exceptions the processor
+//! resets the machine instead, without a word.
 
 use core::arch::asm;
 use core::arch::x86_64::__cpuid;
@@ -10,23 +10,23 @@ use core::fmt;
 
 use super::cpu;
 
-/// How many banks there are, and whether one register enables them all.
+/// The register with the number of banks, and a bit for a register that enables them all.
 const CAPABILITIES: u32 = 0x179;
 const HAS_CONTROL: u64 = 1 << 8;
-/// The register that enables all banks.
+/// The register for enabling all banks.
 const CONTROL: u32 = 0x17b;
-/// The registers of the first bank: what it reports, what it has found, and where.
+/// The registers of the first bank: what to report, the error found, and its address.
 const BANK_CONTROL: u32 = 0x400;
 const BANK_STATUS: u32 = 0x401;
 const BANK_ADDRESS: u32 = 0x402;
-/// The registers of a bank.
+/// The number of registers in a bank.
 const BANK_REGISTERS: u32 = 4;
 
 const IS_VALID: u64 = 1 << 63;
 const HAS_ADDRESS: u64 = 1 << 58;
 
-/// Returns the capabilities, and what to add to a register of the first bank for each; nothing if
-/// this processor has no banks.
+/// Returns the capabilities, and for each bank the offset to add to a register of the first bank;
+/// nothing if this processor has no banks.
 fn banks() -> (u64, impl Iterator<Item = u32>) {
     const EXCEPTION_AND_BANKS: u32 = 1 << 7 | 1 << 14;
     let has_banks = __cpuid(1).edx & EXCEPTION_AND_BANKS == EXCEPTION_AND_BANKS;
@@ -40,7 +40,7 @@ fn banks() -> (u64, impl Iterator<Item = u32>) {
     )
 }
 
-/// Tells the processor that executes this to raise machine checks. It has an interrupt table.
+/// Tells the calling processor to raise machine checks. The processor has an interrupt table.
 pub(super) fn enable() {
     let (capabilities, banks) = banks();
     if capabilities & HAS_CONTROL != 0 {
@@ -57,7 +57,7 @@ pub(super) fn enable() {
     unsafe { asm!("mov {0}, cr4", "bts {0}, 6", "mov cr4, {0}", out(reg) _, options(nostack)) };
 }
 
-/// Writes what the banks of this processor keep of errors.
+/// Writes the errors kept in the banks of this processor.
 pub(super) fn write_errors(f: &mut fmt::Formatter<'_>) -> fmt::Result {
     for bank in banks().1 {
         // SAFETY: each bank has the register, and reading changes nothing.

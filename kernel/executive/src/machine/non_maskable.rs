@@ -8,15 +8,16 @@ use super::this_core::{self, Core};
 /// Whether non-maskable interrupts are this kernel's own signal to stop.
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
-/// Makes a core answer that takes no interrupts. If its interrupts are disabled at several
-/// answers in a row, it ends the run.
+/// Makes a core without interrupts answer. If the core's interrupts are disabled at several answers
+/// in a row, the core ends the run.
 pub fn accuse(core: &Core) {
     if core.accusation.open() {
         local_apic::send_non_maskable(core.apic_id());
     }
 }
 
-/// Answers if this core is accused: returns how often it has, without an interrupt in between.
+/// Answers if this core is accused: returns the number of answers given without an interrupt in
+/// between.
 pub(super) fn answer() -> u32 {
     if !this_core::is_ready() {
         return 0;

@@ -1,15 +1,15 @@
-//! The page table: one for all cores, identity-mapped, no page both writable
-//! and executable, page 0 absent.
+//! The page table: one for all cores, identity-mapped, with no page both writable and executable,
+//! and page 0 absent.
 //!
-//! Entries only ever go from absent to present, so no core can hold an
-//! outdated translation and none needs to be told of a change.
+//! Entries only ever change from absent to present, so no core can hold an outdated translation and
+//! no core needs news of a change.
 
 use core::ops::Range;
 
 /// The smallest page, in bytes.
 pub(crate) const PAGE: u64 = 4096;
 
-/// The access that a page allows.
+/// The access allowed to a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PageAccess {
     /// Read only.
@@ -41,7 +41,7 @@ impl PageAccess {
     }
 }
 
-/// Something that a page cannot be mapped for.
+/// Why a page cannot be mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MapError {
     /// No frame is left for the table itself.
@@ -50,7 +50,7 @@ pub enum MapError {
     AlreadyMapped,
 }
 
-/// Says what is wrong with the machine, where its own memory and devices are mapped.
+/// Says what is wrong with the machine if mapping its own memory and devices fails.
 impl core::fmt::Display for MapError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {

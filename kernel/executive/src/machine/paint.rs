@@ -1,21 +1,20 @@
-//! How deep a stack has been used, by paint.
+//! Measures by paint how much of a stack has been used.
 //!
-//! A stack's *paint* is a word that code does not write by chance, in every place below what is
-//! in use. The part between the lowest place without paint and the top has been used.
+//! A stack's *paint* is a word that code does not write by chance, in every place below the used
+//! part. The part between the lowest place without paint and the top has been used.
 
 use super::this_core;
 
 /// The paint.
 const PAINT: u64 = 0x5ac4_71ed_0f00_d1e5;
 
-/// The bytes that the painting code may use itself of the stack that it is on, the red zone
-/// included.
+/// The bytes of its own stack the painting code may use, the red zone included.
 const OWN_BYTES: u64 = 1024;
 
-/// Returns how much of the running context's stack has been used since the last call, in bytes,
-/// and paints it again: `None` if it was not painted, so at the first call on a stack.
+/// Returns how many bytes of the running context's stack have been used since the last call, and
+/// paints the stack again: `None` if the stack was not painted, as at the first call on a stack.
 ///
-/// It calls nothing that would need much of that stack.
+/// Calls no function that would need much of that stack.
 pub fn take_used_bytes() -> Option<u64> {
     let local = 0_u64;
     let stack = this_core::get().context().stack();
@@ -35,7 +34,7 @@ pub fn take_used_bytes() -> Option<u64> {
     was_painted.then(|| stack.end - lowest)
 }
 
-/// Makes the next measurement on a stack that nothing runs on begin anew.
+/// Makes the next measurement begin anew on a stack not in use.
 pub(super) fn spoil(stack: &core::ops::Range<u64>) {
     // SAFETY: the word is the lowest of a stack, and nothing runs there (context invariant).
     unsafe { (stack.start as *mut u64).write_volatile(0) };

@@ -1,5 +1,5 @@
-//! The end of the run: telling QEMU, or another host; where there is none, powered off, reset, or
-//! just halted.
+//! The end of the run: tells QEMU or another host; without a host, powers off, resets, or just
+//! halts.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -12,34 +12,34 @@ use super::{cpu, non_maskable, port, serial, this_core};
 /// The action after the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PowerAction {
-    /// Stay as it is, with all cores halted.
+    /// Stay on, with all cores halted.
     Halt = 0,
     /// Power the machine off.
     Off = 1,
-    /// Start it anew.
+    /// Start the machine anew.
     Reset = 2,
 }
 
 static END: AtomicU8 = AtomicU8::new(PowerAction::Halt as u8);
 static POWER: SetOnce<Power> = SetOnce::new();
 
-/// Settles what is done after the verdict.
+/// Chooses the action after the verdict.
 pub fn set_end(end: PowerAction) {
     END.store(end as u8, Ordering::Release);
 }
 
-/// Names the registers to do it by.
+/// Sets the registers for that action.
 ///
 /// # Safety
 ///
-/// They are what the machine's ACPI tables say; those in memory are mapped uncached and
+/// They are those of the machine's ACPI tables; registers in memory are mapped uncached and
 /// writable at their addresses.
 pub unsafe fn set_registers(power: Power) {
-    // They are found once.
+    // The tables are read once.
     POWER.set(power);
 }
 
-/// Does what was settled. Returns where that is to halt, or nothing has come of it.
+/// Does the chosen action. Returns if the action is to halt, or has failed.
 fn reset_or_power_off() {
     let end = END.load(Ordering::Acquire);
     let power = POWER.get().copied().unwrap_or_default();
@@ -56,9 +56,9 @@ fn reset_or_power_off() {
 fn power_off(off: Off) {
     const TYPE_BIT: u32 = 10;
     const SLEEP: u16 = 1 << 13;
-    /// The bit of the first control register that says that it is ours.
+    /// The bit of the first control register that says the operating system controls power.
     const ENABLED: u16 = 1;
-    /// Each takes a microsecond; firmware takes far less than a second.
+    /// Each poll takes a microsecond; firmware takes far less than a second.
     const MOST_POLLS: u32 = 1_000_000;
     match off {
         Off::Sleep(register, kind) => write(register, kind << 2 | 1 << 5),
@@ -79,12 +79,12 @@ fn power_off(off: Off) {
     }
 }
 
-/// Resets the machine as ACPI says, or else as PCs were always reset.
+/// Resets the machine as ACPI says, or else in the way of older PCs.
 fn reset(power: Power) {
     if let Some((register, value)) = power.reset {
         write(register, value);
     }
-    // The chip set's register: a full reset, which begins as the second bit is set.
+    // The chip set's register: a full reset, begun by setting the second bit.
     write(Register::Port(0xcf9), 0x02);
     write(Register::Port(0xcf9), 0x06);
     // The keyboard controller's line to the processor.
@@ -112,10 +112,9 @@ fn write_control(control: u16, value: u16) {
     unsafe { port::write_u16(control, value) };
 }
 
-/// Ends the run, and says how: QEMU exits with 33, 35 or 37. Without the debug exit device the
-/// machine ends as was settled
-/// ([`set_end`]), or stays halted: all its cores are, or one would look into why
-/// this one is silent.
+/// Ends the run, and reports the result: QEMU exits with 33, 35 or 37. Without the debug exit
+/// device the machine ends by the chosen action ([`set_end`]), or stays halted: all its cores are,
+/// or another core would investigate this core's silence.
 pub fn exit(told: AppExit) -> ! {
     const DEBUG_EXIT: u16 = 0xf4;
     // QEMU's own exit status is twice what its device takes, plus 1.

@@ -1,9 +1,8 @@
-//! The processors: starting the other cores, and what each states of its kind and of those that it
-//! shares a core with.
+//! The processors: starts the other cores, and reads each core's kind and siblings.
 //!
-//! *Siblings* are processors that share one physical core (SMT): each slows down the other.
-//! Their APIC ids differ in their lowest bits only. *Efficiency cores* are slower than the
-//! others of the same machine. Nothing here schedules by that; it is said, and people choose.
+//! *Siblings* are processors sharing one physical core (SMT): each slows down the other. Their APIC
+//! ids differ in their lowest bits only. *Efficiency cores* are slower than the others of the same
+//! machine. Nothing here schedules by these properties; the kernel reports them, and people choose.
 
 use core::arch::x86_64::{__cpuid, __cpuid_count, CpuidResult};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -11,16 +10,15 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use super::this_core::{self, Core};
 use super::{agreement, avx, clock, cpu, interrupt, local_apic, machine_check};
 
-/// Cores that have arrived in their entry function, the boot processor not
-/// counted.
+/// The number of cores arrived in their entry function, not counting the boot processor.
 static ARRIVED: AtomicU32 = AtomicU32::new(0);
 
-/// While processors start, QEMU's counted time may jump to the end of the next
-/// timer, wherever that is: a timer of ours keeps the jumps this short.
+/// While processors start, QEMU's counted time may jump to the end of the next timer, however far
+/// away: a timer of ours keeps the jumps this short, in nanoseconds.
 const LONGEST_JUMP_NS: u64 = 2_000;
 
-/// Makes the processor that executes this the core with APIC id `apic_id`:
-/// segments, interrupt stacks, interrupt table and local APIC.
+/// Makes the calling processor the core with APIC id `apic_id`: segments, interrupt stacks,
+/// interrupt table and local APIC.
 pub fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
     let is_efficient = is_efficiency_core();
@@ -32,18 +30,18 @@ pub fn become_core(apic_id: u32) -> &'static Core {
     core
 }
 
-/// Says that the core which executes this, `core`, has arrived, once it has compared its counter.
+/// Reports the arrival of the calling core, `core`, after comparing its counter.
 pub fn arrive(core: &Core) {
     agreement::compare_often(core);
     ARRIVED.fetch_add(1, Ordering::Release);
 }
 
-/// For how long cores may take to arrive. All are waited for, so this costs only where
-/// one does not come; a host that is busy may let a virtual one wait for long.
+/// How long cores may take to arrive, in nanoseconds. The boot processor waits for all, so this
+/// costs only if a core does not come; a busy host may let a virtual core wait for long.
 pub const PATIENCE_NS: u64 = 5_000_000_000;
 
-/// Starts all other cores at `entry`, by way of the page number `page`, and returns how
-/// many have arrived (Intel SDM volume 3, 9.4.4: INIT, 10 ms, startup, 200 us, startup).
+/// Starts all other cores at `entry`, through page number `page`, and returns the number of arrived
+/// cores (Intel SDM volume 3, 9.4.4: INIT, 10 ms, startup, 200 us, startup).
 ///
 /// # Safety
 ///
@@ -75,7 +73,7 @@ pub unsafe fn start_others(root_table: u64, page: u8, entry: boot_entry::process
     ARRIVED.load(Ordering::Acquire)
 }
 
-/// Waits `ns`, or until `expected` cores have arrived, and reports the latter.
+/// Waits `ns` nanoseconds, or until `expected` cores have arrived, and reports the latter.
 fn wait(ns: u64, expected: u32) -> bool {
     let end_ns = clock::now_ns().saturating_add(ns);
     let core = this_core::get();
@@ -93,7 +91,7 @@ fn wait(ns: u64, expected: u32) -> bool {
     }
 }
 
-/// Returns how many of an APIC id's lowest bits tell siblings apart.
+/// Returns how many of an APIC id's lowest bits distinguish siblings.
 pub fn sibling_bits() -> u32 {
     const TOPOLOGY: u32 = 0xb;
     const AMD_TOPOLOGY: u32 = 0x8000_001e;
@@ -106,22 +104,22 @@ pub fn sibling_bits() -> u32 {
         .unwrap_or(0)
 }
 
-/// By Intel's SDM volume 2, CPUID leaf 0xb: the level of the first subleaf, if there is one.
+/// Reads Intel's SDM volume 2, CPUID leaf 0xb: the level of the first subleaf, if there is one.
 fn bits_of_topology(leaf: Option<CpuidResult>) -> Option<u32> {
     const SIBLINGS: u32 = 1;
     let leaf = leaf.filter(|leaf| leaf.ebx != 0 && leaf.ecx >> 8 & 0xff == SIBLINGS)?;
     Some(leaf.eax & 0x1f)
 }
 
-/// By AMD's manual volume 3, E.4.17, where leaf 0x8000_0001 says that it is there.
+/// Reads AMD's manual volume 3, E.4.17, if leaf 0x8000_0001 announces the topology leaf.
 fn bits_of_amd(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u32> {
     const HAS_TOPOLOGY: u32 = 1 << 22;
     let leaf = leaf.filter(|_| features.ecx & HAS_TOPOLOGY != 0)?;
     Some(bits_for((leaf.ebx >> 8 & 0xff) + 1))
 }
 
-/// By Intel's SDM volume 3, 9.9.3: ids for processors of a package (leaf 1), less those for cores
-/// (leaf 4).
+/// Computes by Intel's SDM volume 3, 9.9.3: the bits for processors of a package (leaf 1), less the
+/// bits for cores (leaf 4).
 fn bits_of_caches(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u32> {
     const HAS_SEVERAL: u32 = 1 << 28;
     const A_CACHE: u32 = 0x1f;
@@ -130,13 +128,13 @@ fn bits_of_caches(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u3
     Some(bits_for(processors).saturating_sub(bits_for(cores)))
 }
 
-/// Returns how many bits tell so many things apart.
+/// Returns the number of bits for distinguishing `count` things.
 const fn bits_for(count: u32) -> u32 {
     count.next_power_of_two().trailing_zeros()
 }
 
-/// Reports whether the processor that executes this is an efficiency core (Intel's SDM volume 2,
-/// leaves 7 and 0x1a).
+/// Reports whether the calling processor is an efficiency core (Intel's SDM volume 2, leaves 7 and
+/// 0x1a).
 fn is_efficiency_core() -> bool {
     const FEATURES: u32 = 7;
     const HYBRID: u32 = 1 << 15;

@@ -1,8 +1,8 @@
-//! Text on the screen that the loader has left, if it has.
+//! Text on the screen left by the loader, if there is a screen.
 //!
-//! Output to the serial port is put here, too. That writes a byte into a table; drawing is
-//! another step, a cell at a time, which costs about what a byte costs at the serial port,
-//! and is left to those who send such bytes.
+//! Output to the serial port is put here, too. Putting writes a byte into a table; drawing is
+//! another step, a cell at a time, about as costly as a byte at the serial port, and is left to the
+//! cores sending such bytes.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,14 +13,14 @@ use fass::platform::SetOnce;
 
 static GRID: Grid = Grid::new();
 static SCREEN: SetOnce<Screen> = SetOnce::new();
-/// Whether a core draws.
+/// Whether a core is drawing.
 static IS_DRAWING: AtomicBool = AtomicBool::new(false);
 
-/// Blanks a screen, and shows from now on what is put.
+/// Blanks a screen, and shows all text put from now on.
 ///
 /// # Safety
 ///
-/// 1. Its memory is mapped as it is, now and for good, and nobody else uses it.
+/// 1. Its memory is mapped as is, now and for good, and nobody else uses it.
 /// 2. A row's pixels fit into the pitch.
 #[inline(never)]
 pub unsafe fn initialize(buffer: Framebuffer) {
@@ -40,12 +40,12 @@ pub fn put(byte: u8) {
     }
 }
 
-/// Reports whether there is something to be drawn.
+/// Reports whether any cell remains to be drawn.
 pub fn is_behind() -> bool {
     GRID.has_open()
 }
 
-/// Takes a cell that is to be drawn by [`draw`], unless another core draws.
+/// Takes a cell for [`draw`], unless another core draws.
 #[inline(never)]
 pub fn take_cell() -> Option<(usize, u8)> {
     if IS_DRAWING.swap(true, Ordering::Acquire) {
@@ -58,7 +58,7 @@ pub fn take_cell() -> Option<(usize, u8)> {
     cell
 }
 
-/// Draws a cell that was taken.
+/// Draws a taken cell.
 #[inline(never)]
 pub fn draw((cell, letter): (usize, u8)) {
     if let Some(screen) = SCREEN.get() {
@@ -67,7 +67,7 @@ pub fn draw((cell, letter): (usize, u8)) {
     IS_DRAWING.store(false, Ordering::Release);
 }
 
-/// Draws all that is put, as the only core that runs.
+/// Draws all text put so far, as the only running core.
 #[inline(never)]
 pub fn draw_all() {
     while let Some(cell) = GRID.take_open() {

@@ -1,22 +1,22 @@
 //! The serial ports: 16550s at I/O ports 0x3f8 and 0x2f8, by polling.
 //!
-//! The first is for text, the second for an app's wire. Polling, because text comes at boot, at
-//! the end, on a panic, or from an idle core byte by byte; an interrupt for each byte would only
-//! disturb. Input comes from a person, for whom an idle core looks now and then; the sender
-//! waits while the port's FIFO of 16 bytes is full, or bytes are lost.
-//! Registers: National Semiconductor PC16550D data sheet, 8.0.
+//! The first is for text, the second for an app's wire. Polling suffices, because text comes at
+//! boot, at the end, on a panic, or from an idle core byte by byte; an interrupt for each byte
+//! would only disturb. Input comes from a person, and an idle core looks for it now and then; the
+//! sender waits while the port's FIFO of 16 bytes is full, or bytes are lost. Registers: National
+//! Semiconductor PC16550D data sheet, 8.0.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::port;
 
-/// Several times the 1.4 ms that a full FIFO of 16 bytes takes.
+/// The most polls for one byte: several times the 1.4 ms of a full FIFO of 16 bytes.
 const MOST_POLLS: u32 = 100_000;
 
 /// A serial port.
 pub struct SerialPort {
     base: u16,
-    /// Whether it is there, which is found at [`SerialPort::initialize`].
+    /// Whether the port exists, found out by [`SerialPort::initialize`].
     is_there: AtomicBool,
 }
 
@@ -34,8 +34,8 @@ impl SerialPort {
         }
     }
 
-    /// Looks whether there is a port, and sets it to 115200 baud, 8 data bits, no parity, one
-    /// stop bit.
+    /// Checks whether the port exists, and sets it to 115200 baud, 8 data bits, no parity, one stop
+    /// bit.
     pub fn initialize(&self) {
         const SETUP: [(u16, u8); 7] = [
             (1, 0x00), // no interrupts
@@ -46,7 +46,7 @@ impl SerialPort {
             (2, 0xc7), // FIFOs on and cleared
             (4, 0x03), // ready to send
         ];
-        // The register that means nothing to the port.
+        // The scratch register, without effect on the port.
         let scratch = self.base + 7;
         let is_there = keeps_bytes(
             // SAFETY: the eight ports from `base` on are the serial port's, which is this module's.
@@ -61,21 +61,21 @@ impl SerialPort {
         }
     }
 
-    /// Reports whether there is such a port.
+    /// Reports whether the port exists.
     pub fn is_there(&self) -> bool {
         self.is_there.load(Ordering::Relaxed)
     }
 
-    /// Sends one byte, waiting until there is room for it.
+    /// Sends one byte, waiting until there is room.
     pub fn send(&self, byte: u8) {
         self.wait_until_ready();
         self.write(byte);
     }
 
-    /// Waits until a byte can be sent, and reports whether it can.
+    /// Waits until a byte can be sent, and reports whether there is room.
     ///
-    /// The wait is bounded: a port that never gets ready costs its bytes, not the kernel. If
-    /// there is none nothing is waited for, and bytes go nowhere.
+    /// The wait is bounded: a port never ready costs its bytes, not the kernel. Without a port
+    /// nothing waits, and bytes go nowhere.
     pub fn wait_until_ready(&self) -> bool {
         for _ in 0..MOST_POLLS {
             if self.is_ready() {
@@ -86,7 +86,7 @@ impl SerialPort {
         false
     }
 
-    /// Waits until the last byte has left the port, at most as long as for one to be sent.
+    /// Waits until the last byte has left the port, at most as long as for sending a byte.
     pub fn drain(&self) {
         const ALL_SENT: u8 = 1 << 6;
         // SAFETY: reading the line status of this module's device.
@@ -94,7 +94,7 @@ impl SerialPort {
         let _ = (0..MOST_POLLS).find(is_idle);
     }
 
-    /// Sends one byte; it is lost if there is no room for it.
+    /// Sends one byte; without room the byte is lost.
     pub fn write(&self, byte: u8) {
         // SAFETY: the data register of this module's device.
         unsafe { port::write_u8(self.base, byte) };
@@ -108,10 +108,10 @@ impl SerialPort {
         status & TRANSMITTER_EMPTY != 0 || !self.is_there()
     }
 
-    /// Takes a byte that has been received, if there is one.
+    /// Takes a received byte, if there is one.
     pub fn receive(&self) -> Option<u8> {
         const DATA_READY: u8 = 1 << 0;
-        /// The value that a port without a device reads as.
+        /// The value read from a port without a device.
         const ABSENT: u8 = 0xff;
         // SAFETY: reading the line status of this module's device.
         let status = unsafe { port::read_u8(self.base + 5) };
@@ -123,8 +123,8 @@ impl SerialPort {
     }
 }
 
-/// Reports whether a register keeps what is written to it, as none does where there is no
-/// port: that reads as the same byte each time.
+/// Reports whether a register keeps the bytes written. No register does without a port: such a read
+/// returns the same byte each time.
 fn keeps_bytes(write: impl Fn(u8), read: impl Fn() -> u8) -> bool {
     let keeps = |byte: &u8| {
         write(*byte);

@@ -1,4 +1,4 @@
-//! Wake-ups: how one core makes another look for work.
+//! Wake-ups: a core makes another core look for work.
 
 use core::sync::atomic::Ordering;
 
@@ -19,12 +19,12 @@ impl Core {
         }
     }
 
-    /// Tells all other cores that this core watches `wake` from now on.
+    /// Announces this core's watch of `wake` to all other cores.
     pub fn begin_watch(&self) {
         self.watches.store(true, Ordering::SeqCst);
     }
 
-    /// Tells all other cores that this core no longer watches `wake`.
+    /// Announces the end of this core's watch of `wake` to all other cores.
     pub fn end_watch(&self) {
         self.watches.store(false, Ordering::SeqCst);
     }

@@ -1,7 +1,7 @@
 //! Physical memory in frames of 4 KiB, handed out from the boot memory map.
 //!
-//! A frame that was handed out does not come back: what is taken at boot and at
-//! a commit is meant to stay, and memory that comes and goes is the heap's.
+//! Frames never come back: memory taken at boot and at a commit is meant to stay, and short-lived
+//! memory comes from the heap.
 
 use core::ops::Range;
 
@@ -10,20 +10,21 @@ use boot::{List, MAX_REGIONS, MemoryRegion};
 /// The size of a frame, in bytes.
 pub(crate) const FRAME: u64 = 4096;
 
-/// Nothing below is handed out: the firmware's, and the trampoline's page.
+/// No frame below this address is handed out: this memory is the firmware's, and holds the
+/// trampoline's page.
 const LOWEST: u64 = 1 << 20;
 
-/// The frames that nobody has taken.
+/// The frames not taken yet.
 pub(crate) struct FreeFrames {
-    /// Image and module cut two ranges of a map in two.
+    /// Image and module may each cut a range of the map in two.
     free: List<(u64, u64), { MAX_REGIONS + 2 }>,
     /// The bytes of all usable memory, taken or not.
     total: u64,
 }
 
 impl FreeFrames {
-    /// Creates the stock from the memory map, which ascends, less the `taken` ranges. So does
-    /// the stock: what lies below 4 GiB, where page tables have to be at first, goes first.
+    /// Creates the stock from the memory map, which ascends, less the `taken` ranges. The stock
+    /// ascends likewise: memory below 4 GiB, required for the first page tables, goes first.
     pub(crate) fn new(map: &[MemoryRegion], taken: &[Range<u64>]) -> Self {
         let mut frames = Self {
             free: List::new((0, 0)),
@@ -52,7 +53,7 @@ impl FreeFrames {
         self.total
     }
 
-    /// Takes `count` adjacent frames and returns the first one's address.
+    /// Takes `count` adjacent frames and returns the first frame's address.
     pub(crate) fn allocate(&mut self, count: u64) -> Option<u64> {
         let bytes = count.checked_mul(FRAME)?;
         let (start, _) = self
@@ -79,7 +80,7 @@ impl FreeFrames {
     }
 }
 
-/// Returns what is left of `whole` without the `taken` ranges, in ascending order.
+/// Returns the rest of `whole` without the `taken` ranges, in ascending order.
 pub(super) fn less(whole: Range<u64>, taken: &[Range<u64>]) -> impl Iterator<Item = Range<u64>> {
     let end = whole.end;
     let mut start = whole.start;

@@ -1,14 +1,14 @@
 //! The heap: every allocation of kernel and apps, in constant time.
 //!
-//! The heap serves the boot, commits and reports. Between a DAG's first release
-//! and its last completion nothing of the kernel's allocates, and the counters
-//! here are the proof.
+//! The heap serves the boot, commits and reports. Between a DAG's first release and its last
+//! completion the kernel itself allocates nothing, and the counters here are the proof.
 //!
-//! Allocations of an instance are its DAG's, as the word says that the layer above notes of what
-//! runs ([`OWNER_BIT`]). So after a run it can be told what faults have left in use.
+//! An instance's allocations belong to its DAG; the word noted by the layer above for the running
+//! instance tells which DAG ([`OWNER_BIT`]). After a run the kernel can therefore tell how much
+//! memory faults have left in use.
 //!
-//! An app's function may use up the heap all the same. So subtasks cannot have the
-//! last [`RESERVE`] of it: what is left serves the reports, and the app's main function.
+//! An app's function may use up the heap all the same. Subtasks therefore cannot have the last
+//! [`RESERVE`]th of the heap: the rest serves the reports, and the app's main function.
 
 use core::alloc::{GlobalAlloc, Layout};
 use core::ops::Range;
@@ -22,20 +22,20 @@ use crate::machine::this_core;
 
 static HEAP: SpinLock<Tlsf> = SpinLock::new(Tlsf::new());
 
-/// Subtasks leave the heap its capacity divided by this.
+/// Subtasks leave free the heap's capacity divided by this number.
 const RESERVE: usize = 32;
 
-/// From this bit on, the word that is noted of what runs says who owns what it allocates.
+/// The first bit of the owner in the noted word of a running instance.
 pub const OWNER_BIT: u32 = 44;
 
-/// Reports whether the code that allocates can have `bytes` more. Interrupts are disabled.
+/// Reports whether the allocating code may have `bytes` more. Interrupts are disabled.
 fn may_have(heap: &Tlsf, bytes: usize) -> bool {
     let usage = heap.usage();
     let free = usage.capacity_bytes - usage.in_use_bytes;
     free.saturating_sub(usage.capacity_bytes / RESERVE) >= bytes || this_core::running().is_none()
 }
 
-/// The image's global allocator; the `entry!` macro makes it so.
+/// The image's global allocator, installed by the `entry!` macro.
 #[derive(Clone, Copy, Debug)]
 pub struct KernelHeap;
 
@@ -52,7 +52,7 @@ pub unsafe fn add_memory(range: Range<u64>) {
     }
 }
 
-/// Returns what has been allocated so far.
+/// Returns the usage of the heap so far.
 pub fn usage() -> HeapUsage {
     HEAP.lock().usage()
 }
@@ -71,8 +71,8 @@ fn allocate(layout: Layout) -> Option<NonNull<u8>> {
     Some(block)
 }
 
-/// Returns how many bytes that `owner` has allocated are in use for each of these owners, and
-/// forgets what anybody owns. Takes time for each block of the heap.
+/// Adds, for each of these owners, the bytes allocated by the owner and still in use, and forgets
+/// all owners. Takes time for each block of the heap.
 pub fn take_owned(owners: &mut [usize]) {
     HEAP.lock().take_owned(|owner, bytes| {
         if let Some(sum) = owners.get_mut(owner as usize - 1) {

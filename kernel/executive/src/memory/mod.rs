@@ -1,8 +1,8 @@
 //! Memory: frames, the address space, stacks and the heap.
 //!
-//! Virtual and physical addresses are the same, with two exceptions. Stacks live in
-//! a window of their own, so that each can have an absent guard page below it
-//! that catches an overflow at once; so does the loader's module, which may lie in page 0.
+//! Virtual and physical addresses are equal, with two exceptions. Stacks live in a window of their
+//! own, so that each can have an absent guard page below, where an overflow faults at once; the
+//! loader's module has a window, too, because the module may lie in page 0.
 
 pub(crate) mod frames;
 pub mod heap;
@@ -16,24 +16,24 @@ use crate::machine::paging::{MapError, PAGE, PageAccess, PageTable};
 use crate::machine::spinlock::SpinLock;
 use frames::{FRAME, FreeFrames, less};
 
-/// Where stacks live: beyond the memory that is used.
+/// The start of the stacks' window: beyond the used memory.
 const STACK_WINDOW: u64 = MEMORY_END;
 
-/// Where the module is: its physical address beyond this one.
+/// The start of the module's window: the module is at its physical address plus this address.
 pub const MODULE_WINDOW: u64 = 1 << 40;
 
-/// The physical memory and the address space over it.
+/// The physical memory, with the address space over the memory.
 struct PhysicalMemory {
     frames: FreeFrames,
     table: PageTable,
     next_stack: u64,
-    /// The ranges of registers that were mapped since.
+    /// The ranges of registers mapped since the boot.
     registers: [Range<u64>; 16],
 }
 
 static MEMORY: SpinLock<Option<PhysicalMemory>> = SpinLock::new(None);
 
-/// The layout of memory that [`initialize`] found and built.
+/// The memory layout found and built by [`initialize`].
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryLayout {
     /// The page table's root, to be loaded by every core.
@@ -42,12 +42,12 @@ pub struct MemoryLayout {
     pub total_bytes: u64,
 }
 
-/// Builds the address space and the heap, and switches to it.
+/// Builds the address space and the heap, and switches to the new space.
 ///
 /// # Safety
 ///
 /// 1. The boot page table is in use, and `map` is the machine's memory map, in order.
-/// 2. It is called once, by the boot processor, before anything is allocated.
+/// 2. The boot processor calls this function once, before any allocation.
 /// 3. `module`, if any, [lies in memory](lies_in_memory) by that map.
 /// 4. At `devices` there are registers, and `screen`, whole pages, is a screen.
 pub unsafe fn initialize(
@@ -90,17 +90,17 @@ pub unsafe fn initialize(
     })
 }
 
-/// Returns the whole pages that a module lies in, which nobody else gets.
+/// Returns the whole pages around a module, reserved for the module alone.
 fn pages_of(module: Option<Module>) -> Range<u64> {
     module.map_or(0..0, |module| {
         module.start / PAGE * PAGE..module.end.next_multiple_of(PAGE)
     })
 }
 
-/// Returns the number of the page that processors are to start at: the highest one of
-/// usable memory that they can reach from real mode, and that no module lies in.
+/// Returns the number of the page where processors start: the highest page of usable memory within
+/// reach of real mode and free of modules.
 pub fn trampoline_page(map: &[MemoryRegion], modules: &[Module]) -> Option<u8> {
-    /// Here a PC's firmware and adapters begin, even where the map says otherwise.
+    /// A PC's firmware and adapters begin here, even if the map says otherwise.
     const END: u64 = 640 << 10;
     let is_free = |page: &Range<u64>| {
         let lies = |region: &MemoryRegion| {
@@ -119,7 +119,7 @@ pub fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range<u64>) 
     let fits = |region: &MemoryRegion| {
         region.usable && region.start <= module.start && module.end <= region.end
     };
-    // The module's last page is the module's alone, so it has to be whole.
+    // The module's last page belongs to the module alone, so the page has to be whole.
     let Some(end) = module.end.checked_next_multiple_of(PAGE) else {
         return false;
     };
@@ -128,8 +128,8 @@ pub fn lies_in_memory(module: Module, map: &[MemoryRegion], image: &Range<u64>) 
         && map.iter().any(fits)
 }
 
-/// Maps the image with its rights, the module as constant in its window, all other usable
-/// memory as data.
+/// Maps the image with its rights, the module as constant in its window, all other usable memory as
+/// data.
 fn map_all(
     table: &mut PageTable,
     map: &[MemoryRegion],
@@ -158,7 +158,7 @@ fn map_all(
     Ok(())
 }
 
-/// Maps the pages in which devices have registers at these addresses, each once.
+/// Maps the pages of devices' registers at these addresses, each page once.
 fn map_devices(
     table: &mut PageTable,
     map: &[MemoryRegion],
@@ -179,8 +179,8 @@ fn map_devices(
     Ok(())
 }
 
-/// Returns the whole pages that a screen in `range` takes, unless a firmware is mistaken that
-/// puts it into memory, or into what is used for something else.
+/// Returns the whole pages of a screen in `range`, unless a mistaken firmware puts the screen into
+/// memory, or into the place of something else.
 #[inline(never)]
 pub fn pages_of_screen(range: Range<u64>, map: &[MemoryRegion]) -> Option<Range<u64>> {
     let pages = range.start / PAGE * PAGE..range.end.checked_next_multiple_of(PAGE)?;
@@ -203,7 +203,7 @@ fn take_zeroed(frames: &mut FreeFrames) -> Option<u64> {
 ///
 /// # Errors
 ///
-/// [`MapError::AlreadyMapped`] where memory or something else is.
+/// [`MapError::AlreadyMapped`] if the range holds memory or something else.
 pub fn map_registers(range: Range<u64>) -> Result<(), MapError> {
     let end = range.end.checked_next_multiple_of(PAGE);
     let pages = range.start / PAGE * PAGE..end.unwrap_or(u64::MAX);
@@ -235,8 +235,8 @@ pub fn map_registers(range: Range<u64>) -> Result<(), MapError> {
     Ok(())
 }
 
-/// Creates a stack of `bytes`, whole pages, with a guard page below it, and returns its top.
-/// Below that it can grow to `room`.
+/// Creates a stack of `bytes`, whole pages, with a guard page below, and returns the stack's top.
+/// The stack can later grow down to `room` bytes.
 pub fn new_stack(bytes: u64, room: u64) -> Result<u64, MapError> {
     let mut memory = MEMORY.lock();
     let memory = memory.as_mut().ok_or(MapError::OutOfFrames)?;
@@ -246,7 +246,7 @@ pub fn new_stack(bytes: u64, room: u64) -> Result<u64, MapError> {
     Ok(top)
 }
 
-/// Makes a stack reach down from `from`, where it has room, to `to`.
+/// Extends a stack with room down from `from` to `to`.
 pub fn grow_stack(from: u64, to: u64) -> Result<(), MapError> {
     let mut memory = MEMORY.lock();
     memory

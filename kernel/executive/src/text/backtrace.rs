@@ -1,23 +1,23 @@
-//! A backtrace as a machine line: addresses, which the host makes into names.
+//! A backtrace as a machine line: addresses, turned into names by the host.
 
 use core::fmt;
 
 use crate::machine::backtrace::{self, CallSite};
 use front::json::JsonObject;
 
-/// The most calls that a line has, so that it stays together (`console`).
+/// The most calls of a line, so that the line stays together (`console`).
 const MOST: usize = 24;
 
-/// The calls that a stack held, for when it holds others.
+/// A copy of the calls on a stack, kept for when the stack holds others.
 pub struct Backtrace {
     instruction: Option<u64>,
     calls: [Option<CallSite>; MOST],
 }
 
-/// Where code was as it failed.
+/// The place of a failure in code.
 #[derive(Clone, Copy, Debug)]
 pub struct CodeLocation {
-    /// The instruction, if it is known apart from the stack.
+    /// The instruction, if known apart from the stack.
     pub instruction: Option<u64>,
     /// The stack pointer there, or further down.
     pub stack_pointer: u64,
@@ -34,7 +34,7 @@ impl CodeLocation {
         }
     }
 
-    /// Reads the calls, all of this core's stack.
+    /// Reads the calls from this core's stack.
     pub fn backtrace(self) -> Backtrace {
         let mut found = backtrace::calls(self.stack_pointer);
         Backtrace {
@@ -55,7 +55,7 @@ impl Backtrace {
     }
 }
 
-/// Shows a call as where it returns to and what it called.
+/// Shows a call as its return address and its callee.
 fn shown(call: &CallSite) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         write!(f, "\"{:#x}", call.returns_to)?;

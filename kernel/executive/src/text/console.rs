@@ -1,35 +1,33 @@
-//! Text on the serial line, without disturbing what is being measured.
+//! Text on the serial line, without disturbing measurements.
 //!
-//! Text is made by the context that prints it, outside every
-//! lock (`TextPieces`), and goes into a bounded buffer in pieces (`buffer`); the lock is
-//! held for the copy of one piece. Outside a run it is sent at once. During a run it
-//! stays in the buffer until an idle core sends it, byte by byte, so that no subtask
-//! ever waits for a serial port; what no longer fits is dropped and counted, never
-//! silently. A part of the buffer is left to the kernel's own machine lines, so that
-//! an app that floods the port cannot hide a fault.
+//! The printing context makes the text outside every lock (`TextPieces`), and copies it in pieces
+//! into a bounded buffer (`buffer`); the lock is held for the copy of one piece. Outside a run the
+//! text is sent at once. During a run the text stays in the buffer until an idle core sends it,
+//! byte by byte, so that no subtask ever waits for a serial port; excess text is dropped and
+//! counted, never silently. A part of the buffer is reserved for the kernel's own machine lines, so
+//! that an app flooding the port cannot hide a fault.
 //!
-//! Text and machine lines are told apart: only [`front::json`] can print a line
-//! that begins with `{`.
+//! Text and machine lines are distinct: only [`front::json`] can print a line beginning with `{`.
 //!
-//! With `console=on` on the command line a person can talk to the kernel during a
-//! run; that is `background`'s module `session`.
+//! With `console=on` on the command line a person can talk to the kernel during a run;
+//! `background`'s module `session` does this.
 //!
-//! # The last words of a kernel that cannot go on, straight to the port
+//! # The last words of a dying kernel, straight to the port
 //!
-//! To be used only when all other cores are stopped: one of them, or the caller
-//! itself, may hold the buffer's lock and never release it. Nothing said here has a lock, and all
-//! of it is bounded: a message of megabytes is cut off.
+//! To be used only when all other cores are stopped: one of them, or the caller itself, may hold
+//! the buffer's lock and never release the lock. No function for last words waits for a lock, and
+//! all are bounded: a message of megabytes is cut off.
 //!
-//! # Text that waits to be sent: a ring of bytes that takes whole pieces or none
+//! # Text waiting to be sent: a ring of bytes that takes whole pieces or none
 //!
-//! A line cut in the middle is worse than a missing one: half a machine line
-//! would make a run a failure. So a piece that does not fit is refused as a whole.
+//! A line cut in the middle is worse than a missing line: half a machine line would make a run a
+//! failure. The ring therefore refuses a piece as a whole if the piece does not fit.
 //!
-//! Two promises are kept here, because only the ring knows what came before:
+//! The ring keeps two promises, because only the ring knows the preceding byte:
 //!
-//! - A *machine line* begins in column 0, even if a line was begun before it.
-//! - *Text* never has a `{` in column 0; it gets a blank before it. So no text can be
-//!   taken for a machine line.
+//! - A *machine line* begins in column 0, even after an unfinished line.
+//! - *Text* never has a `{` in column 0; the ring puts a blank before the brace. No text can
+//!   therefore be taken for a machine line.
 
 use core::fmt::{self, Display, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -41,21 +39,21 @@ use crate::machine::{screen, serial, turns};
 
 static BUFFER: SpinLock<OutputRing<{ 16 * 1024 }>> = SpinLock::new(OutputRing::new());
 
-/// Whether text waits for idle cores.
+/// Whether text is left to idle cores.
 static DEFERRED: AtomicBool = AtomicBool::new(false);
 /// Whether the buffer holds anything, readable without the lock.
 static PENDING: AtomicBool = AtomicBool::new(false);
 
-/// Takes all text of an image; its entry names this to [`front::output!`].
+/// Takes all text of an image; the image's entry names this function to [`front::output!`].
 #[inline(never)]
 pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
     let mut fits = true;
     let mut pieces = TextPieces::new(kind, |piece, begins| {
-        // What comes after a gap would only look like something else.
+        // Text after a gap would only look like something else.
         fits = hand_over(piece, kind, begins, fits);
     });
-    // Only a `Display` that fails of its own accord can fail here; its text up
-    // to there is then all there is to show.
+    // Only a `Display` that fails of its own accord can fail here; its text up to there is then all
+    // there is to show.
     let _ = pieces.write_fmt(text);
     pieces.finish();
     if !DEFERRED.load(Ordering::Relaxed) {
@@ -63,8 +61,8 @@ pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
     }
 }
 
-/// Puts a piece into the buffer, or counts it as dropped: if it does not fit, or is not
-/// `wanted`. Reports whether it is in the buffer.
+/// Puts a piece into the buffer, or counts the piece as dropped if it does not fit or is not
+/// `wanted`. Reports whether the piece is in the buffer.
 fn hand_over(piece: &[u8], kind: OutputKind, begins: bool, wanted: bool) -> bool {
     turns::look_up();
     loop {
@@ -82,13 +80,13 @@ fn hand_over(piece: &[u8], kind: OutputKind, begins: bool, wanted: bool) -> bool
     }
 }
 
-/// Reports whether anything waits to be sent.
+/// Reports whether any text waits to be sent.
 pub fn has_pending() -> bool {
     PENDING.load(Ordering::Acquire)
 }
 
-/// Sends one byte that waits, if any, or else draws one cell of the screen, and reports whether
-/// there was one. It waits for the port, with interrupts and locks as they are.
+/// Sends one waiting byte, if any, or else draws one cell of the screen, and reports whether there
+/// was either. Waits for the port, with interrupts and locks left as they are.
 #[inline(never)]
 pub fn send_pending_byte() -> bool {
     if !has_pending() {
@@ -98,7 +96,8 @@ pub fn send_pending_byte() -> bool {
     let was_ready = serial::FIRST.wait_until_ready();
     let mut buffer = BUFFER.lock();
     if was_ready && !serial::FIRST.is_ready() {
-        // Another core was faster. It is not waited for with the lock held.
+        // Another core was faster. Waiting for that core with the lock held would keep interrupts
+        // off.
         return true;
     }
     let byte = buffer.pop();
@@ -113,6 +112,7 @@ pub fn send_pending_byte() -> bool {
     };
     PENDING.store(!buffer.is_empty() || screen::is_behind(), Ordering::Release);
     drop(buffer);
+    // Drawn without the lock, since a cell takes about as long as a byte at the port.
     if let Some(cell) = cell {
         screen::draw(cell);
         return true;
@@ -120,8 +120,7 @@ pub fn send_pending_byte() -> bool {
     byte.is_some()
 }
 
-/// Sends bytes that wait for as long as the port takes them without a wait; not
-/// more than a few lines.
+/// Sends waiting bytes for as long as the port takes them without a wait; at most a few lines.
 pub fn send_what_goes_at_once() {
     const MOST_BYTES: usize = 512;
     for _ in 0..MOST_BYTES {
@@ -136,8 +135,8 @@ pub fn defer() {
     DEFERRED.store(true, Ordering::Relaxed);
 }
 
-/// Sends text at once from now on, first what has waited, and returns how many
-/// bytes were dropped meanwhile.
+/// Sends text at once from now on, starting with the waiting text, and returns how many bytes were
+/// dropped meanwhile.
 pub fn resume() -> u64 {
     DEFERRED.store(false, Ordering::Relaxed);
     while send_pending_byte() {}
@@ -153,7 +152,7 @@ mod output {
 /// The most bytes of one text.
 const MOST_BYTES: usize = 8 * 1024;
 
-/// Writes text, which begins a line.
+/// Writes text at the beginning of a line.
 pub fn write_in_emergency(text: fmt::Arguments<'_>) {
     send(OutputKind::Text, text);
 }
@@ -164,6 +163,7 @@ pub fn write_line_in_emergency(line: &dyn Display) {
 }
 
 fn send(kind: OutputKind, text: fmt::Arguments<'_>) {
+    // Only tried: a stopped core may hold this lock for good.
     if let Some(mut buffer) = BUFFER.try_lock() {
         core::iter::from_fn(|| buffer.pop()).for_each(send_byte);
     }
@@ -172,7 +172,7 @@ fn send(kind: OutputKind, text: fmt::Arguments<'_>) {
         let before: &[u8] = if before { b" " } else { b"" };
         before.iter().chain(piece).copied().for_each(send_byte);
     });
-    // It fails where it is cut off.
+    // Fails where the text is cut off.
     let _ = AtMost(&mut pieces, MOST_BYTES).write_fmt(text);
     pieces.finish();
     screen::draw_all();
@@ -200,7 +200,7 @@ impl<W: Write> Write for AtMost<W> {
     }
 }
 
-/// How many bytes are kept from apps' output, for what the kernel itself has to say.
+/// How many bytes are reserved for the kernel's own output, out of reach of apps.
 const RESERVE: usize = 4096;
 
 /// A ring of `N` bytes.
@@ -209,10 +209,10 @@ struct OutputRing<const N: usize> {
     /// The place of the oldest byte.
     start: usize,
     length: usize,
-    /// Whether the next byte stands behind another one of its line. (So said, an empty
-    /// buffer is nothing but zeros, and takes no place in the image.)
+    /// Whether the next byte follows another byte of its line. (In this form an empty buffer is all
+    /// zeros, and takes no place in the image.)
     is_within_line: bool,
-    /// How many bytes have been refused for good.
+    /// The number of bytes refused for good.
     dropped: u64,
 }
 
@@ -227,8 +227,8 @@ impl<const N: usize> OutputRing<N> {
         }
     }
 
-    /// Takes a piece, unless there is no room for all of it. `begins`: it is the first
-    /// one of its text or line.
+    /// Takes a piece, if there is room for all of it. `begins` marks the first piece of a text or
+    /// line.
     fn append(&mut self, piece: &[u8], kind: OutputKind, begins: bool) -> bool {
         let Some(last) = piece.last() else {
             return true;
@@ -252,7 +252,7 @@ impl<const N: usize> OutputRing<N> {
         true
     }
 
-    /// Appends bytes, for which there is room.
+    /// Appends bytes; the caller has checked the room.
     fn copy(&mut self, bytes: &[u8]) {
         let end = (self.start + self.length) % N;
         let (first, second) = bytes.split_at(bytes.len().min(N - end));

@@ -1,10 +1,9 @@
-//! Blocks in raw memory: the only place that reads and writes them.
+//! Blocks in raw memory: the only place for reading and writing them.
 //!
-//! A [`Block`] is a pointer to a header. Its methods are safe to call because
-//! only [`Block::create_region`] and [`Block::of_payload`] make one from
-//! nothing, and both are `unsafe`; the rest follows from the invariants
-//! **Ownership**, **Tiling** and **Listing** of the [module above](super), which
-//! each method here keeps and relies on.
+//! A [`Block`] is a pointer to a header. Its methods are safe to call because only
+//! [`Block::create_region`] and [`Block::of_payload`] make a block from nothing, and both are
+//! `unsafe`; the rest follows from the invariants **Ownership**, **Tiling** and **Listing** of the
+//! [module above](super); each method here keeps and relies on them.
 //!
 //! ```text
 //!  |<-------------- size (multiple of 16) ------------->|
@@ -12,32 +11,30 @@
 //!  ^ block, 16-aligned         ^ payload, 16-aligned
 //! ```
 //!
-//! Pointers stay pointers, never integers: each is derived from the pointer with
-//! which its region was added, as strict provenance asks for.
+//! Pointers stay pointers, never integers: each is derived from the pointer given when its region
+//! was added, as strict provenance asks for.
 //!
-//! # Size classes: which list a free block is in, where to search
+//! # Size classes: in which list a free block is, and where to search
 //!
-//! The first level splits sizes at powers of two, the second splits each of
-//! these ranges into 32 equal classes. Sizes below 512 bytes, whose 32 classes
-//! would be narrower than a granule, share the first range with one class per
-//! granule. Pure arithmetic: nothing here touches memory.
+//! The first level splits sizes at powers of two, the second splits each of these ranges into 32
+//! equal classes. Sizes below 512 bytes, whose 32 classes would be narrower than a granule, share
+//! the first range with one class per granule. Pure arithmetic: nothing here touches memory.
 
 use core::ptr::NonNull;
 
-/// Bytes that all block addresses and sizes are multiples of, and the alignment
-/// that every payload has.
+/// The unit of all block addresses and sizes in bytes, and the alignment of every payload.
 pub(super) const GRANULE: usize = 16;
-/// Bytes before the payload of a block.
+/// The bytes before the payload of a block.
 pub(super) const HEADER_SIZE: usize = size_of::<Header>();
-/// Bytes of the smallest block: its payload holds the links when it is free.
+/// The bytes of the smallest block: its payload holds the links when free.
 pub(super) const MIN_BLOCK_SIZE: usize = HEADER_SIZE + size_of::<FreeLinks>();
 
 const _: () = assert!(HEADER_SIZE == GRANULE && align_of::<Header>() == GRANULE);
 const _: () = assert!(MIN_BLOCK_SIZE == 2 * GRANULE && align_of::<FreeLinks>() <= GRANULE);
 
-/// The bit of [`Header::size_and_free`] that is set while the block is free.
+/// The bit of [`Header::size_and_free`] for a free block.
 const FREE: usize = 1;
-/// From this bit on there is the owner of a used block, above any size.
+/// The first bit of a used block's owner, above any size.
 const OWNER: u32 = 40;
 
 /// A block of the tiling, or an end marker.
@@ -49,7 +46,7 @@ pub(super) struct Block(NonNull<Header>);
 struct Header {
     /// The size; its lowest bits, zero in a multiple of 16, hold [`FREE`], its highest the owner.
     size_and_free: usize,
-    /// The block that ends where this one starts; none for a region's first.
+    /// The block that ends at this block's start; `None` for a region's first.
     previous: Option<Block>,
 }
 
@@ -65,8 +62,7 @@ impl Block {
     ///
     /// # Safety
     ///
-    /// 1. `start` is 16-aligned; `size` is a multiple of 16, at least
-    ///    [`MIN_BLOCK_SIZE`].
+    /// 1. `start` is 16-aligned; `size` is a multiple of 16, at least [`MIN_BLOCK_SIZE`].
     /// 2. **Ownership** holds for `size + HEADER_SIZE` bytes from `start` on.
     pub(super) unsafe fn create_region(start: NonNull<u8>, size: usize) -> Self {
         let block = Self(start.cast());
@@ -83,12 +79,11 @@ impl Block {
         block
     }
 
-    /// Returns the block that has this payload.
+    /// Returns the block with a given payload.
     ///
     /// # Safety
     ///
-    /// `payload` is what [`payload`](Self::payload) returned for a block that is
-    /// still in the tiling.
+    /// [`payload`](Self::payload) returned `payload` for a block still in the tiling.
     pub(super) const unsafe fn of_payload(payload: NonNull<u8>) -> Self {
         // SAFETY: by the caller's promise and Tiling a header lies before it, in
         // the same region.
@@ -105,7 +100,7 @@ impl Block {
         self.read().size_and_free & ((1 << OWNER) - 1) & !FREE
     }
 
-    /// Returns the owner of a used block, 0 if it has none.
+    /// Returns the owner of a used block, 0 if there is none.
     pub(super) fn owner(self) -> u32 {
         u32::try_from(self.read().size_and_free >> OWNER).unwrap_or(0)
     }
@@ -123,7 +118,7 @@ impl Block {
         self.read().size_and_free & FREE != 0
     }
 
-    /// Returns the block before this one, or `None` if it is its region's first.
+    /// Returns the block before this block, or `None` for a region's first.
     pub(super) fn previous(self) -> Option<Self> {
         self.read().previous
     }
@@ -143,8 +138,8 @@ impl Block {
         });
     }
 
-    /// Cuts a used block after `size` bytes and returns the part behind the cut,
-    /// used as well. Both parts must come out as large as a block can be small.
+    /// Cuts a used block after `size` bytes and returns the part behind the cut, used as well. Both
+    /// parts must be at least as large as the smallest block.
     pub(super) fn split(self, size: usize) -> Self {
         let whole = self.read();
         debug_assert!(size >= MIN_BLOCK_SIZE && size.is_multiple_of(GRANULE));
@@ -163,7 +158,7 @@ impl Block {
         rest
     }
 
-    /// Merges the used block `next`, which follows this used block, into it.
+    /// Merges the used block `next`, the successor of this used block, into this block.
     pub(super) fn absorb(self, next: Self) {
         debug_assert!(self.next() == next && !self.is_free() && !next.is_free());
         let header = self.read();
@@ -183,7 +178,7 @@ impl Block {
         unsafe { links.read() }
     }
 
-    /// Sets the links of a block that is listed, or is about to be.
+    /// Sets the links of a block already listed, or about to be.
     pub(super) fn set_links(self, links: FreeLinks) {
         let place: NonNull<FreeLinks> = self.payload().cast();
         // SAFETY: no caller holds this block, so that by Ownership its payload is
@@ -198,7 +193,7 @@ impl Block {
         });
     }
 
-    /// The place `offset` bytes after the start of this block, at most its size.
+    /// Returns the place `offset` bytes after the start of this block, at most its size.
     fn at_offset(self, offset: usize) -> Self {
         // SAFETY: by Tiling a block and the header after it are in one region.
         Self(unsafe { self.0.byte_add(offset) })
@@ -216,17 +211,18 @@ impl Block {
     }
 }
 
-/// Ranges of the first level; the last ends at [`SIZE_LIMIT`].
+/// The number of ranges of the first level; the last ends at [`SIZE_LIMIT`].
 pub(super) const FIRST_LEVEL: usize = 32;
-/// Classes of each range.
+/// The number of classes in each range.
 pub(super) const SECOND_LEVEL: usize = 1 << SECOND_LEVEL_LOG2;
-/// Block sizes, in bytes, are below this: 1 TiB.
+/// The exclusive limit of block sizes in bytes: 1 TiB.
 pub(super) const SIZE_LIMIT: usize = LINEAR_LIMIT << (FIRST_LEVEL - 1);
 const _: () = assert!(SIZE_LIMIT <= 1 << OWNER);
 
-/// The paper's recommended trade-off between waste (1/32) and list heads.
+/// The binary logarithm of the classes in a range: the paper's recommended trade-off between waste
+/// (1/32) and list heads.
 const SECOND_LEVEL_LOG2: u32 = 5;
-/// Sizes below this, in bytes, have a class per granule.
+/// The limit of the sizes, in bytes, with a class per granule.
 const LINEAR_LIMIT: usize = GRANULE << SECOND_LEVEL_LOG2;
 
 /// A range of block sizes, by its place on both levels.
@@ -239,7 +235,7 @@ pub(super) struct SizeClass {
 }
 
 impl SizeClass {
-    /// The class of a block of `size` bytes, which is below [`SIZE_LIMIT`].
+    /// Returns the class of a block of `size` bytes, below [`SIZE_LIMIT`].
     pub(super) const fn of(size: usize) -> Self {
         debug_assert!(size < SIZE_LIMIT);
         if size < LINEAR_LIMIT {
@@ -255,8 +251,8 @@ impl SizeClass {
         }
     }
 
-    /// The smallest class whose every block has at least `size` bytes, a multiple
-    /// of the granule; `None` if there is none.
+    /// Returns the smallest class whose every block has at least `size` bytes, a multiple of the
+    /// granule; `None` if there is no such class.
     pub(super) const fn fitting(size: usize) -> Option<Self> {
         if size < LINEAR_LIMIT {
             return Some(Self::of(size));
@@ -264,7 +260,7 @@ impl SizeClass {
         if size >= SIZE_LIMIT {
             return None;
         }
-        // Any size that is not the least of its class goes to the class above.
+        // Any size other than the least of its class goes to the class above.
         let width = 1 << (size.ilog2() - SECOND_LEVEL_LOG2);
         let rounded = size + (width - 1);
         if rounded >= SIZE_LIMIT {
@@ -274,8 +270,8 @@ impl SizeClass {
     }
 }
 
-/// The size of the smallest block with a payload of `payload_size` bytes, or
-/// `None` when no block can be that large.
+/// Returns the size of the smallest block with a payload of `payload_size` bytes, or `None` if no
+/// block can be that large.
 pub(super) fn block_size_for(payload_size: usize) -> Option<usize> {
     let size = payload_size
         .checked_add(HEADER_SIZE)?

@@ -1,58 +1,56 @@
-//! A heap whose every operation takes bounded time: two-level segregated fit.
+//! A heap with bounded time for every operation: two-level segregated fit.
 //!
-//! The algorithm is that of M. Masmano, I. Ripoll, A. Crespo and J. Real,
-//! "TLSF: a new dynamic memory allocator for real-time systems", ECRTS 2004,
-//! doi [10.1109/EMRTS.2004.1311009](https://doi.org/10.1109/EMRTS.2004.1311009).
+//! The algorithm is by M. Masmano, I. Ripoll, A. Crespo and J. Real, "TLSF: a new dynamic memory
+//! allocator for real-time systems", ECRTS 2004, doi
+//! [10.1109/EMRTS.2004.1311009](https://doi.org/10.1109/EMRTS.2004.1311009).
 //!
 //! # Words
 //!
 //! - A *region* is a piece of memory given to the allocator for good.
-//! - A *block* is a part of a region: a 16-byte header, then its *payload*,
-//!   which a caller holds while the block is *used*. Block sizes count the
-//!   header and are multiples of the *granule*, 16 bytes.
-//! - A *class* is a range of block sizes. Each has a list of its *free* blocks;
-//!   two levels of bitmaps say which lists have any.
-//! - The *end marker* is a header with no payload that closes a region.
+//! - A *block* is a part of a region: a 16-byte header, then its *payload*, held by a caller while
+//!   the block is *used*. Block sizes count the header and are multiples of the *granule*, 16
+//!   bytes.
+//! - A *class* is a range of block sizes. Each class has a list of its *free* blocks; two levels of
+//!   bitmaps mark the nonempty lists.
+//! - The *end marker* is a header with no payload at the end of a region.
 //!
 //! # Invariants
 //!
 //! The safety comments of this module cite these by name.
 //!
-//! - **Ownership**: from [`Tlsf::add_region`] on, the allocator alone reads and
-//!   writes a region, through pointers derived from the region's own, except
-//!   for the payloads of used blocks, which belong to their callers.
-//! - **Tiling**: blocks fill a region without gaps, up to its end marker. A
-//!   block's header is initialised; its size leads to the header after it, and
-//!   that one's `previous` leads back. A `Block` value names a
-//!   block of the tiling; after a merge the absorbed block's value is not used.
-//! - **Listing**: a block is marked free exactly while it is in the list of its
-//!   class; then its links are initialised and name blocks of that list.
+//! - **Ownership**: from [`Tlsf::add_region`] on, the allocator alone reads and writes a region,
+//!   through pointers derived from the region's own, except for the payloads of used blocks, which
+//!   belong to their callers.
+//! - **Tiling**: blocks fill a region without gaps, up to its end marker. A block's header is
+//!   initialised; its size leads to the next header, and the next header's `previous` leads back. A
+//!   `Block` value names a block of the tiling; after a merge the absorbed block's value is not
+//!   used.
+//! - **Listing**: a block is marked free exactly while listed in its class; its links are then
+//!   initialised and name blocks of that list.
 //!
-//! # What it guarantees
+//! # Guarantees
 //!
-//! - Allocating, deallocating and resizing run without loops: they take a few
-//!   bit scans and a constant number of block splits and merges, whatever the
-//!   history and the number of blocks.
+//! - Allocating, deallocating and resizing run without loops: they take a few bit scans and a
+//!   constant number of block splits and merges, whatever the history and the number of blocks.
 //! - Two free blocks are never neighbours: freed memory merges at once.
-//! - Fit is good, not best: the block taken comes from the first nonempty class
-//!   whose *every* block is large enough. A request can hence fail although a
-//!   free block less than 1/32 larger than it is left over.
+//! - Fit is good, not best: the block comes from the first nonempty class whose *every* block is
+//!   large enough. A request can hence fail although a free block less than 1/32 larger than the
+//!   request is left over.
 //!
-//! # What it does not
+//! # No guarantees
 //!
-//! - It does not lock: `&mut self` is the caller's proof of exclusion.
-//! - It does not clear memory, neither when handing it out nor on return.
-//! - It does not join neighbouring regions, nor give a region back.
-//! - It does not detect wrong use in release builds; debug builds catch a
-//!   second free and a wrong size where the header still tells.
+//! - The allocator does not lock: `&mut self` is the caller's proof of exclusion.
+//! - The allocator does not clear memory, neither when handing memory out nor on return.
+//! - The allocator does not join neighbouring regions, nor give a region back.
+//! - The allocator does not detect wrong use in release builds; debug builds catch a second free
+//!   and a wrong size if the header still tells.
 //!
-//! # The free blocks by class, and the bitmaps that find a fitting one at once
+//! # The free blocks by class, and the bitmaps for finding a fitting block at once
 //!
-//! Lists are doubly linked through the payloads of their blocks, so that a block
-//! leaves its list without a search. Insertion is at the front: memory that was
-//! freed last, and is likely still cached, goes out first. This file alone marks
-//! blocks as free or used, which is how the invariant **Listing** of the
-//! [module above](super) is kept.
+//! Lists are doubly linked through the payloads of their blocks, so a block leaves its list without
+//! a search. Insertion is at the front: the memory freed last, and likely still cached, goes out
+//! first. This file alone marks blocks as free or used, and so keeps the invariant **Listing** of
+//! the [module above](super).
 
 mod block;
 #[cfg(test)]
@@ -72,7 +70,7 @@ use block::{
 pub(crate) struct Tlsf {
     free: FreeLists,
     usage: HeapUsage,
-    /// The first block of the region that was added last.
+    /// The first block of the region added last.
     first: Option<Block>,
 }
 
@@ -98,14 +96,14 @@ impl Tlsf {
 
     /// Adds the `length` bytes from `start` on to the heap.
     ///
-    /// Both ends are aligned inwards to 16 bytes. A region that then has less
-    /// than 48 bytes is ignored, and what exceeds 1 TiB is left alone; the
-    /// growth of [`HeapUsage::capacity_bytes`] tells what was taken.
+    /// Both ends are aligned inwards to 16 bytes. A region then shorter than 48 bytes is ignored,
+    /// and any excess over 1 TiB is left alone; the growth of [`HeapUsage::capacity_bytes`] tells
+    /// how much was taken.
     ///
     /// # Safety
     ///
-    /// 1. The region is valid for reads and writes through `start`, all of it,
-    ///    as long as the allocator or any of its allocations is in use.
+    /// 1. The region is valid for reads and writes through `start`, all of it, as long as the
+    ///    allocator or any of its allocations is in use.
     /// 2. Nothing else uses the region from now on.
     pub(crate) unsafe fn add_region(&mut self, start: NonNull<u8>, length: usize) {
         let skipped = start.addr().get().wrapping_neg() % GRANULE;
@@ -126,7 +124,7 @@ impl Tlsf {
         self.free.insert(block);
     }
 
-    /// Notes whose an allocation is, by a number of 24 bits; 0 is nobody.
+    /// Notes the owner of an allocation, by a number of 24 bits; 0 is nobody.
     ///
     /// # Safety
     ///
@@ -137,8 +135,8 @@ impl Tlsf {
         unsafe { Block::of_payload(payload) }.set_owner(owner);
     }
 
-    /// Hands over the owner and the size of each block in use that has an owner, and makes it
-    /// nobody's: of the region that was added last. Takes a step for each block, used or free.
+    /// Passes `take` the owner and the size of each block in use with an owner, and makes the block
+    /// nobody's: in the region added last. Takes a step for each block, used or free.
     pub(crate) fn take_owned(&mut self, mut take: impl FnMut(u32, usize)) {
         let mut next = self.first;
         while let Some(block) = next.filter(|block| block.size() > 0) {
@@ -150,12 +148,11 @@ impl Tlsf {
         }
     }
 
-    /// Returns memory for `layout`, or `None` when no class that is sure to fit
-    /// has a free block.
+    /// Returns memory for `layout`, or `None` if no class sure to fit has a free block.
     ///
-    /// Every alignment is served. One above 16 bytes needs, while searching, a
-    /// block larger by the alignment and 16 bytes; what is not used of it
-    /// returns to the heap at once. A size of zero takes a smallest block.
+    /// Every alignment is served. An alignment above 16 bytes needs, while searching, a block
+    /// larger by the alignment and 16 bytes; the unused part returns to the heap at once. A size of
+    /// zero takes a smallest block.
     pub(crate) fn allocate(&mut self, layout: Layout) -> Option<NonNull<u8>> {
         let needed = block_size_for(layout.size())?;
         let slack = if layout.align() > GRANULE {
@@ -171,14 +168,14 @@ impl Tlsf {
         Some(block.payload())
     }
 
-    /// Takes memory back, and merges it with its free neighbours.
+    /// Takes memory back, and merges the block with its free neighbours.
     ///
     /// # Safety
     ///
-    /// 1. `payload` came from [`allocate`](Self::allocate) of this allocator, and
-    ///    was not deallocated since.
-    /// 2. `layout` is the one it was allocated with, with the size of the last
-    ///    successful [`reallocate_in_place`](Self::reallocate_in_place).
+    /// 1. `payload` came from [`allocate`](Self::allocate) of this allocator, and was not
+    ///    deallocated since.
+    /// 2. `layout` is the layout of the allocation, with the size of the last successful
+    ///    [`reallocate_in_place`](Self::reallocate_in_place).
     /// 3. Nothing uses the memory any more.
     pub(crate) unsafe fn deallocate(&mut self, payload: NonNull<u8>, layout: Layout) {
         // SAFETY: by (1) it is the payload of a used block of the tiling.
@@ -192,16 +189,16 @@ impl Tlsf {
         self.release(block);
     }
 
-    /// Resizes an allocation where it is, and tells whether that was possible.
+    /// Resizes an allocation in place, and tells whether this was possible.
     ///
-    /// Shrinking always is; growing is when the memory after it is free and
-    /// suffices. Contents up to the smaller size are kept. Counts neither as an
-    /// allocation nor as a deallocation.
+    /// Shrinking always is; growing is possible if the memory after the block is free and suffices.
+    /// Contents up to the smaller size are kept. Counts neither as an allocation nor as a
+    /// deallocation.
     ///
     /// # Safety
     ///
-    /// 1. `payload` came from [`allocate`](Self::allocate) of this allocator, and
-    ///    was not deallocated since.
+    /// 1. `payload` came from [`allocate`](Self::allocate) of this allocator, and was not
+    ///    deallocated since.
     /// 2. When shrinking, nothing uses the memory beyond `new_size` any more.
     pub(crate) unsafe fn reallocate_in_place(
         &mut self,
@@ -227,14 +224,14 @@ impl Tlsf {
         true
     }
 
-    /// Tells how much memory is in use, in bytes of whole blocks, 16-byte headers and rounding
-    /// included: so `capacity_bytes - in_use_bytes` is what the free blocks hold.
+    /// Returns the memory in use, in bytes of whole blocks, 16-byte headers and rounding included:
+    /// `capacity_bytes - in_use_bytes` is therefore the size of the free blocks.
     pub(crate) const fn usage(&self) -> HeapUsage {
         self.usage
     }
 
-    /// Returns the part of `block` from its first payload address on that has
-    /// the alignment, and frees the part before, if any.
+    /// Returns the part of `block` from its first aligned payload address on, and frees the part
+    /// before, if any.
     fn trim_front(&mut self, block: Block, align: usize) -> Block {
         let misalignment = block.payload().addr().get().wrapping_neg() % align;
         let gap = match misalignment {
@@ -248,7 +245,7 @@ impl Tlsf {
         aligned
     }
 
-    /// Frees what `block` has beyond `needed` bytes, if that makes a block.
+    /// Frees the excess of `block` beyond `needed` bytes, if large enough for a block.
     fn trim_back(&mut self, block: Block, needed: usize) {
         if block.size() - needed >= MIN_BLOCK_SIZE {
             let rest = block.split(needed);
@@ -272,7 +269,7 @@ impl Tlsf {
         self.free.insert(merged);
     }
 
-    /// Counts a block that has become larger or smaller.
+    /// Counts a block's growth or shrinkage.
     fn count_resize(&mut self, size_before: usize, size_after: usize) {
         let usage = &mut self.usage;
         usage.in_use_bytes = usage.in_use_bytes - size_before + size_after;
@@ -309,7 +306,7 @@ impl FreeLists {
         Some(block)
     }
 
-    /// Lists a used block, which makes it free.
+    /// Lists a used block, and so makes the block free.
     fn insert(&mut self, block: Block) {
         debug_assert!(!block.is_free(), "a listed block cannot be listed again");
         let class = SizeClass::of(block.size());
@@ -328,7 +325,7 @@ impl FreeLists {
         self.set_head(class, Some(block));
     }
 
-    /// Takes a free block out of its list, which makes it used.
+    /// Takes a free block out of its list, and so makes the block used.
     fn remove(&mut self, block: Block) {
         let FreeLinks { before, after } = block.links();
         if let Some(after) = after {
@@ -347,12 +344,12 @@ impl FreeLists {
         block.set_free(false);
     }
 
-    /// The first block in the list of a class.
+    /// Returns the first block in the list of a class.
     const fn head(&self, class: SizeClass) -> Option<Block> {
         self.heads[class.first][class.second]
     }
 
-    /// Whether the bitmaps say that a class has blocks.
+    /// Reports whether the bitmaps mark a class as nonempty.
     #[cfg(test)]
     const fn is_marked(&self, class: SizeClass) -> bool {
         let range = self.ranges >> class.first & 1 == 1;
@@ -361,8 +358,8 @@ impl FreeLists {
         list
     }
 
-    /// The smallest class from `class` on that has a block: one bit scan in its
-    /// own range or, if there is none, one each on both levels.
+    /// Returns the smallest nonempty class from `class` on: by one bit scan in its own range or, if
+    /// the range is empty from there on, one each on both levels.
     fn first_nonempty_from(&self, class: SizeClass) -> Option<SizeClass> {
         let same_range = self.classes[class.first] & (u32::MAX << class.second);
         if same_range != 0 {
