@@ -45,7 +45,7 @@ pub fn wake_interrupt(interrupted: &mut Interrupted) {
     execution::interrupt(interrupted, now_ns, false);
 }
 
-/// Returns the number of timer interrupts taken by all cores since boot.
+/// Returns the timer interrupts taken by all cores since boot.
 pub fn timer_interrupts() -> u64 {
     let counts = this_core::all().iter().map(|core| &core.timer_interrupts);
     counts.map(|count| count.load(Ordering::Relaxed)).sum()

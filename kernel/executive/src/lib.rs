@@ -20,18 +20,18 @@
 //! handler.
 //!
 //! ```text
-//!  SLICED --+---> execution[0] --> execution[1] --> ... --+--> EDGE
-//!  WATCH ---+     (all nested: only `divided::rest`)      +--> STOCK
-//!  SLICED ------> EDGE            SLICED, WATCH, ProtocolPlace::protocol ------> BUFFER
+//!  SLICED --+--> execution[0] --> execution[1] --> ... ---+--> EDGE
+//!  WATCH ---+    (several at once: only `divided::rest`)  +--> STOCK
+//!  SLICED --> EDGE           SLICED, WATCH, ProtocolPlace::protocol --> BUFFER
 //!  Network::receiver --> ProtocolPlace::protocol --> Network::sender
-//!  (every lock) --> HEAP          all others: no lock inside but HEAP
+//!  (any lock) --> HEAP       (all other locks: no lock inside but HEAP)
 //!
 //!  lock            data                       taken in a thread by      taken in a handler by
 //!  execution[i]    scheduler, journal, bodies find_work, complete,      timer, wake-up, device,
 //!                  and contexts of cluster i  answer, background        contained fault
 //!  STOCK           free contexts              commit, end of `work`     `follow`, contained fault
-//!  EDGE            recorded, replayed values  commit, replayed source,  scheduler's step
-//!                                             completion, background
+//!  EDGE            recorded, replayed values  commit, replayed source,  scheduler's step,
+//!                                             completion, background    core 0's heartbeat
 //!  BUFFER          text for the port          print, idle core          core 0's heartbeat
 //!  WAITING         notes of faults            panic, background         exception, spent budget,
 //!                                                                       core 0's heartbeat
@@ -41,6 +41,10 @@
 //!  Kernel::terms   figures, terms of commits
 //!  CLEARING        DAG being dropped          main, after a run         core 0's heartbeat (tries)
 //!  SLICED, WATCH   status, console; progress  core 0's background       core 0's heartbeat (tries)
+//!  Network::...,   card, neighbours; a        background                card, bell, heartbeat
+//!  ProtocolPlace   node's session
+//!  Script::line,   line for the port; entries background                core 0's heartbeat
+//!  ...::playing    still to arrive on a wire
 //! ```
 //!
 //! Each lock is a [`SpinLock`](machine::spinlock::SpinLock), whose guard masks interrupts on its

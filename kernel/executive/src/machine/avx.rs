@@ -63,7 +63,7 @@ fn is_there() -> bool {
     has_xsaveopt && (halves.eax + halves.ebx) as usize == VECTOR_BYTES
 }
 
-/// Enables AVX on the calling processor, if on. The processor takes no interrupts yet.
+/// Enables AVX on the calling processor, if AVX is on. The processor takes no interrupts yet.
 pub(super) fn enable() {
     if !is_on() {
         return;

@@ -6,7 +6,7 @@
 //! another context instead.
 //!
 //! **Context invariant**: a context's save area and stack belong to the core running the context,
-//! or, while none does, to the holder of its one [`Parked`]. Never do two places touch them.
+//! or, while none does, to the holder of its one [`Parked`]. Two places never touch them at once.
 
 use core::cell::UnsafeCell;
 use core::fmt;
@@ -137,7 +137,7 @@ pub struct Context {
 pub(super) struct SectionNote {
     /// The lock held or awaited by the context; null if there is none.
     pub(super) lock: AtomicPtr<LockWords>,
-    /// The number of the core waiting for the lock, counted from 1; 0 if the context does not wait.
+    /// The core where the context waits, counted from 1; 0 if the context does not wait.
     pub(super) waits_on: AtomicU32,
     /// When a preemption was first postponed, in nanoseconds on the clock; 0 if never.
     pub(super) put_off_ns: AtomicU64,

@@ -1,8 +1,8 @@
 //! Counted time under QEMU, made repeatable to the nanosecond.
 //!
 //! With `-icount shift=0,sleep=off` an instruction takes a nanosecond, and when all cores halt QEMU
-//! advances the clock to the next timer's end. Another QEMU thread makes that jump than the thread
-//! executing instructions: the main loop (`main_loop_wait` calls `icount_start_warp_timer`), which
+//! advances the clock to the next timer's end. A different QEMU thread makes that jump than
+//! executes instructions: the main loop (`main_loop_wait` calls `icount_start_warp_timer`), which
 //! is also awake for no reason after each timer that has fired. The main loop accepts the halt of
 //! the last core as soon as `hlt` has set its flag, but the instructions up to and including `hlt`
 //! are counted only at the end of the core's turn (`icount_process_data`). If the main loop looks

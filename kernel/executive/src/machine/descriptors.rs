@@ -13,7 +13,7 @@ pub(super) const CODE: u16 = 0x08;
 /// The task state segment's selector.
 const TASK_STATE: u16 = 0x18;
 
-/// The arrival stack of each kind of interrupt, as IST numbers.
+/// The stack where each kind of interrupt arrives, as IST numbers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum InterruptStack {
     /// The running context's save area.

@@ -140,10 +140,10 @@ extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegi
     this_core::get().context().registers()
 }
 
-/// The number of answers in a row with disabled interrupts after which an accused core has disabled
-/// them for good. On a busy host, a line to the serial port may outlast several answers: the line
-/// is written with interrupts disabled, and a core runs there for some milliseconds between
-/// answers.
+/// The number of answers in a row with disabled interrupts after which an accused core counts as
+/// having disabled them for good. On a busy host, a line to the serial port may outlast several
+/// answers: the line is written with interrupts disabled, and a core runs there for some
+/// milliseconds between answers.
 const LAST_ANSWER: u32 = 8;
 
 /// Handles one exception and returns the registers to resume, or null for the registers of the

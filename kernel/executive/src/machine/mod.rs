@@ -1,8 +1,8 @@
 //! The machine layer: all code specific to x86_64 and a PC.
 //!
-//! Apart from `memory` and the `entry!` macro, only this layer of the kernel contains `unsafe`. The
-//! machine layer names nothing above itself: its users pass in the functions to call. Each module
-//! states the invariant cited by its SAFETY comments.
+//! Besides `memory`, `devices` and the loans of `run`, only this layer of the executive contains
+//! `unsafe`. The machine layer names nothing above itself: its users pass in the functions to call.
+//! Each module states the invariant cited by its SAFETY comments.
 
 pub mod abandoned;
 mod accusation;

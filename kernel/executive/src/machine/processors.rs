@@ -104,22 +104,22 @@ pub fn sibling_bits() -> u32 {
         .unwrap_or(0)
 }
 
-/// Reads Intel's SDM volume 2, CPUID leaf 0xb: the level of the first subleaf, if there is one.
+/// Reads CPUID leaf 0xb (Intel's SDM volume 2): the level of the first subleaf, if there is one.
 fn bits_of_topology(leaf: Option<CpuidResult>) -> Option<u32> {
     const SIBLINGS: u32 = 1;
     let leaf = leaf.filter(|leaf| leaf.ebx != 0 && leaf.ecx >> 8 & 0xff == SIBLINGS)?;
     Some(leaf.eax & 0x1f)
 }
 
-/// Reads AMD's manual volume 3, E.4.17, if leaf 0x8000_0001 announces the topology leaf.
+/// Reads the topology leaf (AMD's manual volume 3, E.4.17), if leaf 0x8000_0001 announces the leaf.
 fn bits_of_amd(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u32> {
     const HAS_TOPOLOGY: u32 = 1 << 22;
     let leaf = leaf.filter(|_| features.ecx & HAS_TOPOLOGY != 0)?;
     Some(bits_for((leaf.ebx >> 8 & 0xff) + 1))
 }
 
-/// Computes by Intel's SDM volume 3, 9.9.3: the bits for processors of a package (leaf 1), less the
-/// bits for cores (leaf 4).
+/// Computes the bits for processors of a package (leaf 1), less the bits for cores (leaf 4), by
+/// Intel's SDM volume 3, 9.9.3.
 fn bits_of_caches(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u32> {
     const HAS_SEVERAL: u32 = 1 << 28;
     const A_CACHE: u32 = 0x1f;

@@ -16,7 +16,7 @@ static SCREEN: SetOnce<Screen> = SetOnce::new();
 /// Whether a core is drawing.
 static IS_DRAWING: AtomicBool = AtomicBool::new(false);
 
-/// Blanks a screen, and shows all text put from now on.
+/// Blanks a screen, and from now on shows all text put.
 ///
 /// # Safety
 ///

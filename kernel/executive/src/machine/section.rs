@@ -1,4 +1,4 @@
-//! Sections of app code, executed by one core at a time and never preempted.
+//! Sections of app code, executed by one core at a time, with preemption postponed.
 //!
 //! Unlike a [`SpinLock`](super::spinlock::SpinLock), a section lock can be given to untrusted code.
 //! Interrupts stay enabled in a section, so events there are the app's: a fault is contained, a

@@ -50,14 +50,13 @@ impl CoreMeter {
 /// A core's part in the time slices of computing cores ([`turns`](super::turns)).
 ///
 /// ```text
-///              1                2               4                5
-///      None --------> Comes --------> Fresh --------> Computes --------> Waits
-///       | ^                             ^              |    ^              |
-///       | |              3              |              |    |      6       |
-///       | |                             |              |    +--------------+
-///       +-|-----------------------------+              |                   |
-///         |                     7 (from any part)      v                   v
-///         +----------------------------------------------------------------+
+///                 1             2               4                 5
+///        None ---------> Comes -------> Fresh --------> Computes --------> Waits
+///        |  ^                             ^              |    ^             |  |
+///        |  |             3               |              |    +----- 6 -----+  |
+///        +--|-----------------------------+              |                     |
+///           |               7 (from every part)          |                     |
+///           +--------------------------------------------+---------------------+
 /// ```
 ///
 /// 1. `turns::come`: an interrupt handler has chosen a new worker for the core.

@@ -6,8 +6,8 @@ use super::this_core::{self, Core};
 use super::{local_apic, turns, vector};
 
 impl Core {
-    /// Makes this core look for work, by an interrupt unless the core watches for the wake-up or is
-    /// the calling core.
+    /// Makes this core look for work, by an interrupt unless the core watches `wake` or is the
+    /// caller's.
     pub fn wake_up(&self) {
         // In one order with `begin_watch`: either the watching core sees there that it is to wake
         // up, or the caller sees here that the core does not watch yet.

@@ -2,7 +2,7 @@
 //!
 //! All knowledge of recordings is behind [`Crossing`](fass::edge::Crossing), present only in an
 //! image with a recorded topic. The scheduler's step uses the edge under the scheduler's lock, and
-//! a replayed source uses the edge for a moment; the drain belongs to core 0's background alone, so
+//! a replayed source uses the edge for a moment; the drain belongs to core 0's background, so
 //! sending disturbs nobody.
 
 use fass::edge::{Edge, EdgeMode};

@@ -1,4 +1,4 @@
-//! Signs of life: interrupts taken by a core now and then, even when nothing else is due.
+//! Signs of life: interrupts taken by a core now and then, also when nothing else is due.
 
 use core::sync::atomic::Ordering;
 
@@ -10,12 +10,11 @@ use crate::machine::timer::{self, Alarm};
 /// virtual machine with virtual time would stop forever.
 const FIRST_NS: u64 = 1_000_000_000;
 
-/// The same time for core 1, in nanoseconds. By its heartbeats core 1 notices when core 0 takes no
-/// interrupts.
+/// The same time for core 1, which thereby notices a core 0 without interrupts.
 pub const SECOND_NS: u64 = 2_000_000_000;
 
-/// Gives every core a heartbeat each `period_ns` nanoseconds; if 0, core 0 and core 1 get their
-/// ordinary heartbeats and the others none.
+/// Gives every core a heartbeat each `period_ns`; if 0, gives cores 0 and 1 their ordinary
+/// heartbeats and the others none.
 pub fn set_heartbeats(period_ns: u64) {
     for core in this_core::all() {
         let ordinary_ns = match core.index {
@@ -40,8 +39,7 @@ pub fn own_heartbeat_ns() -> u64 {
     this_core::get().heartbeat_ns.load(Ordering::Relaxed)
 }
 
-/// Gives core 0, the calling core, a heartbeat each `period_ns` nanoseconds. Called outside any
-/// instance.
+/// Gives core 0, the calling core, a heartbeat each `period_ns`. Called outside any instance.
 pub fn set_own_heartbeat(period_ns: u64) {
     let core = this_core::get();
     core.heartbeat_ns.store(period_ns, Ordering::Relaxed);

@@ -40,8 +40,8 @@ impl Kernel {
         change(&mut self.terms.lock());
     }
 
-    /// Marks future commits as the kernel's own, with no record and no report, or as the app's
-    /// again.
+    /// Marks future commits as the kernel's own, left out of records and measurements, or as the
+    /// app's again.
     pub fn set_calibration(&self, calibrates: bool) {
         self.calibrates.store(calibrates, Ordering::Relaxed);
     }

@@ -22,7 +22,7 @@ static RECORD: SpinLock<Option<File>> = SpinLock::new(None);
 /// Whether to send the record during a run, too, to have it even if the run dies.
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
-/// The way for the record's bytes out of the machine.
+/// The way of the record's bytes out of the machine.
 pub(super) enum RecordSink {
     Port,
     Console(Box<RecordLines>),

@@ -8,7 +8,7 @@
 //!
 //! Requests from a cluster to others (signals, pauses, modes, the end) are
 //! [letters](sched_dag::lifecycle::Mailboxes): the sender wakes the other cluster's first core, and
-//! this core takes the letters in a step of its own. Letters need no lock, so nobody waits.
+//! that core takes the letters in a step of its own. Letters need no lock, so nobody waits.
 
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
