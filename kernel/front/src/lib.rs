@@ -1,13 +1,13 @@
-//! The front: what an app sees and a person reads, on whatever platform the app runs.
+//! The front: everything an app sees and a person reads, on whatever platform the app runs.
 //!
-//! Lines, the words of the command line, reports and verdicts are the same on the bare machine
-//! and on Linux, because they are made here, once. An app names `kernel`, never this.
+//! Lines, command-line options, reports and verdicts are the same on the bare machine and on Linux,
+//! because the code for them exists here, once. An app names `kernel`, never this crate.
 //!
 //! # Rooms, from top to bottom
 //!
-//! `shell` talks with a person during a run, `app` is the machine as an app sees it and judges
-//! runs, `report` tells of a run when it is over, `options` reads the command line, `text` makes
-//! lines. Where text goes is bound when a program is linked: its entry names its platform's
+//! `shell` talks with a person during a run, `app` is the app's view of the machine and judges
+//! runs, `report` describes a finished run, `options` reads the command line, `text` makes lines.
+//! The destination of text is bound at link time: a program's entry names its platform's output
 //! function by [`output!`], once.
 //!
 //! # What is guaranteed
@@ -35,22 +35,22 @@ pub mod text;
 
 pub use text::{console, json};
 
-/// The modules that apps know by these names, with what is theirs in them.
+/// The modules known to apps by these names, with the items meant for apps.
 pub mod named {
-    /// Text on the serial line, or the standard output, which [`print!`](crate::print) and
-    /// [`println!`](crate::println) write.
+    /// Text on the serial line, or the standard output, as written by [`print!`](crate::print) and
+    /// [`println!`](crate::println).
     pub mod console {
         #[doc(inline)]
         pub use crate::text::console::write;
     }
 
-    /// The words of the command line.
+    /// The options of the command line.
     pub mod options {
         #[doc(inline)]
         pub use crate::options::{CommandLine, UsageError};
     }
 
-    /// Machine lines: lines of JSON among the text, for programs that read it.
+    /// Machine lines: lines of JSON among the text, for programs reading the output.
     pub mod json {
         #[doc(inline)]
         pub use crate::text::json::{JsonObject, emit, line, quoted};

@@ -1,8 +1,8 @@
-//! The words of the kernel's command line: `key=value`, separated by spaces.
+//! The options of the kernel's command line: words `key=value`, separated by spaces.
 //!
-//! The kernel takes the words that it knows and leaves the rest to the app,
-//! which states for each of its words what is allowed. A word that nobody takes
-//! is an error: a misspelt option must not run with the default.
+//! The kernel takes its own options and leaves the rest to the app. The app states the values
+//! allowed for each of its options. An option taken by nobody is an error: a misspelt option must
+//! not run with the default.
 
 use core::cell::Cell;
 use core::fmt;
@@ -12,7 +12,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// The kernel's own words, which every app has: `settings` takes them.
+/// The kernel's own options, known to every app; `settings` takes them.
 const KERNELS: [&str; 21] = [
     "policy",
     "preemption",
@@ -37,7 +37,7 @@ const KERNELS: [&str; 21] = [
     "smt",
 ];
 
-/// The command line, with a note of which words have been taken.
+/// The command line, with a note of the options taken so far.
 ///
 /// ```no_run
 /// use kernel::options::CommandLine;
@@ -62,14 +62,14 @@ struct OptionWord<'a> {
     taken: Cell<bool>,
 }
 
-/// A word of the command line is wrong: which one, and what is allowed.
+/// An error in the command line: the wrong option, and the values allowed.
 ///
 /// See [`CommandLine::finish`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsageError(String);
 
 impl UsageError {
-    /// States what is wrong: the word, and what is allowed.
+    /// Makes an error from a message with the wrong option and the values allowed.
     ///
     /// ```no_run
     /// use kernel::options::UsageError;
@@ -91,7 +91,7 @@ impl fmt::Display for UsageError {
 impl core::error::Error for UsageError {}
 
 impl<'a> CommandLine<'a> {
-    /// Splits a command line into words.
+    /// Splits a command line into options.
     ///
     /// # Errors
     ///
@@ -114,7 +114,7 @@ impl<'a> CommandLine<'a> {
         Ok(Self { words })
     }
 
-    /// Takes the value of `key` as it is, if the key is given.
+    /// Takes the raw value of `key`, if the key is given.
     ///
     /// ```no_run
     /// let options = kernel::options::CommandLine::parse("map=town").unwrap();
@@ -152,7 +152,7 @@ impl<'a> CommandLine<'a> {
     ///
     /// # Errors
     ///
-    /// If one of them is not a whole number within `allowed`.
+    /// If any part is not a whole number within `allowed`.
     pub fn numbers(
         &self,
         key: &str,
@@ -170,11 +170,11 @@ impl<'a> CommandLine<'a> {
         )
     }
 
-    /// Takes the value of `key` as one of the names in `choices`, or the first.
+    /// Takes the value of `key` as a name in `choices`, or the first name if the key is missing.
     ///
     /// # Errors
     ///
-    /// If the value is not one of them.
+    /// If the value is not among the names.
     ///
     /// # Panics
     ///
@@ -184,8 +184,8 @@ impl<'a> CommandLine<'a> {
         Ok(choices[self.chosen(key, &name)?].1)
     }
 
-    /// Returns the place of the name that is the value of `key`, or the first. One function
-    /// for all kinds of choices: an image has little room.
+    /// Returns the index of the name given as the value of `key`, or 0 if the key is missing. All
+    /// kinds of choices share this function, because an image has little room.
     #[inline(never)]
     fn chosen<'n>(
         &self,
@@ -202,11 +202,11 @@ impl<'a> CommandLine<'a> {
         })
     }
 
-    /// Checks that every word has been taken; `known` are the app's keys.
+    /// Checks that every option has been taken; `known` are the app's keys.
     ///
     /// # Errors
     ///
-    /// If one has not: it names the word and the keys that there are.
+    /// If an option has not been taken. The error names the option and all existing keys.
     ///
     /// ```no_run
     /// let options = kernel::options::CommandLine::parse("sed=3").unwrap();
@@ -241,7 +241,7 @@ fn parse_number(key: &str, value: &str, allowed: &RangeInclusive<u64>) -> Result
         })
 }
 
-/// Reads a whole number: digits alone, without the sign that `parse` would take.
+/// Reads a whole number: digits alone, without the sign accepted by `parse`.
 pub fn whole_number(text: &str) -> Option<u64> {
     let is_whole = text.bytes().all(|byte| byte.is_ascii_digit());
     is_whole.then(|| text.parse().ok()).flatten()

@@ -1,5 +1,5 @@
-//! The report of a run: what became of its jobs, its memory, its wires and its recording, and
-//! lines of the log, which come meanwhile.
+//! The report of a run: its jobs, memory, wires and recording, and the lines of the log, which are
+//! printed during the run.
 
 use alloc::sync::Arc;
 use core::fmt::{self, Display, Write};
@@ -17,7 +17,7 @@ use crate::text::json::{self, JsonObject};
 pub use crate::text::Ns;
 pub use sched_dag::law::Distribution;
 
-/// Prints the line of a DAG for people, of which `print` makes the rest, and its machine line.
+/// Prints a DAG's line for people, whose end is written by `print`, and the DAG's machine line.
 pub fn show_dag(snapshot: &DagSnapshot, dag: DagId, model: &Dag, print: fn(&DagSnapshot, &Dag)) {
     crate::print!("  dag {} ", dag.0);
     print(snapshot, model);
@@ -39,7 +39,7 @@ pub fn show_dag(snapshot: &DagSnapshot, dag: DagId, model: &Dag, print: fn(&DagS
     });
 }
 
-/// Prints the counts of each DAG of a run that is over.
+/// Prints the counts of each DAG of a finished run.
 pub(crate) fn show_counts(run: &Run) {
     for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
         show_dag(run.snapshot(dag), dag, model, print_counts);
@@ -65,37 +65,37 @@ pub fn print_counts(snapshot: &DagSnapshot, model: &Dag) {
     );
 }
 
-/// The memory of the machine in use while nothing runs.
+/// The machine's memory in use while nothing runs.
 ///
 /// See `Machine::resources`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryInUse {
-    /// The bytes of the heap that are in use.
+    /// The bytes of the heap in use.
     pub heap_bytes: usize,
-    /// The contexts, each with a stack, that there are for instances; none on Linux, where each
-    /// run has its own threads.
+    /// The number of contexts for instances, each with a stack; 0 on Linux, where each run has its
+    /// own threads.
     pub contexts: usize,
-    /// How many of these can be taken: while nothing runs, all.
+    /// The number of free contexts: while nothing runs, all of them.
     pub contexts_free: usize,
 }
 
-/// How much of a heap is, was and can be in use.
+/// The present, the peak and the possible use of a heap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HeapUsage {
     /// How often memory was allocated.
     pub allocations: u64,
-    /// The bytes that are in use.
+    /// The bytes in use.
     pub in_use_bytes: usize,
-    /// The most that were, between two operations.
+    /// The most bytes in use so far, measured between two operations.
     pub peak_bytes: usize,
-    /// The bytes that there are.
+    /// The size of the heap, in bytes.
     pub capacity_bytes: usize,
 }
 
 impl HeapUsage {
-    /// Prints what was needed.
+    /// Prints the peak use.
     pub(crate) fn report(self) {
-        // In virtual time nobody counts.
+        // In virtual time allocations are not counted.
         if self.capacity_bytes == 0 {
             return;
         }
@@ -112,8 +112,8 @@ impl HeapUsage {
     }
 }
 
-/// Tells of a contained fault: of an instance, with the names of its DAG and subtask; its cause, in a
-/// word and in a message; the core and the place; and what it has cost.
+/// Reports a contained fault: the instance, with the names of its DAG and subtask; the cause, in a
+/// word and in a message; the core and the place in the code; and the cost of the fault.
 pub fn fault(
     (instance, [dag, subtask]): (Instance, [&dyn Display; 2]),
     (cause, message): (&str, &dyn Display),
@@ -142,7 +142,7 @@ pub fn fault(
     });
 }
 
-/// Tells how complete a recording is.
+/// Prints whether a recording is complete.
 pub fn recorded(drained: &RecordingState) {
     let is_complete = !drained.is_cut && drained.lost == 0;
     json::emit("recorded", |line| {
@@ -152,7 +152,7 @@ pub fn recorded(drained: &RecordingState) {
     });
 }
 
-/// Tells what a replay has found.
+/// Prints the findings of a replay.
 pub fn replayed(outcome: &ReplayOutcome) {
     let (compared, uncompared) = (outcome.compared, outcome.uncompared);
     crate::println!(
@@ -180,17 +180,17 @@ pub fn replayed(outcome: &ReplayOutcome) {
     });
 }
 
-/// How many bytes a line has; a multiple of three, so that only the last one is padded.
+/// The length of a line, in bytes: a multiple of three, so that only the last line is padded.
 const LINE_BYTES: usize = 768;
 
-/// Prints a record, by the line.
+/// Prints a record in machine lines of base64.
 pub struct RecordLines {
     bytes: [u8; LINE_BYTES],
     length: usize,
 }
 
 impl RecordLines {
-    /// Begins with nothing.
+    /// Creates a printer without any bytes.
     pub const fn new() -> Self {
         Self {
             bytes: [0; LINE_BYTES],
@@ -198,7 +198,7 @@ impl RecordLines {
         }
     }
 
-    /// Prints what waits for a line to be full.
+    /// Prints the bytes waiting for a full line.
     pub fn flush(&mut self) {
         let bytes = &self.bytes[..core::mem::take(&mut self.length)];
         if !bytes.is_empty() {
@@ -230,7 +230,7 @@ impl Sink for RecordLines {
     }
 }
 
-/// Writes bytes as RFC 4648 has it, section 4.
+/// Writes bytes in base64 (RFC 4648, section 4).
 fn in_base64(bytes: &[u8]) -> impl fmt::Display {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     fmt::from_fn(move |f| {
@@ -248,7 +248,7 @@ fn in_base64(bytes: &[u8]) -> impl fmt::Display {
     })
 }
 
-/// Says it in a line for people and in one for programs.
+/// Prints a wire's counts in a line for people and in a line for programs.
 pub fn tell_wire(wire: &Wire) {
     let WireCounts {
         packets,
@@ -275,7 +275,7 @@ pub fn tell_wire(wire: &Wire) {
     });
 }
 
-/// Says it of a protocol in a line for people and in one for programs.
+/// Prints a protocol's counts in a line for people and in a line for programs.
 pub fn tell_protocol(peer: &dyn Display, protocol: &dyn Protocol) {
     crate::print!("router {peer}");
     protocol.counts(&mut |name, count| crate::print!(", {name} {count}"));
@@ -286,10 +286,11 @@ pub fn tell_protocol(peer: &dyn Display, protocol: &dyn Protocol) {
     });
 }
 
-/// The most lines that are shown at once: as many as can wait.
+/// The most lines of the log shown at once: as many as can wait.
 const AT_ONCE: usize = 64;
 
-/// Shows the lines that wait, with the names of the run that they are of. Nothing is allocated.
+/// Shows the waiting lines of the log, with the names of their run's DAGs and subtasks. Nothing is
+/// allocated.
 pub fn tell_log(task_set: impl Fn() -> Option<Arc<TaskSet>>) {
     for line in iter::from_fn(LogLine::take).take(AT_ONCE) {
         let task_set = task_set();

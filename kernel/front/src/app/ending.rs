@@ -1,27 +1,23 @@
-//! How an app's function may end, besides well.
+//! The ways an app's function can end, and the verdict on its runs.
 //!
 //! # The verdict on faults, and on response times beyond their proven bounds
 //!
-//! An app that ignores a fault in one of its DAGs has failed, and so says its verdict. An
-//! app to which faults belong says so
-//! (`Machine::accept_faults`) and judges them by itself.
+//! An app fails if it ignores a fault in any of its DAGs, and the verdict says so. An app made for
+//! faults calls `Machine::accept_faults` and judges them itself.
 //!
-//! A bound holds as long as no instance takes longer than its WCET, and the machine no
-//! longer than the overheads that the commit was told. So a job that took longer shows
-//! that something was stated too small, and that what the commit has proven is not so:
-//! such a run is no success, even if it meets its deadlines. An app whose WCETs are not meant
-//! for this machine says so
-//! (`Machine::accept_exceeded_bounds`).
+//! A bound holds as long as no instance takes longer than its WCET, and the machine no longer than
+//! the overheads stated at commit. A job with a longer response time therefore proves a stated time
+//! too small, and the commit's proof void. Such a run is no success, even if all deadlines are met.
+//! An app whose WCETs are not meant for this machine calls `Machine::accept_exceeded_bounds`.
 //!
-//! In mode `threads` a line says it, and the verdict does not: there emulated
-//! processors wait for the host's, which no overhead can state.
+//! In mode `threads` an exceeded bound is printed, but does not affect the verdict: in this mode
+//! emulated processors wait for the host's, and no stated overhead can cover such waits.
 //!
-//! # Calls that took longer than their WCETs
+//! # Calls longer than their WCETs
 //!
-//! A proof rests on the WCETs, so a WCET that does not hold is worth a line even
-//! where every bound has held. A call includes the kernel's own work for it; so a subtask
-//! is named only if its longest call is above its WCET by more than the commit has charged
-//! for that.
+//! A proof rests on the WCETs, so an exceeded WCET is reported even if every bound has held. A call
+//! includes the kernel's own work. A subtask is therefore named only if its longest call exceeds
+//! its WCET by more than the overheads charged by the commit.
 
 use alloc::format;
 use alloc::string::String;
@@ -37,7 +33,7 @@ use crate::options::UsageError;
 use crate::report::{self, Ns};
 use crate::text::json;
 
-/// Why an app ends other than by success.
+/// The reason for an app's ending, other than success.
 ///
 /// ```no_run
 /// use kernel::{AppError, options::UsageError};
@@ -51,18 +47,18 @@ pub enum AppError {
     Usage(UsageError),
     /// The DAGs could not be committed; QEMU exits with 35.
     Commit(CommitError),
-    /// Something else went wrong, in words; QEMU exits with 35.
+    /// Something else went wrong, described in the text; QEMU exits with 35.
     Failure(String),
     /// A person has ended the run, at the console or by ctrl-C; QEMU exits with 33.
     Shutdown,
 }
 
 impl AppError {
-    /// Judges a run by how often it has violated the model's rules.
+    /// Judges a run by the number of violated rules of the model.
     ///
     /// # Errors
     ///
-    /// [`AppError::Failure`] if it has.
+    /// [`AppError::Failure`] if any rule was violated.
     pub fn of_violations(count: u64) -> Result<(), Self> {
         match count {
             0 => Ok(()),
@@ -70,10 +66,11 @@ impl AppError {
         }
     }
 
-    /// Judges a run that a person has ended, and returns how its app ends. Whoever awaits that
-    /// sees that it goes on.
+    /// Judges a run ended by a person, and returns how its app ends. Prints the judge's progress
+    /// for a person waiting.
     pub fn after_shutdown(run: &Run) -> Self {
-        /// The judge takes a second or so for them, where processors are emulated.
+        /// The number of events between two lines of progress: a second or so of judging, where
+        /// processors are emulated.
         const EVENTS: u64 = 1 << 16;
         let mut tell = |events: u64| {
             if events.is_multiple_of(EVENTS) {
@@ -86,8 +83,8 @@ impl AppError {
         }
     }
 
-    /// Returns a complaint of the kernel's as the ending of an app that ends well, or as a
-    /// person wants it. The app's own error takes precedence.
+    /// Turns a complaint of the kernel into the ending of an app that ends well or by a person's
+    /// wish. The app's own error takes precedence.
     pub fn or_complaint(result: Result<(), Self>, complaint: Option<String>) -> Result<(), Self> {
         match (result, complaint) {
             (Ok(()) | Err(Self::Shutdown), Some(text)) => Err(Self::Failure(text)),
@@ -96,20 +93,20 @@ impl AppError {
     }
 }
 
-/// How an app has ended, for the program or the machine that ends with it.
+/// The outcome of an app, for the program or the machine about to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AppExit {
-    /// Well, or as a person wants it.
+    /// The app ended well, or by a person's wish.
     Success,
-    /// By a command line that is wrong.
+    /// The command line is wrong.
     Usage,
-    /// By anything else.
+    /// The app ended for any other reason.
     Failure,
 }
 
 /// Prints how the app ended; the verdict is the last line.
 pub fn tell(result: &Result<(), AppError>) -> AppExit {
-    // What was said outside of runs.
+    // Lines logged outside of runs.
     report::tell_log(|| None);
     let (told, word) = match result {
         Ok(()) | Err(AppError::Shutdown) => (AppExit::Success, "success"),
@@ -160,35 +157,35 @@ impl fmt::Display for AppError {
     }
 }
 
-/// Whether the app was compiled without optimization, as its entry says.
+/// Whether the app was compiled without optimization, as reported by its entry.
 pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
 
-/// The faults and exceeded bounds that are known of the runs so far.
+/// The faults and exceeded bounds known of the runs so far.
 pub struct RunVerdict {
     judges_faults: Cell<bool>,
     judges_bounds: Cell<bool>,
-    /// Whether several cores share one clock.
+    /// Whether several cores share a single clock.
     shares_clock: bool,
-    /// Why the app fails for a fault, if it does.
+    /// The complaint about a fault, if there was a fault.
     fault: RefCell<Option<String>>,
-    /// Why the app fails for a bound, if it does.
+    /// The complaint about an exceeded bound, if a bound was exceeded.
     exceeded: RefCell<Option<String>>,
 }
 
-/// The jobs of a DAG that took longer than is proven, until all of them or one sink had
-/// finished.
+/// The jobs of a DAG with response times beyond the proven bound, up to the end of all sinks or of
+/// a single sink.
 struct ExceededBound {
     dag: DagId,
     sink: Option<SubtaskId>,
     jobs: u64,
-    /// The longest of them.
+    /// The job with the longest response time.
     job: u64,
     response_ns: u64,
     bound_ns: u64,
 }
 
 impl RunVerdict {
-    /// Begins without a run. `shares_clock`: several cores share one clock.
+    /// Creates the verdict before any run. `shares_clock`: several cores share a single clock.
     pub const fn new(judges_bounds: bool, shares_clock: bool) -> Self {
         Self {
             judges_faults: Cell::new(true),
@@ -209,8 +206,8 @@ impl RunVerdict {
         self.judges_bounds.set(false);
     }
 
-    /// Notes which DAGs of a run have been ended by faults, and says and notes which took longer
-    /// than is proven. Allocates only if there are any.
+    /// Notes the DAGs of a run ended by faults; prints and notes those with response times beyond
+    /// their proven bounds. Allocates only if there are any.
     pub fn note(&self, run: &Run) {
         self.note_faults(run.task_set(), |dag| {
             run.statistics(dag).faults - run.statistics(dag).restarts
@@ -227,7 +224,7 @@ impl RunVerdict {
             let has_faults = dags.map(|dag| run.statistics(dag).faults).sum::<u64>() > 0;
             let also = causes(is_unoptimized, self.shares_clock, has_faults);
             let text = exceeded.report(run.task_set(), &also);
-            // What the app judges itself is not kept: it would count as in use.
+            // A complaint kept for an app with its own verdict would count as memory in use.
             if self.judges_bounds.get() {
                 self.exceeded.borrow_mut().get_or_insert(text);
             }
@@ -253,7 +250,7 @@ impl RunVerdict {
         });
     }
 
-    /// Takes why the app fails, if it does.
+    /// Takes the app's reason to fail, if there is a reason.
     pub fn complaint(&self) -> Option<String> {
         let fault = self.fault.take().filter(|_| self.judges_faults.get());
         let exceeded = self.exceeded.take();
@@ -261,7 +258,7 @@ impl RunVerdict {
     }
 }
 
-/// Says what may have made calls longer than WCETs that are right elsewhere.
+/// Lists the possible causes of calls longer than WCETs valid elsewhere.
 fn causes(is_unoptimized: bool, shares_clock: bool, has_faults: bool) -> String {
     let of_image = "; the image's profile does not optimize: boot one that does";
     let of_clock = "; in mode deterministic cores that compute share one clock: `--cores 1` shows \
@@ -279,7 +276,7 @@ fn causes(is_unoptimized: bool, shares_clock: bool, has_faults: bool) -> String 
 }
 
 impl ExceededBound {
-    /// Looks at a DAG's jobs that are complete.
+    /// Searches the complete jobs of a DAG for response times beyond the bound.
     fn find(run: &Run, dag: DagId, sink: Option<SubtaskId>) -> Option<Self> {
         let bound_ns = match sink {
             Some(sink) => run.sink_bound_ns(dag, sink)?,
@@ -300,7 +297,8 @@ impl ExceededBound {
         let (mut jobs, mut longest) = late.fold((0, (0, 0)), |(jobs, longest), of_job| {
             (jobs + 1, of_job.max(longest))
         });
-        // Of jobs that are not recorded any more, the longest one is known.
+        // The record may have dropped early jobs; the longest response time of all jobs is still
+        // known.
         if record.is_none_or(|record| record.first_job(dag) > 0)
             && sink.is_none()
             && let Some(times) = run.times()
@@ -320,7 +318,7 @@ impl ExceededBound {
         })
     }
 
-    /// Prints it, and returns it in words.
+    /// Prints the exceeded bound, and returns the message.
     fn report(&self, task_set: &TaskSet, also: &str) -> String {
         let dag = task_set.dag(self.dag);
         let name = dag.name();
@@ -349,8 +347,8 @@ impl ExceededBound {
     }
 }
 
-/// Names the subtasks of a run that took longer than their WCET and these overheads, which are
-/// those of the commit.
+/// Names the subtasks of a run with calls longer than their WCET and these overheads, the overheads
+/// charged by the commit.
 pub(super) fn note(run: &Run, overheads: Overheads) {
     let set = run.task_set();
     let mut subtasks = set.dags().iter().flat_map(|dag| dag.subtasks());

@@ -1,8 +1,8 @@
-//! The words that say what a wire is connected to: `wire.NAME=...`.
+//! The option `wire.NAME=...`, which names the endpoint that a wire is connected to.
 //!
-//! | word | meaning |
+//! | option | meaning |
 //! | --- | --- |
-//! | `wire.NAME=serial` | the serial port; so is a wire without a word |
+//! | `wire.NAME=serial` | the serial port, as for a wire without an option |
 //! | `wire.NAME=file` | a script: packets with their times |
 //! | `wire.NAME=udp://:PORT` | datagrams to this port, from anyone |
 //! | `wire.NAME=udp://ADDRESS:PORT` | datagrams from and to this peer |
@@ -14,7 +14,7 @@ use fass::shared::Wire;
 
 use crate::options::{CommandLine, UsageError};
 
-/// The endpoint that a word names.
+/// The endpoint named by an option.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndpointWord {
     /// The serial port.
@@ -23,15 +23,15 @@ pub enum EndpointWord {
     File,
     /// Datagrams to an own port.
     Port(u16),
-    /// Datagrams to a peer, and from it.
+    /// Datagrams to and from a peer.
     Peer(SocketAddrV4),
 }
 
-/// Takes the word of a wire, if there is one.
+/// Takes the option of a wire, if given.
 ///
 /// # Errors
 ///
-/// [`UsageError`] if it is none of those that are allowed.
+/// [`UsageError`] if the value is not among the values allowed.
 pub fn word_of(wire: &Wire, options: &CommandLine<'_>) -> Result<Option<EndpointWord>, UsageError> {
     let key = format!("wire.{}", wire.name());
     let Some(value) = options.text(&key) else {

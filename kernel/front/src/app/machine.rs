@@ -1,10 +1,10 @@
-//! The machine as an app sees it, on whatever system it runs.
+//! The machine lent to an app, the same on every platform.
 //!
-//! Its methods, how a run is judged and what is told of it are the same everywhere.
-//! The part that differs is in its [`System`], by which each crate that apps know as `kernel`
-//! names its own `Machine`.
+//! The methods of [`Machine`], the verdict on a run and the reports of a run are shared by all
+//! platforms. Platform-specific services come from a [`System`]. Each platform crate known to apps
+//! as `kernel` names a `Machine` with its own system.
 //!
-//! An image has the code of those services alone that its app asks for.
+//! An image contains only the code of the services used by its app.
 
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
@@ -27,11 +27,11 @@ use crate::shell::parameters::ParameterTable;
 use crate::shell::topics::TopicCommands;
 use crate::shell::{LiveRun, PARAMETERS, TOPICS};
 
-/// The system below an app's machine: the bare machine, or Linux.
+/// The platform below an app's machine: the bare machine, Linux or virtual time.
 ///
 /// See [`Machine`].
 pub trait System: Sized {
-    /// The run that a person can talk to.
+    /// The live run of this platform, for a person at the console.
     type Run: LiveRun + 'static;
 
     /// Reports whether a person can talk to a run.
@@ -39,24 +39,24 @@ pub trait System: Sized {
         false
     }
 
-    /// Returns the terms of the commits to come.
+    /// Returns the configuration of the commits to come.
     fn terms(&self) -> RunConfig;
 
-    /// Changes these, as far as the system allows it.
+    /// Changes the configuration of the commits to come, as far as the platform allows.
     fn change(&self, change: impl FnOnce(&mut RunConfig));
 
-    /// Makes events that are less than `window` apart count as one instant.
+    /// Makes events less than `window` apart count as a single instant.
     fn set_coincidence(&self, window: Duration);
 
-    /// Runs the committed DAGs, from `epoch_ns` on or as soon as may be, and tells what is its
-    /// own of the run.
+    /// Runs the committed DAGs from `epoch_ns` on, or as soon as possible, and prints the
+    /// platform's own reports of the run.
     fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError>;
 
     /// Reports whether a person has ended the latest run.
     fn is_shut_down(&self) -> bool;
 
-    /// Connects a wire to the device that the words name. The script of a device is taken from
-    /// the end of the app's file.
+    /// Connects a wire to the device named by the options. A device's script is taken from the end
+    /// of the app's file.
     fn connect(
         &self,
         wire: &Wire,
@@ -64,7 +64,7 @@ pub trait System: Sized {
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError>;
 
-    /// Connects a protocol to its peer, by the words for the network.
+    /// Connects a protocol to its peer, by the options for the network.
     fn connect_protocol(
         &self,
         protocol: Box<dyn Protocol>,
@@ -72,27 +72,28 @@ pub trait System: Sized {
         options: &CommandLine<'static>,
     ) -> Result<(), AppError>;
 
-    /// Returns a number that is hardly another machine's, or one of this machine's before.
+    /// Returns a number unlikely to repeat, on another machine or later on the same machine.
     fn seed() -> u128;
 
-    /// Returns the Unix time now, in nanoseconds, if the system knows it.
+    /// Returns the Unix time now, in nanoseconds, if the system knows the date.
     fn unix_ns() -> Option<u64>;
 
-    /// Measures what it takes itself, and charges that with so many hundredths more.
+    /// Measures the platform's own overheads, and charges them to the commits to come with a margin
+    /// of `margin_percent` hundredths.
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError>;
 
-    /// Returns how many contexts there are for instances, and how many of these can be taken.
+    /// Returns the number of contexts for instances, and the number of free contexts.
     fn contexts() -> (usize, usize) {
         (0, 0)
     }
 
-    /// Returns how much memory is and was in use.
+    /// Returns the present and the peak use of memory.
     fn memory() -> HeapUsage;
 }
 
 /// The machine, lent to the app's function for the time of the run.
 ///
-/// An app's function gets it; there is no other way to one.
+/// An app gets its machine as the argument of this function; there is no other way.
 ///
 /// ```no_run
 /// use kernel::{AppError, Machine, println};
@@ -111,16 +112,16 @@ pub struct Machine<S> {
     pub(super) system: S,
     pub(super) options: CommandLine<'static>,
     pub(super) module: Cell<Option<&'static [u8]>>,
-    /// Whether the app has asked for that.
+    /// Whether the app has asked for the module.
     has_asked: Cell<bool>,
-    /// The signal that bytes of input raise during a run.
+    /// The signal raised by bytes of input during a run.
     input: RefCell<Option<Signal>>,
-    /// Whether what they were like makes the app fail.
+    /// The faults and exceeded bounds of the runs so far, and whether they make the app fail.
     verdict: RunVerdict,
 }
 
 impl<S: System> Machine<S> {
-    /// Lends `app` the machine that a system makes, and returns how the app ends. `module` is the
+    /// Lends `app` a machine on top of `system`, and returns how the app ends. `module` is the
     /// app's file.
     #[doc(hidden)]
     pub fn serve(
@@ -151,35 +152,35 @@ impl<S: System> Machine<S> {
         }
     }
 
-    /// Returns the words of the command line that the kernel left to the app.
+    /// Returns the options of the command line left to the app by the kernel.
     ///
     /// See [`CommandLine`].
     pub const fn options(&self) -> &CommandLine<'static> {
         &self.options
     }
 
-    /// Returns the file that the loader left in memory (`qemu -initrd FILE`), or on Linux the one
-    /// that the word `module=` names, if there is one. The loader's is not copied: memory and the
-    /// boot's time are the same for files of any size. If there is one and the app never asks for
-    /// it, a line says so at the end.
+    /// Returns the app's file, if there is a file: on the bare machine the file left in memory by
+    /// the loader (`qemu -initrd FILE`), on Linux the file named by the option `module=`. The
+    /// loader's file is not copied, so files of any size cost the same memory and boot time. If
+    /// there is a file and the app never asks for it, a warning says so at the end.
     pub fn module(&self) -> Option<&'static [u8]> {
         self.has_asked.set(true);
         self.module.get()
     }
 
-    /// Reports whether a person can talk to the kernel during a run (`console=on`), and
-    /// so end one that would not end by itself.
+    /// Reports whether a person can talk to the kernel during a run (`console=on`), and so end an
+    /// otherwise endless run.
     pub fn has_console(&self) -> bool {
         self.system.has_console()
     }
 
-    /// Returns the number of cores that run subtasks.
+    /// Returns the number of cores available to run subtasks.
     pub fn cores(&self) -> u32 {
         self.system.terms().scheduler.cores
     }
 
-    /// Chooses policy and preemption of the commits to come, instead of what the
-    /// command line says. On Linux nothing is preempted without the right to use SCHED_FIFO.
+    /// Sets policy and preemption of the commits to come, overriding the command line. On Linux
+    /// nothing is preempted without the right to use SCHED_FIFO.
     ///
     /// ```no_run
     /// use fass::{Policy, Preemption};
@@ -199,23 +200,21 @@ impl<S: System> Machine<S> {
         });
     }
 
-    /// Makes events that are less than `window` apart count as one instant in the
-    /// runs to come: the scheduler decides that long after the first of them,
-    /// and has then seen them all. With 0, as at the start, it decides after
-    /// each event at once.
+    /// Makes events less than `window` apart count as a single instant in the runs to come. The
+    /// scheduler then decides `window` after the first of such events, having seen them all. With a
+    /// window of 0, the initial value, the scheduler decides at once after each event.
     ///
-    /// In a model, completions and releases can fall on the same instant, and
-    /// one dispatch sees them all. On a machine they come one after the other,
-    /// however close, and a decision between two of them starts or preempts what
-    /// the model would not. To compare the machine with the model, they have to
-    /// be taken together again. The price is that every decision comes `window`
-    /// later. On Linux the next run is refused, unless `window` is 0.
+    /// In a model, completions and releases can fall on the same instant, and a single dispatch
+    /// sees them all. On a machine they come one after the other, however close. A decision between
+    /// two of them starts or preempts instances differently from the model. To compare the machine
+    /// with the model, such events have to be taken together again. The price: every decision comes
+    /// `window` later. On Linux the next run is refused, unless `window` is 0.
     pub fn set_coincidence(&self, window: Duration) {
         self.system.set_coincidence(window);
     }
 
-    /// Leaves it to the app to judge faults. Unless it says so, at any time before its
-    /// function returns, a fault that ended a DAG in any of its runs makes it fail.
+    /// Leaves the verdict on faults to the app. Without this call, a fault ending a DAG in any run
+    /// makes the app fail. The app may call at any time before its function returns.
     ///
     /// ```no_run
     /// fn may_lose_a_camera(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
@@ -232,35 +231,35 @@ impl<S: System> Machine<S> {
         self.verdict.accept_faults();
     }
 
-    /// Leaves it to the app to judge response times beyond their proven bounds. Unless
-    /// it says so, at any time before its function returns, one in any of its runs makes
-    /// it fail (neither in the tool's mode `threads` nor on Linux). A line says so in any case.
+    /// Leaves the verdict on response times beyond their proven bounds to the app. Without this
+    /// call, such a response time in any run makes the app fail, except in the tool's mode
+    /// `threads` and on Linux. The app may call at any time before its function returns. Exceeded
+    /// bounds are printed in any case.
     pub fn accept_exceeded_bounds(&self) {
         self.verdict.accept_exceeded_bounds();
     }
 
     /// Runs the committed DAGs until each has ended all its jobs.
     ///
-    /// The calling core takes part. Progress is printed in machine lines of
-    /// kind `progress`, by core 0's background. A fault ends its DAG, and makes the app
-    /// fail (see [`accept_faults`](Self::accept_faults)).
+    /// The calling core takes part. The background of core 0 prints the progress in machine lines
+    /// of kind `progress`. A fault ends its DAG, and makes the app fail (see
+    /// [`accept_faults`](Self::accept_faults)).
     ///
     /// # Errors
     ///
     /// [`AppError::Failure`] if nothing has been committed since the last run.
-    /// [`AppError::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on
-    /// Linux by
-    /// SIGTERM: then each DAG has ended the jobs that it had in flight and released no more. If
-    /// that
-    /// run broke a rule of the model, it is a failure instead.
+    ///
+    /// [`AppError::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on Linux
+    /// by SIGTERM: then each DAG has ended the jobs in flight and released no more. If such a run
+    /// broke a rule of the model, the error is [`AppError::Failure`] instead.
     ///
     /// See [`Run`].
     pub fn run(&self) -> Result<Run, AppError> {
         self.run_when(None)
     }
 
-    /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on
-    /// the clock of [`fass::now_ns`]. If that is past, releases are late.
+    /// Works like [`run`](Self::run), with the releases counted from `epoch_ns` on the clock of
+    /// [`fass::now_ns`]. If `epoch_ns` is past, releases are late.
     ///
     /// # Errors
     ///
@@ -269,13 +268,13 @@ impl<S: System> Machine<S> {
         self.run_when(Some(epoch_ns))
     }
 
-    // Within an app's function it would make the image larger.
+    // Not inlined into an app's function: that would enlarge the image.
     #[inline(never)]
     fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, AppError> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
         let is_shut_down = self.system.is_shut_down();
         if is_shut_down {
-            // Before anything that may take longer than a person waits.
+            // The person waits, so the counts come before the slower reports.
             report::show_counts(&run);
         }
         self.verdict.note(&run);
@@ -286,12 +285,12 @@ impl<S: System> Machine<S> {
         Ok(run)
     }
 
-    /// Makes each byte that the serial port receives during runs raise a signal, in
-    /// place of the signal named before. With `console=on` bytes are the console's
-    /// and raise nothing. On Linux it is whatever arrives on standard input.
+    /// Makes each byte received by the serial port during runs raise `signal`, in place of any
+    /// signal set before. With `console=on` the bytes belong to the console and raise nothing. On
+    /// Linux the bytes come from standard input.
     ///
-    /// Core 0 looks for bytes when it has nothing else to do, so one may count up to
-    /// 20 ms late, and later where that core is busy.
+    /// Core 0 polls the port when it has nothing else to do, so a byte may count up to 20 ms late,
+    /// and later on a busy core.
     ///
     /// # Panics
     ///
@@ -320,25 +319,26 @@ impl<S: System> Machine<S> {
     }
 }
 
-/// The margin if nobody states one, in hundredths.
+/// The default margin on measured overheads, in hundredths.
 const MARGIN_PERCENT: u64 = 20;
 
 impl<S: System> Machine<S> {
-    /// Connects a wire to what its [word](super::endpoint) says. Without one it is the second serial
-    /// port (COM2, at I/O port 0x2f8): what is sent goes there in the runs to come, and what the port gets
-    /// arrives. If the word `input=` says that the end of the loader's module is a script, that arrives
-    /// instead, in each run. To be called before
-    /// [`CommandLine::finish`](crate::options::CommandLine::finish), which otherwise refuses these words,
-    /// and before [`module`](Self::module).
+    /// Connects a wire to the endpoint named by its [option](super::endpoint). Without an option
+    /// the endpoint is the second serial port (COM2, at I/O port 0x2f8): in the runs to come, the
+    /// port sends the wire's output, and bytes received by the port arrive on the wire. If the
+    /// option `input=` declares the end of the loader's module a script, the script arrives
+    /// instead, in each run. Call before
+    /// [`CommandLine::finish`](crate::options::CommandLine::finish), which otherwise refuses these
+    /// options, and before [`module`](Self::module).
     ///
-    /// The port is looked at every millisecond. Core 0 sends when it has nothing else to do.
-    /// After each run a line says what the wire has counted. On Linux standard input (`input=-`) and a
-    /// file (`output=FILE`) are in the port's place.
+    /// The port is polled every millisecond. Core 0 sends when it has nothing else to do. After
+    /// each run a line reports the wire's counts. On Linux, standard input (`input=-`) and a file
+    /// (`output=FILE`) take the port's place.
     ///
     /// # Errors
     ///
-    /// [`AppError::Usage`] if there is no such port, another wire has it, or neither end is named;
-    /// [`AppError::Failure`] if the wire is connected already.
+    /// [`AppError::Usage`] if there is no such port, another wire has the port, or neither end is
+    /// named; [`AppError::Failure`] if the wire is connected already.
     ///
     /// ```no_run
     /// use fass::shared::{Received, Wire};
@@ -363,8 +363,8 @@ impl<S: System> Machine<S> {
         self.system.connect(wire, &self.options, &self.module)
     }
 
-    /// Sets a clock of Unix time by the machine's own: that of a PC is right within a second, at best.
-    /// In mode `deterministic` it is set by the first second of 2000, on the guest's clock.
+    /// Sets a clock of Unix time by the machine's own clock. A PC's clock is right within a second,
+    /// at best. In mode `deterministic` the guest's clock begins at the first second of 2000.
     ///
     /// # Errors
     ///
@@ -389,10 +389,10 @@ impl<S: System> Machine<S> {
         Ok(())
     }
 
-    /// Lets people look at topics at the console: `echo TOPIC` shows values of those that are
-    /// recorded ([`Dag::record`](fass::Dag::record)) as they are completed, `hz TOPIC` says how
-    /// often any topic was written lately. To be called before the commit. Without a console it
-    /// does nothing.
+    /// Lets people look at topics at the console. `echo TOPIC` shows the values of a recorded topic
+    /// ([`Dag::record`](fass::Dag::record)) as instances complete them; `hz TOPIC` shows how often
+    /// any topic was written lately. Call before the commit. Without a console the call does
+    /// nothing.
     ///
     /// ```no_run
     /// fn app(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
@@ -405,21 +405,21 @@ impl<S: System> Machine<S> {
     pub fn show_topics(&self) {
         if self.has_console() {
             platform::let_look();
-            // Once is enough.
+            // An earlier call may have set the commands; the second set has no effect.
             TOPICS.set(Box::leak(Box::new(TopicCommands::<S::Run>::new())));
         }
     }
 
     /// Lets people set parameters: at the console by `set NAME VALUE`, before the first run by the
-    /// word `set=NAME=VALUE,...` of the command line, which `./scripts/run --set` and `--params`
-    /// make. To be called before [`CommandLine::finish`](crate::options::CommandLine::finish),
-    /// which
-    /// otherwise refuses that word.
+    /// option `set=NAME=VALUE,...` of the command line, as passed by `./scripts/run --set` and
+    /// `--params`. Call before [`CommandLine::finish`](crate::options::CommandLine::finish), which
+    /// otherwise refuses the option.
     ///
     /// # Errors
     ///
-    /// [`AppError::Usage`] in one line, if the word names no parameter, or no value of its type and
-    /// range; [`AppError::Failure`] if two have one name, or it was called before.
+    /// [`AppError::Usage`] in a single line, if the option names no parameter, or no value of the
+    /// parameter's type and range; [`AppError::Failure`] if two parameters share a name, or
+    /// parameters were offered before.
     ///
     /// ```no_run
     /// use fass::shared::Parameter;
@@ -444,17 +444,17 @@ impl<S: System> Machine<S> {
         }
     }
 
-    /// Takes the word `overheads`. With `overheads=measured` the kernel runs DAGs of its own
-    /// now, on all cores, and measures what it takes itself; the commits to come charge that
-    /// with a margin of 20 %, or `overheads_margin=PERCENT`, and their answers say so.
+    /// Takes the option `overheads`. With `overheads=measured` the kernel now runs DAGs of its own,
+    /// on all cores, and measures its overheads. The commits to come charge the result with a
+    /// margin of 20 %, or `overheads_margin=PERCENT`, and report the charge in their answers.
     ///
-    /// To be called before anything is committed and before the cores are divided. It settles
-    /// the size of stacks: subtasks may state no more than 64 KiB then.
+    /// Call before anything is committed and before the cores are divided. The measurement fixes
+    /// the size of stacks: subtasks may then state no more than 64 KiB.
     ///
     /// # Errors
     ///
-    /// If the words are wrong, or `overheads_ns` states the overheads besides; if there is no
-    /// memory for it; on Linux, where what it costs is not measured.
+    /// If the options are wrong, or `overheads_ns` states the overheads as well; if there is too
+    /// little memory for the measurement; on Linux, where overheads are not measured.
     ///
     /// ```no_run
     /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
@@ -484,9 +484,8 @@ impl<S: System> Machine<S> {
         }
     }
 
-    /// Returns what is in use and what is free between two runs: the same after
-    /// equal work, unless something leaks. During a run the stacks of running instances are not
-    /// free.
+    /// Returns the resources in use and free between two runs. The result is the same after equal
+    /// work, unless something leaks. During a run the stacks of running instances are not free.
     ///
     /// ```no_run
     /// fn leaks(machine: &kernel::Machine, work: impl Fn()) -> bool {
@@ -505,35 +504,36 @@ impl<S: System> Machine<S> {
         }
     }
 
-    /// Prints how much memory the run has needed, as a `memory` machine line.
+    /// Prints the run's peak use of memory, as a `memory` machine line.
     pub fn report_memory(&self) {
         S::memory().report();
     }
 
-    /// Divides the cores, from core 0 on, into clusters of so many each in the commits to come;
-    /// no number: they are not divided. Each cluster schedules its own DAGs
+    /// Divides the cores, from core 0 on, into clusters of the given sizes in the commits to come.
+    /// With no sizes, the cores are not divided. Each cluster schedules its own DAGs
     /// ([`fass::Dag::cluster`]).
     pub fn divide(&self, sizes: &[u32]) {
         self.system.change(|terms| terms.divide(sizes));
     }
 
-    /// Gives the commits to come a certificate, and so [fixes](RunConfig::certificate) their set; an
-    /// empty text does neither.
+    /// Gives the commits to come a certificate, and so [fixes](RunConfig::certificate) their set of
+    /// DAGs. An empty text removes the certificate.
     pub fn fix(&self, certificate: &str) {
         let text = (!certificate.is_empty()).then(|| certificate.to_owned().into());
         self.system.change(|terms| terms.certificate = text);
     }
 
-    /// Leaves that to the command line's word `clusters`: `clusters=2,2` divides the cores so;
-    /// with `clusters=auto` the commit does ([`sched_dag::analysis::assign()`]): a DAG that
-    /// needs several cores gets a cluster of its own, the others share clusters of one core each.
-    /// For that all subtasks need WCETs, and no DAG states a cluster. Without the word cores are
-    /// not divided. An app that reads options calls it before
-    /// [`finish`](crate::options::CommandLine::finish), which refuses words that nothing has read.
+    /// Leaves the division of the cores to the option `clusters` of the command line.
+    /// `clusters=2,2` sets the sizes of the clusters. With `clusters=auto` the commit divides the
+    /// cores ([`sched_dag::analysis::assign()`]): each DAG in need of several cores gets a cluster
+    /// of its own, and the others share clusters of a single core each. This requires WCETs for all
+    /// subtasks, and no DAG may state a cluster. Without the option the cores are not divided. An
+    /// app with options of its own calls this before
+    /// [`finish`](crate::options::CommandLine::finish), which refuses unread options.
     ///
     /// # Errors
     ///
-    /// If the word is neither `auto` nor numbers of cores.
+    /// If the option is neither `auto` nor numbers of cores.
     ///
     /// ```no_run
     /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
@@ -556,7 +556,7 @@ impl<S: System> Machine<S> {
         Ok(())
     }
 
-    /// Gives each of these DAGs to one of the clusters that there are, in turn.
+    /// Assigns the DAGs to the clusters in turn.
     ///
     /// ```no_run
     /// fn take_part(machine: &kernel::Machine, dags: &[fass::Dag]) -> Result<(), kernel::AppError> {
@@ -573,7 +573,7 @@ impl<S: System> Machine<S> {
         }
     }
 
-    /// Returns how the cores are divided, unless the commit is to find that.
+    /// Returns the division of the cores, unless the commit is to choose the division.
     pub fn clusters(&self) -> CoreDivision {
         self.system.terms().clusters
     }

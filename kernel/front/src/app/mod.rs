@@ -1,5 +1,5 @@
-//! The machine as an app sees it, how its runs are judged and how it ends, and the words by which
-//! it lets people take part.
+//! The app's view of the machine, the verdicts on its runs and its ending, and the options by which
+//! an app lets people take part.
 
 pub mod ending;
 pub mod endpoint;

@@ -1,12 +1,12 @@
-//! Nodes of ROS 2: the words that say who a node is, and where its router.
+//! Nodes of ROS 2: the options that identify a node and its router.
 //!
-//! | word | meaning |
+//! | option | meaning |
 //! | --- | --- |
-//! | `router=udp://ADDRESS:PORT` | the router; without it the node runs alone |
+//! | `router=udp://ADDRESS:PORT` | the router; without a router the node runs alone |
 //! | `domain=0` | the domain, to 232 |
-//! | `namespace=/robot` | stands before relative names of topics |
+//! | `namespace=/robot` | prefix of relative names of topics |
 //! | `lease_ms=1000` | after so long without a datagram the router takes the node for gone |
-//! | `identity=HEX` | tells the session from all others; without it, a fresh one |
+//! | `identity=HEX` | tells the session from all others; a fresh identity by default |
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -21,12 +21,12 @@ use super::machine::{Machine, System};
 use crate::options::UsageError;
 
 impl<S: System> Machine<S> {
-    /// Makes a node by the words of the command line. To be [joined](Self::join), when it has its
-    /// topics.
+    /// Makes a node by the options of the command line. The app then adds topics to the node and
+    /// [joins](Self::join) it.
     ///
     /// # Errors
     ///
-    /// [`AppError::Usage`] if a word has no value that is allowed.
+    /// [`AppError::Usage`] if the value of an option is not allowed.
     ///
     /// # Panics
     ///
@@ -60,7 +60,7 @@ impl<S: System> Machine<S> {
             UsageError::new(format!("`{word}={value}`: allowed are {allowed}"))
         };
         let namespace = options.text("namespace").unwrap_or_default();
-        // With room for the names of topics.
+        // The limit leaves room for the names of topics.
         let fits = namespace.is_empty() || is_name(namespace) && namespace.len() <= 128;
         if !fits {
             let allowed = "128 letters, digits and single `_` between `/`, no digit first";
@@ -80,22 +80,23 @@ impl<S: System> Machine<S> {
         Ok(Node::new(name, options))
     }
 
-    /// Joins a node with its topics to the router that the word `router=` names, and sets its
-    /// [clock](Node::clock), if the machine keeps the date. Without the word a line says that it runs
-    /// alone. To be called before the commit, and before
+    /// Joins a node with its topics to the router named by the option `router=`, and sets the
+    /// node's [clock](Node::clock), if the machine keeps the date. Without the option a line says
+    /// that the node runs alone. Call before the commit, and before
     /// [`CommandLine::finish`](crate::options::CommandLine::finish).
     ///
-    /// See [`ros_node`](Self::ros_node). On Linux it is joined until the end of the next run.
+    /// See [`ros_node`](Self::ros_node). On Linux the node stays joined until the end of the next
+    /// run.
     ///
     /// # Errors
     ///
-    /// [`AppError::Usage`] if the word names no router; [`AppError::Failure`] if there is no network,
-    /// or a topic has a device already.
+    /// [`AppError::Usage`] if the option names no router; [`AppError::Failure`] if there is no
+    /// network, or a topic has a device already.
     pub fn join(&self, mut node: Node) -> Result<(), AppError> {
-        // The stamps of messages correct it, too.
+        // A machine without a date is fine: the stamps of messages correct the clock, too.
         let _ = self.set_clock(node.clock());
         let Some(word) = self.options.text("router") else {
-            // Its topics have no link.
+            // The topics of a lone node have no link.
             let _ = node.begin(0, || ());
             crate::println!(
                 "there is no router, as by `router=udp://10.0.2.2:7447`: the node runs alone"

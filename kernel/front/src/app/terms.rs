@@ -1,5 +1,5 @@
-//! The words that say how DAGs are scheduled, what a commit reckons with and what of a run is
-//! printed. They are the same wherever an app runs.
+//! The options for scheduling, for a commit's assumptions and for the printed lines of a run. They
+//! are the same on every platform.
 
 use alloc::format;
 
@@ -15,19 +15,19 @@ use crate::options::{CommandLine, UsageError};
 const PREEMPTIONS: [(&str, Preemption); 2] =
     [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
-/// The configuration of a run that the command line states.
+/// The configuration of a run stated by the command line.
 #[derive(Clone, Copy, Debug)]
 pub struct RunTerms {
     policy: Policy,
     preemption: Preemption,
     budget_factor: u64,
     overheads: Overheads,
-    /// Whether a response time beyond its bound is the app's fault.
+    /// Whether a response time beyond its bound makes the app fail.
     pub judges_bounds: bool,
 }
 
 impl RunTerms {
-    /// Takes the words. The log has its level from now on.
+    /// Takes the options, and sets the level of the log at once.
     pub fn read(options: &CommandLine<'_>) -> Result<Self, UsageError> {
         let levels = [Some(Info), None, Some(Error), Some(Warn), Some(Debug)];
         let levels = levels.map(|most| (most.map_or("off", Level::word), most));
@@ -42,7 +42,7 @@ impl RunTerms {
         })
     }
 
-    /// Puts what commits are told where a platform keeps it.
+    /// Copies the terms of commits into a platform's configuration.
     pub const fn apply(&self, terms: &mut RunConfig) {
         terms.scheduler.policy = self.policy;
         terms.scheduler.preemption = self.preemption;
@@ -51,7 +51,7 @@ impl RunTerms {
     }
 }
 
-/// Takes the job that the word `from` says a replay shall begin with, or before it.
+/// Takes the option `from`: a replay begins with the named job of a DAG, or before that job.
 pub fn from<'a>(options: &CommandLine<'a>) -> Result<Option<(&'a str, u64)>, UsageError> {
     let Some(text) = options.text("from") else {
         return Ok(None);
@@ -60,8 +60,8 @@ pub fn from<'a>(options: &CommandLine<'a>) -> Result<Option<(&'a str, u64)>, Usa
     job_of(text).map(Some).ok_or_else(refused)
 }
 
-/// Takes the WCETs that the word `wcets` says the app's file begins with. Returns them, if there
-/// are any, and the rest of the file.
+/// Takes the WCETs at the beginning of the app's file, as declared by the option `wcets`. Returns
+/// the WCETs, if any, and the rest of the file.
 pub fn split_wcets<'a>(
     options: &CommandLine<'_>,
     module: Option<&'a [u8]>,
@@ -77,15 +77,14 @@ pub fn split_wcets<'a>(
     Ok((Some(wcets), rest))
 }
 
-/// Returns the first `bytes` of an app's file, and the rest if there is one; `None`: it is
-/// shorter.
+/// Returns the first `bytes` of an app's file, and any rest; `None` if the file is shorter.
 pub fn split(module: Option<&[u8]>, bytes: u64) -> Option<(&[u8], Option<&[u8]>)> {
     let (first, rest) = module?.split_at_checked(usize::try_from(bytes).ok()?)?;
     Some((first, Some(rest).filter(|rest| !rest.is_empty())))
 }
 
 fn overheads(options: &CommandLine<'_>) -> Result<Overheads, UsageError> {
-    /// So many have to be stated.
+    /// The fewest numbers a user has to state.
     const LEAST: usize = 3;
     let numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0; LEAST])?;
     let mut terms_ns = [0; Overheads::WORDS.len()];

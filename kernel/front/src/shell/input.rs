@@ -1,4 +1,4 @@
-//! Lines from bytes: what a person types, put together.
+//! Puts the bytes typed by a person together into lines.
 
 /// The longest line, in bytes.
 const LONGEST: usize = 120;
@@ -6,25 +6,25 @@ const LONGEST: usize = 120;
 const BACKSPACE: u8 = 0x08;
 const DELETE: u8 = 0x7f;
 
-/// A line that is being typed.
+/// A line being typed.
 pub(super) struct LineEditor {
     bytes: [u8; LONGEST],
     length: usize,
     is_too_long: bool,
-    /// The length of the line that was complete last, until the next one begins.
+    /// The length of the latest complete line, 0 once the next line has begun.
     complete: usize,
 }
 
 /// The effect of a typed byte.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum TypedByte<'a> {
-    /// The line goes on.
+    /// The line is not complete yet, or is empty.
     Nothing,
     /// The line is complete.
     Line(&'a str),
-    /// The line is complete, and longer than lines may be.
+    /// The line is complete, but longer than a line may be.
     TooLong,
-    /// The line is complete, and not UTF-8.
+    /// The line is complete, but not UTF-8.
     NotText,
 }
 
@@ -38,14 +38,14 @@ impl LineEditor {
         }
     }
 
-    /// Returns the line that was complete last, unless another one has begun.
+    /// Returns the latest complete line, unless another line has begun.
     pub(super) fn line(&self) -> &str {
         let line = core::str::from_utf8(&self.bytes[..self.complete]);
         line.map_or("", str::trim)
     }
 
-    /// Takes a byte. A line ends with `\r` or `\n`; an empty one is nothing, and
-    /// so `\r\n` ends one line.
+    /// Takes a byte. A line ends with `\r` or `\n`. An empty line does not count, and so `\r\n`
+    /// ends a single line.
     pub(super) fn on_byte(&mut self, byte: u8) -> TypedByte<'_> {
         match byte {
             b'\r' | b'\n' => {

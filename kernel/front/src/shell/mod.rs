@@ -1,13 +1,13 @@
-//! The shell: the conversation with a person during a run, on whatever platform.
+//! The shell: the conversation with a person during a run, on every platform.
 //!
-//! It goes on in slices, each of a few microseconds, whenever the platform has time for one, so
-//! that it keeps no instance waiting. Nothing is allocated. (Only a shutdown takes longer: a step
-//! of the scheduler for each DAG.) What it asks of the run is a [`LiveRun`]. Some commands are there
-//! only where the app has called for them: they are reached through [`Commands`], so that another
-//! image has no code for them.
+//! The shell works in slices of a few microseconds each, whenever the platform has time for a
+//! slice, and so keeps no instance waiting. Nothing is allocated. (Only a shutdown takes longer: a
+//! step of the scheduler for each DAG.) The shell queries the run through a [`LiveRun`]. Some
+//! commands exist only if the app has asked for them. They are reached through [`Commands`], so
+//! that the images of other apps contain no code for them.
 //!
-//! Each command is answered by lines for people and by one machine line of kind
-//! `console`; `dags` and `stats` print a line of kind `dag_status` for each DAG.
+//! Each command is answered by lines for people and by a single machine line of kind `console`;
+//! `dags` and `stats` print a line of kind `dag_status` for each DAG.
 
 mod input;
 pub mod parameters;
@@ -29,16 +29,16 @@ use crate::text::json;
 use crate::{println, report};
 use input::{LineEditor, TypedByte};
 
-/// How often a platform looks for bytes, at least.
+/// The longest time between two looks of a platform at the incoming bytes.
 pub const PERIOD_NS: u64 = 20_000_000;
 
-/// The byte that ends a run in order: what ctrl-C is on a serial line (ETX in ASCII).
+/// The byte that ends a run in order: ctrl-C on a serial line (ETX in ASCII).
 pub const END: u8 = 3;
 
-/// The most bytes that a slice takes: what the FIFO of a serial port holds.
+/// The most bytes taken in a slice: the size of a serial port's FIFO.
 const MOST_BYTES: usize = 16;
 
-/// The commands for people: how each is typed, and what it does.
+/// The commands, described for people: the syntax, and the effect of each.
 const HELP: [(&str, &str); 8] = [
     ("help", "list the commands"),
     ("dags", "list the DAGs"),
@@ -59,36 +59,38 @@ const HELP: [(&str, &str); 8] = [
     ),
 ];
 
-/// A run that goes on, as the shell sees it: what a platform has for it.
+/// A platform's services for the shell, about the run going on.
 pub trait LiveRun {
-    /// Returns the model of the run, if one goes on.
+    /// Returns the model of the run, if a run goes on.
     fn task_set() -> Option<Arc<TaskSet>>;
 
     /// Makes a change to a DAG.
     fn control(dag: DagId, change: fn(DagId) -> Request);
 
-    /// Returns the time, in nanoseconds. Not what functions are told of it ([`fass::now_ns`]): that
-    /// may be written down for them, and the shell speaks in the middle of theirs.
+    /// Returns the time, in nanoseconds. This is not the time seen by the app's functions
+    /// ([`fass::now_ns`]): each reading of that clock may be recorded, and the shell reads the time
+    /// in the middle of a function.
     fn now_ns() -> u64;
 
-    /// Has the scheduler of a cluster answer a question, if a run goes on.
+    /// Asks the scheduler of a cluster a question, if a run goes on.
     fn ask(cluster: usize, query: SchedulerQuery<'_>) -> Option<u64>;
 
-    /// Takes a byte that a person has typed.
+    /// Takes a byte typed by a person.
     fn receive() -> Option<u8>;
 
-    /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
+    /// Keeps the values of a topic for display, or of no topic; reports whether the topic is
+    /// recorded.
     fn watch(topic: Option<&str>) -> bool {
         platform::watch(topic)
     }
 
-    /// Takes the latest value that is to be seen, if there is a new one.
+    /// Takes the latest value kept for display, if there is a new value.
     fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
         platform::take_seen(into)
     }
 }
 
-/// Returns how a DAG does, if a run goes on.
+/// Returns the state and the counts of a DAG, if a run goes on.
 pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<DagSnapshot> {
     let cluster = task_set.dag(dag).cluster().index();
     let mut found = None;
@@ -96,10 +98,10 @@ pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<DagSnapsho
     found
 }
 
-/// Shows the events that the journal of a cluster has last, the latest one first, at most so many
-/// and until `take` has seen enough.
+/// Calls `take` with the latest events in the journal of a cluster, from the latest one backwards:
+/// at most `most` events, and until `take` returns false.
 pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Event) -> bool) {
-    /// How many events are copied under the lock at a time.
+    /// The number of events copied at a time under the lock.
     const AT_ONCE: usize = 64;
     let mut end = R::ask(cluster, SchedulerQuery::Written).unwrap_or(0);
     let last = end.saturating_sub(most);
@@ -116,16 +118,16 @@ pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Ev
     }
 }
 
-/// The way of a command to say why it does not do what a line asks.
+/// A function by which a command explains why it does not do as asked.
 pub type Refuse<'r> = &'r mut dyn FnMut(&dyn Display);
 
-/// The commands about parameters, if the app has called for them.
+/// The commands about parameters, if the app has asked for them.
 pub(crate) static PARAMETERS: SetOnce<&'static dyn Commands> = SetOnce::new();
 
-/// The commands about topics, if the app has called for them.
+/// The commands about topics, if the app has asked for them.
 pub(crate) static TOPICS: SetOnce<&'static dyn Commands> = SetOnce::new();
 
-/// Returns the commands that the app has called for.
+/// Returns the commands requested by the app.
 fn extra() -> impl Iterator<Item = &'static dyn Commands> {
     [&PARAMETERS, &TOPICS]
         .into_iter()
@@ -135,7 +137,7 @@ fn extra() -> impl Iterator<Item = &'static dyn Commands> {
 /// Whether a person has ended the run.
 pub static IS_SHUT_DOWN: AtomicBool = AtomicBool::new(false);
 
-/// Has nothing more released, and what is in flight go on to its end.
+/// Stops all releases, and lets the jobs in flight go on to their end.
 pub fn shut_down<R: LiveRun>() {
     let Some(task_set) = R::task_set() else {
         return;
@@ -146,20 +148,20 @@ pub fn shut_down<R: LiveRun>() {
     dags.for_each(|dag| R::control(dag, Request::Close));
 }
 
-/// Some commands of the shell.
+/// A group of commands of the shell.
 pub trait Commands: Sync {
-    /// Returns them for people: how each is typed, and what it does.
+    /// Describes the commands for people: the syntax, and the effect of each.
     fn help(&self) -> &'static [(&'static str, &'static str)];
 
-    /// Does what a line says, of its first word and the rest, or tells why not; `false`: it is
-    /// none of these commands. Allocates nothing.
+    /// Executes the command `name` with the arguments `rest`, or explains why not. Returns `false`
+    /// if the command is not in this group. Allocates nothing.
     fn answer(&self, name: &str, rest: &str, refuse: Refuse<'_>) -> bool;
 
-    /// Goes on a little with a command that takes long.
+    /// Continues a lengthy command for a moment.
     fn step(&self) {}
 }
 
-/// A conversation.
+/// A conversation with a person.
 pub struct ShellSession<R> {
     input: LineEditor,
     echoes: bool,
@@ -167,17 +169,17 @@ pub struct ShellSession<R> {
     run: PhantomData<fn() -> R>,
 }
 
-/// DAGs that are still to be listed, each in a slice of its own.
+/// The DAGs still to be listed, each in a slice of its own.
 #[derive(Clone, Copy, Debug)]
 struct DagListing {
     next: DagId,
-    /// The first one that is not to be listed.
+    /// The first DAG after the list.
     end: DagId,
     print: fn(&DagSnapshot, &Dag),
 }
 
 impl<R: LiveRun> ShellSession<R> {
-    /// Begins a conversation; `echoes`: what is typed is sent back.
+    /// Begins a conversation; with `echoes`, typed bytes are sent back.
     pub const fn new(echoes: bool) -> Self {
         Self {
             input: LineEditor::new(),
@@ -187,8 +189,8 @@ impl<R: LiveRun> ShellSession<R> {
         }
     }
 
-    /// Does a little: prints one DAG's line, or takes a few bytes and answers what
-    /// they complete. Reports whether there is more to do at once.
+    /// Does a little work: prints the line of a single DAG, or takes a few bytes and answers a line
+    /// completed by them. Reports whether there is more to do at once.
     pub fn slice(&mut self) -> bool {
         let Some(task_set) = R::task_set() else {
             return false;
@@ -234,7 +236,7 @@ impl<R: LiveRun> ShellSession<R> {
 }
 
 impl DagListing {
-    /// Prints the next DAG's lines and returns what is left to be listed.
+    /// Prints the next DAG's lines and returns the rest of the list.
     fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<DagListing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
         if let Some(snapshot) = snapshot::<R>(task_set, dag) {
@@ -245,7 +247,7 @@ impl DagListing {
     }
 }
 
-/// Does what a line says, or tells why not. Returns what is to be listed for it.
+/// Executes a line, or explains why not. Returns the DAGs to be listed in answer.
 fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<DagListing> {
     let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     let rest = rest.trim();
@@ -282,7 +284,7 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
     None
 }
 
-/// Says that a word is no command, and which there are.
+/// Says that a word is no command, and lists all commands.
 fn no_command<E: Iterator<Item = &'static dyn Commands>>(
     name: &str,
     extra: impl Fn() -> E,
@@ -298,7 +300,7 @@ fn no_command<E: Iterator<Item = &'static dyn Commands>>(
     })
 }
 
-/// Has events recorded from now on, or forgotten.
+/// Starts recording events, or stops and forgets them.
 fn record<R: LiveRun>(on: bool, task_set: &TaskSet, refuse: Refuse<'_>) {
     if on && R::ask(0, SchedulerQuery::HasRoom) != Some(1) {
         return refuse(&"there is no room for events; boot without `trace_events=0`");
@@ -310,7 +312,7 @@ fn record<R: LiveRun>(on: bool, task_set: &TaskSet, refuse: Refuse<'_>) {
     println!("{what} are recorded");
 }
 
-/// Begins a list of the DAG that is named, or of all.
+/// Begins a list of the named DAG, or of all DAGs.
 fn list(
     task_set: &TaskSet,
     name: &str,
@@ -340,7 +342,7 @@ fn describe(snapshot: &DagSnapshot, dag: &Dag) {
     );
 }
 
-/// Makes a change to the DAG that is named.
+/// Makes a change to the named DAG.
 fn change<R: LiveRun>(
     task_set: &TaskSet,
     name: &str,
@@ -359,7 +361,7 @@ fn change<R: LiveRun>(
     println!("dag `{of}` {what}");
 }
 
-/// Finds a DAG by its name or, if none has it, by its number.
+/// Finds a DAG by its name or, if no DAG has the name, by its number.
 fn find(task_set: &TaskSet, name: &str, refuse: Refuse<'_>) -> Option<DagId> {
     let ids = || (0..).map(DagId).take(task_set.dags().len());
     let by_name = ids().find(|dag| task_set.dag(*dag).name() == name);

@@ -1,5 +1,4 @@
-//! Parameters that an app offers, and people set: at the console, or by the command line's word
-//! `set`.
+//! The commands for an app's parameters: people set them at the console, or by the option `set`.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -14,11 +13,11 @@ use super::{Commands, Refuse};
 use crate::options::UsageError;
 use crate::println;
 
-/// The parameters that an app offers.
+/// The parameters offered by an app.
 pub struct ParameterTable(pub Vec<Arc<dyn Tunable>>);
 
 impl ParameterTable {
-    /// Takes those that an app offers; two of one name are refused in words.
+    /// Takes the parameters offered by an app. Returns a message if two parameters share a name.
     pub fn new(parameters: &[&dyn Tunable]) -> Result<Self, String> {
         let mut names = (1..).zip(parameters);
         if let Some((_, twice)) = names.find(|(next, parameter)| {
@@ -34,7 +33,7 @@ impl ParameterTable {
         Ok(Self(shared.collect()))
     }
 
-    /// Sets those that a word of the command line names, as `NAME=VALUE,...`.
+    /// Sets the parameters listed in an option of the command line, as `NAME=VALUE,...`.
     pub fn set_all(&self, word: &str) -> Result<(), UsageError> {
         for part in word.split(',') {
             let mut refusal = None;
@@ -51,7 +50,7 @@ impl ParameterTable {
         Ok(())
     }
 
-    /// Sets one of them, or tells why not.
+    /// Sets a single parameter, or explains why not.
     pub fn set(
         &self,
         name: &str,

@@ -1,8 +1,9 @@
-//! Topics at the console: `echo TOPIC` shows values as they are completed, `hz TOPIC` how often.
+//! Topics at the console: `echo TOPIC` shows values as they are completed, `hz TOPIC` the rate of a
+//! topic.
 //!
-//! Values are those of topics that the app records (`Dag::record`). One is shown every
-//! [`BETWEEN_NS`] at most, the latest, with the number of those that were left out. The journal
-//! knows how often any topic is written.
+//! Only topics recorded by the app (`Dag::record`) have values to show. The latest value is shown,
+//! at most every [`BETWEEN_NS`], with the number of values left out. The rate of any topic comes
+//! from the journal.
 
 use core::fmt::{self, Display};
 use core::marker::PhantomData;
@@ -17,32 +18,32 @@ use super::{Commands, LiveRun, Refuse, look_back};
 use crate::println;
 use crate::text::json;
 
-/// The least time between two values that are shown.
+/// The least time between two shown values.
 const BETWEEN_NS: u64 = 100_000_000;
 
-/// The longest value that is shown, in bytes.
+/// The longest value shown, in bytes.
 const MOST_BYTES: usize = 512;
 
-/// How much of its text is shown.
+/// The most bytes of a value's text shown.
 const MOST_TEXT_BYTES: usize = 200;
 
-/// How many events of the journal are looked at.
+/// The most events of the journal searched for a rate.
 const MOST_EVENTS: u64 = 2048;
 
 /// Stands for no topic.
 const NONE: u64 = u64::MAX;
 
-/// The commands, and the topic that is echoed. Only the session uses it, a slice at a time.
+/// The commands, and the echoed topic. Only the session uses this, a slice at a time.
 pub struct TopicCommands<R> {
-    /// The topic: its DAG, and its place there in the lower half; or [`NONE`].
+    /// The topic: its DAG in the upper half, its index there in the lower half; or [`NONE`].
     echoed: AtomicU64,
-    /// When a value was shown last.
+    /// The time of the latest shown value.
     shown_ns: AtomicU64,
     run: PhantomData<fn() -> R>,
 }
 
 impl<R: LiveRun> TopicCommands<R> {
-    /// Makes them; no topic is echoed.
+    /// Makes the commands, with no echoed topic.
     #[allow(clippy::new_without_default, reason = "it is for a static")]
     pub const fn new() -> Self {
         Self {
@@ -52,7 +53,7 @@ impl<R: LiveRun> TopicCommands<R> {
         }
     }
 
-    /// Begins to echo a topic, or tells why not.
+    /// Begins to echo a topic, or explains why not.
     fn echo(&self, name: &str, task_set: &TaskSet, refuse: Refuse<'_>) {
         let Some((dag, place)) = find(name, task_set, refuse) else {
             return;
@@ -68,7 +69,7 @@ impl<R: LiveRun> TopicCommands<R> {
         self.shown_ns.store(0, Ordering::Relaxed);
     }
 
-    /// Shows the latest value of a topic, if there is one and it is time.
+    /// Shows the latest value of a topic, if it is new and [`BETWEEN_NS`] have passed.
     fn show(&self, topic: &Topic) {
         let now_ns = R::now_ns();
         let shown_ns = self.shown_ns.load(Ordering::Relaxed);
@@ -144,7 +145,7 @@ impl<R: LiveRun> Commands for TopicCommands<R> {
     }
 }
 
-/// Says how often a topic was written lately, or why it cannot.
+/// Prints how often a topic was written lately, or explains why not.
 fn hz<R: LiveRun>(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) {
     let Some((dag, topic)) = find(name, task_set, refuse) else {
         return;
@@ -177,24 +178,24 @@ fn hz<R: LiveRun>(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) {
     });
 }
 
-/// Writes a time; nothing is allocated.
+/// Writes a time in microseconds; nothing is allocated.
 fn microseconds(ns: u64) -> impl Display {
     fmt::from_fn(move |f| write!(f, "{}.{:03} us", ns / 1000, ns % 1000))
 }
 
-/// The completions of a subtask, taken from the latest one back.
+/// The completions of a subtask, taken from the latest one backwards.
 #[derive(Clone, Copy, Debug, Default)]
 struct CompletionRate {
     values: u64,
     last_ns: u64,
     first_ns: u64,
-    /// From one to the next.
+    /// The least and the most time between consecutive completions.
     least_ns: u64,
     most_ns: u64,
 }
 
 impl CompletionRate {
-    /// Looks at the latest events of the journal.
+    /// Takes the completions among the latest events of the journal.
     fn look<R: LiveRun>(task_set: &TaskSet, dag: DagId, writer: SubtaskId) -> Self {
         let mut rate = Self::default();
         look_back::<R>(
@@ -225,7 +226,7 @@ impl CompletionRate {
         self.values += 1;
     }
 
-    /// Returns the mean time from one value to the next, if there are two at two times.
+    /// Returns the mean time between two values, if there are two with different times.
     fn mean_ns(&self) -> Option<u64> {
         let span_ns = self.last_ns - self.first_ns;
         span_ns
@@ -234,7 +235,8 @@ impl CompletionRate {
     }
 }
 
-/// Finds a topic of any DAG, or tells that there is none: its DAG, and its place there.
+/// Finds a topic of any DAG: its DAG, and its index there. Otherwise says so, and suggests a
+/// similar name.
 fn find(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<(DagId, usize)> {
     let dags = || (0..).map(DagId).zip(task_set.dags());
     let found = dags().find_map(|(dag, model)| {

@@ -1,16 +1,16 @@
-//! The way of text to the platform's output.
+//! The path of text to the platform's output.
 //!
 //! Text and machine lines are told apart: only [`json`](super::json) can print a line that begins
-//! with `{`. Printed text goes to the function of the platform that the program's entry names
-//! by [`output!`](crate::output). It is found when the program is linked: a pointer to it would
-//! cost each image bytes, and each line a look.
+//! with `{`. Printed text goes to the platform's output function, which the program's entry names
+//! by [`output!`](crate::output). The function is bound at link time: a pointer to it would cost
+//! each image some bytes, and each line a lookup.
 //!
-//! # From a value's `Display` to the bytes that are handed over
+//! # From a value's `Display` to the bytes handed over
 //!
-//! An app's `Display` may take long, print, or panic. So text is made outside every
-//! lock, in a buffer on the stack of the context that prints, with interrupts as they
-//! are there: all of it is then that context's own affair. A full buffer goes on as a
-//! *piece*. Up to [`LONGEST`] bytes are one piece, and stay together.
+//! An app's `Display` may take long, print, or panic. Text is therefore formatted outside every
+//! lock, in a buffer on the stack of the printing context, with interrupts left as they are. All
+//! consequences stay with that context. A full buffer is handed over as a *piece*. Up to
+//! [`LONGEST`] bytes form a single piece, and stay together.
 
 use core::fmt;
 
@@ -20,16 +20,15 @@ mod bound {
 
     use super::OutputKind;
 
-    // SAFETY: `output!` alone defines the symbol, as a safe function of this very type; the linker
-    // refuses a program that has none or two.
+    // SAFETY: `output!` alone defines the symbol, as a safe function of exactly this type; the
+    // linker refuses a program with none or two.
     unsafe extern "Rust" {
         pub(super) safe fn front_output(kind: OutputKind, text: fmt::Arguments<'_>);
     }
 }
 
-/// Makes a function of the platform's, `fn(OutputKind, fmt::Arguments<'_>)`, the one that all text
-/// of
-/// the program goes to. To be called once in a program.
+/// Makes a function of the platform, `fn(OutputKind, fmt::Arguments<'_>)`, the destination of all
+/// text of the program. Use exactly once in a program.
 #[macro_export]
 macro_rules! output {
     ($write:path) => {
@@ -40,21 +39,21 @@ macro_rules! output {
     };
 }
 
-/// Writes text. The text of one call stays together, up to 1 KiB of it. A line that begins with
-/// `{` gets a blank before it. For [`print!`](crate::print).
+/// Writes text. The text of a single call stays together, up to 1 KiB. A line beginning with `{`
+/// gets a blank in front. For [`print!`](crate::print).
 pub fn write(text: fmt::Arguments<'_>) {
     bound::front_output(OutputKind::Text, text);
 }
 
-/// Writes a machine line and its end, on a line of its own.
+/// Writes a machine line and its line end, on a line of its own.
 pub(super) fn write_line(kind: OutputKind, line: &dyn fmt::Display) {
     bound::front_output(kind, format_args!("{line}"));
 }
 
 /// Prints text: on the serial line of the machine, on the standard output of Linux.
 ///
-/// Text is made by the caller's context, so a `Display` that
-/// panics or takes long is the caller's own affair.
+/// The caller's context formats the text, so a `Display` that panics or takes long affects only the
+/// caller.
 #[macro_export]
 macro_rules! print {
     ($($text:tt)*) => { $crate::console::write(::core::format_args!($($text)*)) };
@@ -75,7 +74,7 @@ mod output {
     fn forget(_: super::OutputKind, _: core::fmt::Arguments<'_>) {}
 }
 
-/// The most bytes that are handed over at once.
+/// The most bytes handed over at once.
 pub const LONGEST: usize = 1024;
 
 /// The kind of an output.
@@ -83,14 +82,14 @@ pub const LONGEST: usize = 1024;
 pub enum OutputKind {
     /// Text for people.
     Text,
-    /// A machine line of an app's.
+    /// A machine line of an app.
     Line,
     /// A machine line of the kernel's own.
     KernelLine,
 }
 
-/// Collects text and hands it over in pieces; `hand_over` gets each one, and whether
-/// it is the first.
+/// Collects text and hands it over in pieces. `hand_over` gets each piece, and a flag that marks
+/// the first one.
 pub struct TextPieces<F: FnMut(&[u8], bool)> {
     bytes: [u8; LONGEST],
     length: usize,
@@ -119,7 +118,7 @@ impl<F: FnMut(&[u8], bool)> TextPieces<F> {
         self.flush();
     }
 
-    /// Hands over what there is.
+    /// Hands over the collected bytes.
     fn flush(&mut self) {
         if self.length > 0 {
             (self.hand_over)(&self.bytes[..self.length], self.begins);
@@ -129,7 +128,7 @@ impl<F: FnMut(&[u8], bool)> TextPieces<F> {
     }
 
     fn push(&mut self, byte: u8) {
-        /// Room for a blank and the longest character: no piece ends within one.
+        /// Room for a blank and the longest character: no piece ends within a character.
         const MARGIN: usize = 5;
         let begins_character = byte & 0xc0 != 0x80;
         if self.length + MARGIN > LONGEST && begins_character {
@@ -144,14 +143,14 @@ impl<F: FnMut(&[u8], bool)> fmt::Write for TextPieces<F> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for byte in text.bytes() {
             match (self.kind, byte) {
-                // As at the seam of two pieces, see `buffer`.
+                // The platform does the same at the seam of two pieces.
                 (OutputKind::Text, b'{') if self.bytes[..self.length].ends_with(b"\n") => {
                     self.push(b' ');
                 }
                 _ => {}
             }
             let is_end = self.kind != OutputKind::Text && byte == b'\n';
-            // JSON has no line ends but as white space between its parts.
+            // In JSON a line end is white space between two parts, nothing else.
             self.push(if is_end { b' ' } else { byte });
         }
         Ok(())

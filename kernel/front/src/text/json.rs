@@ -1,10 +1,10 @@
-//! The one printer of machine lines: one JSON object a line, `{` in column 0.
+//! The only printer of machine lines: a line is a single JSON object, with `{` in column 0.
 //!
-//! `docs/formats.md` lists the kinds. An object is described by a
-//! closure that names its fields, so printing one allocates nothing.
+//! `docs/formats.md` lists the kinds. A closure that names the fields describes an object, so
+//! printing an object allocates nothing.
 //!
-//! A run is judged by some of the kinds (`KERNELS`). Those are the kernel's to print:
-//! it `report`s, apps [`emit`].
+//! Some of the kinds (`KERNELS`) decide the verdict on a run. The kernel alone prints those, by
+//! `report`; apps use [`emit`].
 
 use core::fmt::{self, Display, Formatter};
 
@@ -12,7 +12,7 @@ use sched_dag::law::Distribution;
 
 use super::console;
 
-/// Writes the fields of one object.
+/// Writes the fields of a single object.
 ///
 /// ```no_run
 /// let line = kernel::json::line("run", |line| {
@@ -94,8 +94,7 @@ impl JsonObject<'_, '_> {
         })
     }
 
-    // One function for all callers each: lines are not written in haste, and an image has
-    // little room.
+    // Each of these serves all callers: an image has little room, and printing lines is not urgent.
 
     #[inline(never)]
     fn whole(&mut self, name: &str, value: u64) -> &mut Self {
@@ -107,7 +106,7 @@ impl JsonObject<'_, '_> {
         self.shown(name, &quoted(value))
     }
 
-    /// Writes a list; `next` shows a value, while there is one.
+    /// Writes a list; `next` shows the next value, until there is none left.
     #[inline(never)]
     fn each(&mut self, name: &str, next: &mut dyn FnMut(Show<'_>) -> Option<()>) -> &mut Self {
         self.shown(name, &"[");
@@ -135,7 +134,7 @@ impl JsonObject<'_, '_> {
     }
 }
 
-/// Writes a value of a list.
+/// A function that writes a value of a list.
 type Show<'s> = &'s mut dyn FnMut(&dyn Display);
 
 /// An object as text.
@@ -184,7 +183,7 @@ impl fmt::Write for EscapedText<'_, '_> {
     }
 }
 
-/// Returns a machine line of kind `kind`, without the line's end.
+/// Returns a machine line of kind `kind`, without the line end.
 ///
 /// See [`JsonObject`].
 pub fn line(kind: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) -> impl Display {
@@ -194,7 +193,7 @@ pub fn line(kind: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) -> impl Displa
     })
 }
 
-/// The kinds by which a run is judged.
+/// The kinds that decide the verdict on a run.
 const KERNELS: [&str; 6] = [
     "boot",
     "commit_fault",
@@ -208,7 +207,7 @@ const KERNELS: [&str; 6] = [
 ///
 /// # Panics
 ///
-/// If the kind is the kernel's: `boot`, `commit_fault`, `fault`, `panic`, `stalled` or
+/// If the kind is reserved for the kernel: `boot`, `commit_fault`, `fault`, `panic`, `stalled` or
 /// `verdict`.
 ///
 /// ```no_run

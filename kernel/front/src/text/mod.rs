@@ -1,13 +1,12 @@
-//! All text that goes out: machine lines (`json`), and the way of it to the platform
-//! (`console`).
+//! All text going out: machine lines (`json`), and the path of text to the platform (`console`).
 
 pub mod console;
 pub mod json;
 
 use core::fmt;
 
-/// Nanoseconds, shown with four digits or so and a unit: `412 ns`, `1.050 us`,
-/// `25.000 ms`, `1.500 s`. Honours the width of the format string.
+/// Nanoseconds, shown with about four digits and a unit: `412 ns`, `1.050 us`, `25.000 ms`, `1.500
+/// s`. Honours the width of the format string.
 ///
 /// ```no_run
 /// use kernel::report::Ns;
