@@ -1,8 +1,8 @@
-//! Devices of PCI, for drivers that are written in an app's crate: `docs/driver.md` makes one.
+//! PCI devices, for drivers in an app's crate: `docs/driver.md` writes an example.
 //!
-//! These are functions of the kernel, and not of the app's [`Machine`](crate::Machine), which is the
-//! same on Linux, where an app reaches no device. Nothing is mapped, and nothing of this is in the
-//! image, unless an app asks.
+//! These are functions of the kernel, and not of the app's [`Machine`](crate::Machine), because the
+//! machine is the same on Linux, where an app reaches no device. Unless an app asks, no device is
+//! mapped, and none of this code is in the image.
 //!
 //! ```no_run
 //! use kernel::AppError;
@@ -58,7 +58,7 @@ pub fn each(each: &mut dyn FnMut(Function<'static>)) -> Result<(), AppError> {
 ///
 /// # Errors
 ///
-/// There is none, or the machine has no PCI configuration space in memory.
+/// There is no such function, or the machine has no PCI configuration space in memory.
 pub fn find(vendor: u16, device: u16) -> Result<Function<'static>, AppError> {
     let mut found = None;
     each(&mut |function| {
@@ -72,7 +72,7 @@ pub fn find(vendor: u16, device: u16) -> Result<Function<'static>, AppError> {
     })
 }
 
-/// Returns why an app cannot use a function as its error, which names the function.
+/// Makes an error that names a PCI function and the reason why an app cannot use it.
 ///
 /// See the [example](self).
 pub fn refusal(function: &Function<'_>, why: impl Display) -> AppError {

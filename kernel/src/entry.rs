@@ -1,9 +1,8 @@
-//! Definitions that only the image itself can have: its entry, allocator, panic handler
-//! and the few functions that compiled code calls without being asked, which are
-//! [`mod@boot::memory_functions`].
+//! Definitions that belong into an image alone: its entry, its allocator, its panic handler and the
+//! few functions that compiled code calls implicitly ([`mod@boot::memory_functions`]).
 //!
-//! The [`entry!`](crate::entry) macro defines them in the app's binary, not in
-//! this library, so that host programs that use the library keep their own.
+//! The [`entry!`](crate::entry) macro defines them in the app's binary, not in this library. Host
+//! programs that are linked with the library thus keep their own.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::Ordering;
@@ -17,10 +16,10 @@ pub use front::output;
 #[cfg(test)]
 front::output!(write_as);
 
-/// Makes an app's function the one that the image runs.
+/// Makes an app's function the function run by the image.
 ///
-/// To be called once, in the `main.rs` of a `#![no_std] #![no_main]` binary
-/// whose `build.rs` calls `boot_link::link_image()`:
+/// Use once, in the `main.rs` of a `#![no_std] #![no_main]` binary whose `build.rs` calls
+/// `boot_link::link_image()`:
 ///
 /// ```ignore
 /// kernel::entry!(main);
@@ -53,14 +52,15 @@ macro_rules! entry {
             $crate::entry::panic(info)
         }
 
-        // SAFETY: the linker script makes the section part of the notes, and this is one.
+        // SAFETY: the linker script makes the section part of the notes, and this static has the
+        // layout of a note.
         #[used]
         #[unsafe(link_section = ".note.app")]
         static APP_NOTE: $crate::entry::AppNote =
             $crate::entry::AppNote::new(env!("CARGO_PKG_NAME"));
 
-        // SAFETY: `boot` declares the function with this signature and calls it
-        // once; no other symbol has the name.
+        // SAFETY: `boot` declares the function with this signature and calls it once; no other
+        // symbol has the name.
         #[unsafe(no_mangle)]
         fn kernel_main(info: &'static $crate::entry::BootInfo) -> ! {
             $crate::entry::start(info, env!("CARGO_PKG_NAME"), cfg!(unoptimized), $app)
@@ -72,8 +72,7 @@ macro_rules! entry {
     };
 }
 
-/// The note of the image that names its app: an ELF note, which the host reads without a
-/// boot.
+/// The ELF note naming the image's app. The host reads the note without booting the image.
 #[repr(C)]
 pub struct AppNote {
     owner_bytes: u32,
@@ -104,7 +103,7 @@ impl AppNote {
     }
 }
 
-/// Runs `kernel_main` of the image.
+/// Implements `kernel_main` of the image.
 pub fn start(
     info: &'static BootInfo,
     name: &'static str,
@@ -115,7 +114,7 @@ pub fn start(
     crate::start::start(info, name, app)
 }
 
-/// Runs the image's panic handler.
+/// Implements the image's panic handler.
 pub fn panic(info: &PanicInfo<'_>) -> ! {
     crate::watch::panic::panic(info)
 }

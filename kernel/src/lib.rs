@@ -1,7 +1,7 @@
 //! The unikernel: runs committed DAGs on bare x86_64 processors.
 //!
-//! An app is one function. It states its DAGs with `fass`, commits them, and
-//! tells its [`Machine`] to run them; the kernel does the rest:
+//! An app is a single function. It states its DAGs with `fass`, commits them, and tells its
+//! [`Machine`] to run them; the kernel does the rest:
 //!
 //! ```no_run
 //! use kernel::{AppError, Machine};
@@ -17,25 +17,25 @@
 //! # fn main() {}
 //! ```
 //!
-//! Examples in this crate's documentation are compiled and not run: it contains the
-//! image's first instruction, with which no program of the host can be linked. An app's
-//! own functions need no kernel and run on the host (`virtual-time`).
+//! Examples in this crate's documentation are compiled but not run: the crate contains the image's
+//! first instruction, and no program of the host can be linked with it. An app's own functions need
+//! no kernel and run on the host (`virtual-time`).
 //!
-//! The words (*run*, *context*, *step* and others) are in `docs/glossary.md`.
+//! Terms (*run*, *context*, *step* and others) are defined in `docs/glossary.md`.
 //!
 //! # Principles
 //!
-//! 1. **The scheduler decides, the kernel carries out.** `sched-dag` is told
-//!    what happens and when; no line here chooses an instance.
-//! 2. **One lock around the scheduler**, held with interrupts off for one step
-//!    of it, never across an app's function.
-//! 3. **After commit nothing allocates**: from a job's release to its completion
-//!    all memory is there already.
-//! 4. **A core without work halts**, and is woken by the core that has some.
-//! 5. **`unsafe` is in the executive's `machine`, `memory` and `devices`, and in `entry` and `start`**
-//!    alone, each block with the invariant that it relies on. A driver has one such step.
-//! 6. **Apps are not trusted**: what they say is verified at commit, and nothing here lets one change
-//!    a core's interrupts:
+//! 1. **The scheduler decides, the kernel carries out.** `sched-dag` is told about events and their
+//!    times; no line here chooses an instance.
+//! 2. **One lock around the scheduler**, held with interrupts off for a single step of the
+//!    scheduler, never across an app's function.
+//! 3. **After commit nothing allocates**: all memory needed from a job's release to its completion
+//!    exists already.
+//! 4. **A core without work halts**, and is woken by a core with work for it.
+//! 5. **`unsafe` is confined** to the executive's `machine`, `memory` and `devices`, and to `entry`
+//!    and `start`. Each block names the invariant it relies on. A driver has a single such step.
+//! 6. **Apps are not trusted**: their statements are verified at commit, and nothing here lets an
+//!    app change a core's interrupts:
 //!
 //! ```compile_fail,E0425
 //! kernel::set_heartbeat(core::time::Duration::from_nanos(1));
@@ -43,11 +43,11 @@
 //!
 //! # Rooms, from top to bottom
 //!
-//! `entry` and `start` bring an image up, `app` is what an app sees of the kernel. `watch` looks in
-//! on a run, [`devices`] is for drivers, and [`report`] tells of it afterwards; [`options`] reads the words of the command
-//! line. The part that executes jobs is below, in a crate of its own, `executive`: cores,
-//! interrupts, memory, the drivers of the scheduler, and output ([`console`], [`json`]).
-//! `docs/architecture.md` has the table that the tests hold this to.
+//! `entry` and `start` bring an image up, `app` offers the kernel's services to apps. `watch`
+//! observes a run, [`devices`] is for drivers, [`report`] describes a finished run, and [`options`]
+//! reads the command line. Below is a crate of its own, `executive`, which executes jobs: cores,
+//! interrupts, memory, the drivers of the scheduler, and output ([`console`], [`json`]). The tests
+//! check this crate against the table in `docs/architecture.md`.
 
 #![cfg_attr(not(test), no_std)]
 
@@ -78,7 +78,7 @@ pub use front::{print, println};
 #[doc(inline)]
 pub use sched_dag::engine::Run;
 
-/// Returns the number of timer interrupts that all cores have taken since boot.
+/// Returns the number of timer interrupts taken by all cores since boot.
 ///
 /// ```no_run
 /// let before = kernel::timer_interrupts();
@@ -89,12 +89,12 @@ pub fn timer_interrupts() -> u64 {
     executive::interrupts::timer_interrupts()
 }
 
-/// Reports whether functions may use AVX: the processor has it, and the word `avx=off` is
-/// not given.
+/// Reports whether functions may use AVX: the processor has AVX, and the option `avx=off` is not
+/// given.
 ///
-/// A function that uses it bears `#[target_feature(enable = "avx")]`, and its caller has
-/// asked. Any other feature, such as `avx2`, is asked of the processor
-/// (`core::arch::x86_64::__cpuid`) besides; its state is AVX's.
+/// A function using AVX carries the attribute `#[target_feature(enable = "avx")]`, and its caller
+/// has to ask first. For any other feature, such as `avx2`, the caller also has to ask the
+/// processor (`core::arch::x86_64::__cpuid`); the state of such features is saved with AVX's.
 ///
 /// ```no_run
 /// # #![allow(unsafe_code)]

@@ -1,14 +1,15 @@
-//! The report of a run when it is over: the [`Run`] that an app gets, and what its
-//! functions have left in the heap and used of their stacks.
+//! The report of a finished run: the [`Run`] for the app, the bytes its functions have left in the
+//! heap, and their use of the stacks.
 //!
-//! All of it is computed from the journal. Nothing here is called while a run goes on, but
-//! `latest`, by a panic. Reports that know no machine are the front's.
+//! Everything is computed from the journal. Nothing here is called while a run goes on, except
+//! `latest`, by a panic. Reports without knowledge of the machine are in the front.
 //!
-//! # What a fault leaves
+//! # Memory left by a fault
 //!
-//! All that a function owned when a fault ended it is lost: no destructor of it is called. All
-//! that a DAG's functions have allocated in the run, and is in use after all that belongs to the
-//! run was dropped, is either that, or was handed to somebody else, such as a `static`.
+//! When a fault ends a function, everything the function owns is lost, because its destructors are
+//! not called. Memory allocated by a DAG's functions during the run, and still in use after the run
+//! itself was dropped, is therefore either lost in this way, or was handed over, for example to a
+//! `static`.
 
 use alloc::vec;
 use core::fmt;
@@ -23,8 +24,8 @@ use sched_dag::journal::Event;
 
 pub use front::report::{Distribution, Ns};
 
-/// Returns the latest `most` events, a line each, the oldest first; none while the
-/// scheduler is at work.
+/// Returns the latest `most` events, a line each, the oldest first; none while the scheduler is at
+/// work.
 pub(crate) fn latest<const MOST: usize>() -> impl fmt::Display {
     fmt::from_fn(move |f| {
         let mut latest = [None; MOST];
@@ -52,7 +53,7 @@ pub(crate) fn latest<const MOST: usize>() -> impl fmt::Display {
     })
 }
 
-/// Prints a line for each DAG that had faults and has left something.
+/// Prints a line for each DAG that had faults and has left memory in use.
 pub(crate) fn tell_left(run: &Run) {
     let dags = run.task_set().dags();
     let mut left = vec![0; dags.len()];
@@ -74,7 +75,7 @@ pub(crate) fn tell_left(run: &Run) {
     }
 }
 
-/// Prints a line for each subtask, if that was measured.
+/// Prints a line for each subtask, if the use of stacks was measured.
 pub(crate) fn tell_stacks(run: &Run) {
     let of_bytes = contexts::stack_bytes(run.task_set());
     let dags = run.task_set().dags();

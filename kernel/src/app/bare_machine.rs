@@ -1,4 +1,4 @@
-//! The kernel as the system below an app's machine.
+//! The kernel as the platform below an app's machine.
 
 use alloc::boxed::Box;
 use core::cell::Cell;
@@ -31,9 +31,9 @@ use sched_dag::engine::{Run, RunCounts};
 /// The machine, lent to the app's function for the time of the run.
 pub type Machine = front::app::machine::Machine<BareMachine>;
 
-/// The kernel, as an app's machine knows it.
+/// The kernel, as seen by an app's machine.
 pub struct BareMachine {
-    /// Options of what people see, and say, during a run.
+    /// The options for people's view of a run, and for their commands.
     wishes: BackgroundOptions,
     /// Whether a person has ended the latest run.
     is_shut_down: Cell<bool>,
@@ -79,7 +79,7 @@ impl System for BareMachine {
         console::defer();
         execution::arm_all();
         let mut background = Background::begin(self.wishes, input.and_then(Signal::target), total);
-        // What was measured before, while booting and printing, does not count.
+        // Forget sections measured while booting and printing: only the run counts.
         let _ = interrupts_off::take_longest();
         worker::wait_in_background(|| record::step(&mut outgoing) | background.step());
         self.is_shut_down.set(background.end());
@@ -88,7 +88,7 @@ impl System for BareMachine {
         let locks = execution::lock_acquisitions().wrapping_sub(locks_before);
         let dropped = console::resume();
         if dropped > 0 {
-            // What was cut off has most likely lost the end of its line.
+            // The cut has most likely removed the end of a line.
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
         record::end_recording(outgoing, !self.is_shut_down());
@@ -138,7 +138,7 @@ impl System for BareMachine {
 
     fn seed() -> u128 {
         let second = u128::from(machine::date::unix_s().unwrap_or(0));
-        // How long a boot takes, by so fine a clock, is hardly twice the same.
+        // The time stamp is so fine that two boots hardly ever take equally long.
         second << 64 | u128::from(machine::cpu::time_stamp())
     }
 

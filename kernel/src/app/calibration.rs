@@ -1,17 +1,17 @@
-//! DAGs of the kernel's own, by which it measures what it takes itself.
+//! DAGs of the kernel's own, used to measure its overheads.
 //!
-//! Their functions do next to nothing, so what passes between their instances is the platform's.
-//! In each period an instance is at work on every core when ten DAGs are released at one instant:
-//! one step releases all of them, and preempts an instance on every core. One of the ten forks to
-//! 16 subtasks and joins, one is a chain, the others have one subtask each. Four more are due
-//! while the step has interrupts disabled, and so are released late. Then the preempted instances
-//! go on. All have budgets, so that each dispatch sets an alarm.
+//! Their functions do next to nothing, so the time between their instances is the platform's. In
+//! each period, every core is busy with an instance when ten DAGs are released at one instant. A
+//! single step releases them all, and preempts an instance on every core. Of the ten, one DAG forks
+//! to 16 subtasks and joins, one is a chain, the others have a single subtask each. Four more fall
+//! due while the step has interrupts disabled, and so are released late. Then the preempted
+//! instances go on. All have budgets, so that each dispatch sets an alarm.
 //!
-//! Once the cores are idle, two DAGs more are released next to one that loses each job to an
-//! exception, from job to job at another moment. Nobody is told of these faults.
+//! Once the cores are idle, two more DAGs are released close to a DAG whose jobs all end in an
+//! exception, in each job at a different moment. These faults are not reported.
 //!
-//! Steps are the longer, the more becomes ready at once. An app that has more of this is charged
-//! by the number (`Overheads::ready_ns`).
+//! The more instances become ready at once, the longer is the step. An app with more of them is
+//! charged by their number (`Overheads::ready_ns`).
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -32,31 +32,32 @@ use front::json;
 
 const PERIOD: Duration = Duration::from_micros(1_250);
 const JOBS: u32 = 20;
-/// How long an instance takes that is to be preempted, and when it is.
+/// The execution time of the instances to be preempted, and the time of their preemption.
 const BUSY: Duration = Duration::from_micros(400);
 const INTO_IT: Duration = Duration::from_micros(100);
 const WIDE: usize = 16;
 const LONG: usize = 16;
-/// How many DAGs are released at one instant.
+/// The number of DAGs released at the same instant.
 const AT_ONCE: u64 = 10;
-/// How many are due while that is being decided, and how far from each other.
+/// The number of DAGs due during that step, and the time between them.
 const DURING_IT: u32 = 4;
 const APART: Duration = Duration::from_micros(2);
-/// When in a period the cores are idle.
+/// The time in a period when the cores are idle.
 const IDLE: Duration = Duration::from_micros(1_100);
-/// How much later a fault comes in each job, and before what it comes in the first one.
+/// The delay of the fault from job to job, and its lead over the two releases in the first job.
 const STEP: Duration = Duration::from_micros(1);
 const BEFORE: Duration = Duration::from_micros(15);
-/// Nothing comes near it.
+/// A budget that no instance comes near.
 const BUDGET: Duration = Duration::from_secs(10);
 /// Time for the cores to get ready.
 const LEAD_NS: u64 = 100_000;
 
-/// Measures, and has the commits to come charge it with this margin.
+/// Measures the overheads, and charges them to the commits to come with this margin.
 pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
     let costs = run()?;
     let measured = Overheads::measured(&costs, margin_percent, AT_ONCE);
-    // What a network is charged stays, whatever came meanwhile: nothing else is charged before.
+    // The charge of a network stays, even with frames arriving during the measurement: nothing else
+    // has been charged before.
     let before = KERNEL.terms().overheads;
     let overheads = Overheads {
         device_ns: before.device_ns,
@@ -85,7 +86,7 @@ pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Runs them, and returns what they have shown.
+/// Runs the DAGs, and returns the measured costs.
 fn run() -> Result<MeasuredCosts, AppError> {
     KERNEL.set_calibration(true);
     let committed = finish_create_dags_with(&dags(), ConstructionPolicy::any_graph());
@@ -121,7 +122,7 @@ fn dags() -> Vec<Dag> {
         long.precede(&last, &next);
         last = next;
     }
-    // Besides the wide and the long one.
+    // The wide and the long DAG are among the ten.
     let at_once = (2..AT_ONCE).map(|_| Duration::ZERO);
     let during = (1..=DURING_IT).map(|number| APART * number);
     let singles = at_once.chain(during).map(|later| {

@@ -1,12 +1,12 @@
-//! Waiting for what another core does.
+//! Waiting for another core.
 //!
-//! A DAG needs none of it: in a DAG an instance becomes ready when its inputs are there. This is for
-//! what is no DAG, such as the publish/subscribe baseline that DAGs are compared with.
+//! A DAG needs no events: in a DAG an instance becomes ready when its inputs are there. Events
+//! serve programs outside the model, such as the publish/subscribe baseline in the comparison with
+//! DAGs.
 //!
-//! An [`Event`] is a count that only goes up: its *version*. A waiter has read the
-//! version, then looked for what it wants in vain, and now waits until the
-//! version is another one. As it read the version before it looked, nothing that
-//! happens later is missed:
+//! An [`Event`] is a count that only goes up: its *version*. A waiter reads the version, then looks
+//! for its condition. If the condition does not hold, the waiter waits until the version has
+//! changed. Because the version is read before the condition, no later change is missed:
 //!
 //! ```no_run
 //! # use kernel::{Event, Lock};
@@ -22,7 +22,8 @@
 //! # }
 //! ```
 //!
-//! A waiting core halts; its instance keeps it, as the scheduler knows nothing of this.
+//! A waiting core halts. Its instance keeps the core, because the scheduler knows nothing of the
+//! wait.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -30,7 +31,7 @@ use executive::machine::timer::{self, Alarm};
 use executive::machine::{clock, interrupt_flag, this_core, turns};
 use executive::text::console;
 
-/// Something that cores wait for.
+/// An event that cores can wait for.
 ///
 /// ```no_run
 /// use kernel::Event;
@@ -48,7 +49,7 @@ use executive::text::console;
 #[derive(Debug, Default)]
 pub struct Event {
     version: AtomicU64,
-    /// The cores that wait, as bits, or have waited since the last notice.
+    /// The cores waiting now, or since the last notice, as bits.
     waiting: [AtomicU64; 4],
 }
 
@@ -66,7 +67,7 @@ impl Event {
         self.version.load(Ordering::SeqCst)
     }
 
-    /// Raises the version: all that wait go on.
+    /// Raises the version, and so lets all waiters go on.
     pub fn notify(&self) {
         self.version.fetch_add(1, Ordering::SeqCst);
         for (word, first) in self.waiting.iter().zip((0..).step_by(64)) {
@@ -74,7 +75,7 @@ impl Event {
             while left != 0 {
                 let were_enabled = interrupt_flag::disable();
                 let core = &this_core::all()[first + left.trailing_zeros() as usize];
-                // Whoever else runs there by now is not interrupted.
+                // A core may have gone on to another context by now; leave that undisturbed.
                 if core.context().awaits(self.address()) {
                     core.wake_up();
                 }
@@ -84,26 +85,27 @@ impl Event {
         }
     }
 
-    /// Halts the calling instance's core until the version is not `seen` or the time
-    /// is `until_ns`, on the clock of [`fass::now_ns`]; `u64::MAX` is never. An idle
-    /// core sends text that waits to be printed.
+    /// Halts the calling instance's core until the version differs from `seen` or the time
+    /// `until_ns` has come, on the clock of [`fass::now_ns`]; `u64::MAX` means no limit. An idle
+    /// core sends text waiting to be printed.
     ///
-    /// No notice is lost. The context's note and the bit are set before the version is compared,
-    /// and the notifier changes the version before it takes the bits: one of them sees the
-    /// other (both orders are sequentially consistent). If it is the notifier, its
-    /// interrupt comes after interrupts were disabled here, and so ends the halt. If it finds
-    /// another context on the core, the halt has ended, and the version is compared again.
+    /// No notice is lost. The waiter sets the context's note and the bit before comparing the
+    /// version, and the notifier changes the version before taking the bits: at least one of the
+    /// two sees the other (both orders are sequentially consistent). If the notifier sees the
+    /// waiter, its interrupt comes after interrupts were disabled here, and so ends the halt. If
+    /// the notifier finds another context on the core, the halt has ended already, and the version
+    /// is compared again.
     pub fn wait(&self, seen: u64, until_ns: u64) {
         loop {
             interrupt_flag::disable();
-            // Read in every round: in between, the instance may have moved.
+            // Read in every round: in between, the instance may have moved to another core.
             let core = this_core::get();
             let here = core.index;
             let word = &self.waiting[(here / 64) as usize];
             core.context().note_awaited(self.address());
             word.fetch_or(1 << (here % 64), Ordering::SeqCst);
             if self.version() != seen || clock::now_ns() >= until_ns {
-                // The bit stays, and means nothing without the note.
+                // The bit stays set, but without the note it has no effect.
                 core.context().note_awaited(0);
                 turns::end_hold(core);
                 turns::enter();

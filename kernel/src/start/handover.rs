@@ -1,10 +1,8 @@
-//! From the handover by `boot` to the app's function, and its end.
+//! The way from the handover by `boot` to the app's function, and the machine's end.
 //!
-//! On the way stand the line of kind `boot`, which says what machine this is, and warnings of what
-//! in
-//! it harms real time. A hypervisor hides what the processor states of itself, so on one nothing
-//! is said of that but
-//! in the line.
+//! Prints the `boot` line, a description of the machine, and warns of hardware that harms real
+//! time. Under a hypervisor, which hides the processor's statements about itself, the line alone
+//! reports them.
 
 use alloc::borrow::Cow;
 use alloc::format;
@@ -40,21 +38,22 @@ use crate::watch::{self, panic};
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), AppError>;
 
-/// The last processor that can be reached without x2APIC; the next id means all of them.
+/// The highest APIC id reachable without x2APIC; the next id means all processors.
 const LAST_SHORT_ID: u32 = 254;
 
 /// The stack of an interrupt handler, or of an exception's report, in bytes.
 const HANDLER_STACK: u64 = 16 * 1024;
 
-/// Brings up memory and interrupts, then goes on on the core's own stack: the
-/// boot stack has no guard page.
+/// Brings up memory and interrupts, then continues on the core's own stack, because the boot stack
+/// has no guard page.
 #[allow(clippy::too_many_lines, reason = "it states the order of the steps")]
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
     serial::FIRST.initialize();
-    // What an app's wire gets from now on waits there.
+    // From now on, the port's FIFO holds bytes that arrive for an app's wire.
     serial::SECOND.initialize();
     let screen = screen_pages(info);
-    // The boot table maps no more; what is to be said before the kernel's shows later.
+    // The boot table maps no address beyond; text for a higher screen shows once the kernel's table
+    // is in use.
     let is_early = screen.end <= 1 << 32;
     if is_early {
         show_text(info, &screen);
@@ -83,8 +82,8 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         }
     });
     if info.value("avx") != Some("off") {
-        // SAFETY: the boot table maps all memory writable, and this is the boot processor's
-        // only way.
+        // SAFETY: the boot table maps all memory writable, only the boot processor runs, and it has
+        // no interrupt table before `become_core`.
         unsafe { avx::turn_on() };
     }
     let platform = read_platform(info);
@@ -95,9 +94,10 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         println!("warning: the memory map has more than {MAX_REGIONS} ranges; some are not used");
     }
     let module = module(info);
-    // SAFETY: 1. `boot` handed over with its table in use and the machine's
-    // map. 2. This is the boot processor's only way, and nothing was allocated.
-    // 3. `module` made sure of it.
+    // SAFETY: 1. `boot` handed over with its table in use and the machine's map. 2. Only the boot
+    // processor runs, it comes here once, and nothing was allocated before. 3. `module` made sure
+    // that the module lies in memory. 4. The tables name the registers, and `screen_pages` returned
+    // the whole pages of a screen.
     let layout = unsafe {
         memory::initialize(
             info.memory.as_slice(),
@@ -132,11 +132,11 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         layout,
         probes,
     };
-    // SAFETY: the stack is that of the context which this core runs first.
+    // SAFETY: the stack belongs to the context that this core runs first.
     unsafe { cpu::continue_on_stack(stack, &start, start_cores) }
 }
 
-/// Returns the addresses of all registers in memory, for their pages to be mapped.
+/// Returns the addresses of all memory-mapped registers, so that their pages can be mapped.
 fn devices(platform: &Platform) -> List<u64, { MAX_IO_APICS + 4 }> {
     let mut devices = List::new(0);
     let apics = platform.io_apics.as_slice().iter().copied();
@@ -149,7 +149,7 @@ fn devices(platform: &Platform) -> List<u64, { MAX_IO_APICS + 4 }> {
     devices
 }
 
-/// Returns the pages of the screen, if there is one.
+/// Returns the pages of the screen, if there is a screen.
 #[inline(never)]
 fn screen_pages(info: &BootInfo) -> Range<u64> {
     let range = info.screen.as_ref().map(Framebuffer::range);
@@ -157,17 +157,17 @@ fn screen_pages(info: &BootInfo) -> Range<u64> {
     pages.unwrap_or(0..0)
 }
 
-/// Shows text from now on on the screen that takes these pages.
+/// Shows text on the screen with these pages from now on.
 #[inline(never)]
 fn show_text(info: &BootInfo, pages: &Range<u64>) {
     if let Some(buffer) = info.screen.filter(|_| !pages.is_empty()) {
-        // SAFETY: 1. The pages are mapped by the table in use and by the kernel's, and lie
-        // in no memory (`pages_of_screen`). 2. `multiboot2` takes no other screen.
+        // SAFETY: 1. The pages are mapped by the table in use and by the kernel's, and lie in no
+        // memory (`pages_of_screen`). 2. `multiboot2` takes no other screen.
         unsafe { screen::initialize(buffer) };
     }
 }
 
-/// Returns the first module that the loader left in memory.
+/// Returns the first module left in memory by the loader.
 fn module(info: &BootInfo) -> Option<Module> {
     let module = *info.modules.as_slice().first()?;
     let (map, image) = (info.memory.as_slice(), boot_entry::image::whole());
@@ -180,24 +180,24 @@ fn module(info: &BootInfo) -> Option<Module> {
     Some(module)
 }
 
-/// Returns the bytes of the loader's module, once it is mapped.
+/// Returns the bytes of the loader's module, once the module is mapped.
 fn module_bytes(info: &'static BootInfo) -> Option<&'static [u8]> {
     let module = module(info)?;
     let length = usize::try_from(module.end - module.start).ok()?;
     let start = (memory::MODULE_WINDOW + module.start) as *const u8;
-    // SAFETY: `memory::initialize` mapped the module as constant in its window, for good,
-    // and kept its pages from the frames: nobody writes there.
+    // SAFETY: `memory::initialize` mapped the module read-only in its window, for good, and kept
+    // its pages from the frames: nobody writes there.
     Some(unsafe { core::slice::from_raw_parts(start, length) })
 }
 
-/// The values that the boot processor takes along to its own stack.
+/// The values taken along by the boot processor to its own stack.
 struct BootHandover {
     info: &'static BootInfo,
     name: &'static str,
     app: App,
     platform: Platform,
     layout: memory::MemoryLayout,
-    /// Whether it is the probe that runs, and no app.
+    /// Whether the probe runs, and no app.
     probes: bool,
 }
 
@@ -213,7 +213,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     } = start;
     let rate = measure_time(info, platform);
     let cores = this_core::all().len();
-    // What time means is the host's choice.
+    // The host chooses the meaning of time.
     if info.value("mode") == Some("deterministic") {
         counted_time::enable();
         turns::enable();
@@ -229,7 +229,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     if !*probes {
         heartbeat::set_heartbeats(0);
     }
-    // A second installation would come from a second boot, which there is not.
+    // A second installation would require a second boot, so this cannot fail.
     let _ = fass::platform::install(&KERNEL);
     announce(info, name, layout.total_bytes, &rate);
     finish(if *probes {
@@ -239,7 +239,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     })
 }
 
-/// Measures time by a clock of known rate, which the machine must have.
+/// Measures time by a clock of known rate; the machine must have such a clock.
 fn measure_time(info: &BootInfo, platform: &Platform) -> TscRate {
     // SAFETY: the tables name these registers, and `devices` had them mapped.
     let clocks = unsafe { KnownClock::all(platform) };
@@ -254,13 +254,12 @@ fn measure_time(info: &BootInfo, platform: &Platform) -> TscRate {
     })
 }
 
-/// Starts the other cores, all of which have to come up.
+/// Starts the other cores. Panics unless all of them come up.
 fn start_others(info: &BootInfo, layout: &memory::MemoryLayout, cores: usize) {
     let page = memory::trampoline_page(info.memory.as_slice(), info.modules.as_slice());
     let page = page.expect("no page below 640 KiB is free for processors to start at");
-    // SAFETY: 1. The table identity-maps the image, and all stacks are mapped
-    // in it. 2. `trampoline_page` returns usable memory, which is mapped, and which
-    // frames are not taken from.
+    // SAFETY: 1. The table identity-maps the image, and all stacks are mapped in it. 2.
+    // `trampoline_page` returns usable memory that is mapped, and that no frame is taken from.
     let others = unsafe { processors::start_others(layout.root_table, page, other_core) };
     assert!(
         others as usize + 1 == cores,
@@ -278,21 +277,21 @@ fn start_others(info: &BootInfo, layout: &memory::MemoryLayout, cores: usize) {
 }
 
 fn read_platform(info: &BootInfo) -> Platform {
-    // SAFETY: 1. Until `memory::initialize` the boot table is in use, and the view ends
-    // with this function. 2. Nothing writes to the firmware's tables.
+    // SAFETY: 1. Until `memory::initialize` the boot table is in use, and the view ends with this
+    // function. 2. Nothing writes to the firmware's tables.
     let memory = unsafe { LowMemory::new() };
     acpi::read(&memory, info.rsdp).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Returns the APIC ids of all processors by their numbers.
+/// Returns the APIC ids of all processors in the order of their numbers.
 fn by_number(platform: &Platform) -> impl Iterator<Item = u32> {
     let own = local_apic::id();
     let ids = platform.apic_ids.as_slice().iter().copied();
     core::iter::once(own).chain(ids.filter(move |id| *id != own))
 }
 
-/// Returns the APIC ids of the processors that become cores. Faults in the words are refused
-/// later.
+/// Returns the APIC ids of the processors that become cores. Wrong options are refused later, when
+/// they can be reported as such.
 fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
     let is_right = |list: &&str| settings::check(list, by_number(platform).count()).is_ok();
     let list = info.value("cores").filter(is_right);
@@ -308,7 +307,7 @@ fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
     settings::select(by_number(platform), list, bits.unwrap_or(0))
 }
 
-/// Returns what each core needs, the boot processor's first.
+/// Returns the stacks each core needs, the boot processor's first.
 fn with_stacks(ids: Vec<u32>) -> impl Iterator<Item = (u32, CoreStacks)> {
     ids.into_iter().zip(0..).map(|(id, index)| {
         let stacks = stacks(index == 0);
@@ -328,7 +327,7 @@ fn stacks(is_boot_processor: bool) -> Result<CoreStacks, MapError> {
     })
 }
 
-/// Where every other core begins: it works until the machine stops.
+/// The entry of every other core, which then works until the machine stops.
 extern "C" fn other_core(apic_id: u32) -> ! {
     processors::arrive(processors::become_core(apic_id));
     interrupt::begin_work()
@@ -373,7 +372,7 @@ fn finish(result: Result<(), AppError>) -> ! {
     power::exit(told)
 }
 
-/// Says what machine this is, and of what an app has to beware.
+/// Prints the description of the machine, and warnings for the app's users.
 pub(super) fn announce(info: &BootInfo, app: &str, memory_bytes: u64, rate: &TscRate) {
     let all = this_core::all();
     let cores = all.len();

@@ -1,9 +1,9 @@
-//! The way from the handover by `boot` to the app's function, and the machine's end.
+//! The steps from the handover by `boot` to the app's function, and the machine's end.
 //!
-//! `handover` goes that way. `settings` takes the kernel's own words of the command line, and
-//! `selection` those that say which processors become cores; `announcement` says what machine it
-//! is, and `probe` is what the image does in place of an app if a word asks for it. All of the
-//! kernel but its entry may be named here: this is where it is put together.
+//! `handover` takes the steps, and describes the machine in the `boot` line. `settings` takes the
+//! kernel's own options, among them those that choose the processors to become cores. `probe`
+//! replaces the app if an option asks for it. All parts of the kernel but its entry may be named
+//! here, because this is where the kernel is put together.
 
 #[allow(unsafe_code, reason = "the way up to the first safe state")]
 mod handover;

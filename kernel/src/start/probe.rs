@@ -1,15 +1,14 @@
-//! The probe: whether this machine does what the kernel needs, asked before anything
-//! relies on it.
+//! The probe: checks that the machine does what the kernel needs, before anything relies on it.
 //!
-//! With the word `probe=on` the image runs no app. A *token* goes round the cores
-//! instead. The core that has it sets its timer; the timer's interrupt wakes up the
-//! next core, and the wake-up's interrupt hands that core the token. The round ends when
-//! core 0 is woken up, so each core has then taken one timer interrupt and one wake-up
-//! from the core before it (on one core: from itself). At each step a sum is made in
-//! floating point, in the SSE registers that all compiled code uses.
+//! With the option `probe=on` the image runs no app. Instead a *token* goes round the cores. The
+//! core with the token sets its timer. The timer's interrupt wakes the next core, and the wake-up's
+//! interrupt hands that core the token. The round ends when core 0 is woken up. By then each core
+//! has taken a timer interrupt and a wake-up from the core before it (on a single core: from
+//! itself). At each step a sum is formed in floating point, in the SSE registers used by all
+//! compiled code.
 //!
-//! The host boots this before it chooses KVM (`scripts/tool/src/probe.rs`): there are hosts
-//! where a guest of a few instructions runs and a kernel does not.
+//! The host boots the probe before choosing KVM (`scripts/tool/src/probe.rs`): on some hosts a
+//! guest of a few instructions runs, but a kernel does not.
 
 use alloc::format;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -23,7 +22,7 @@ use executive::run::contexts;
 use front::app::ending::AppError;
 use front::json;
 
-/// Handlers in place of the scheduler's.
+/// The handlers that replace the scheduler's.
 pub(crate) const HANDLERS: Handlers = Handlers {
     timer: pass_token_on,
     wake: take_token,
@@ -34,23 +33,23 @@ pub(crate) const HANDLERS: Handlers = Handlers {
     release: contexts::give_back,
 };
 
-/// How long each core keeps the token.
+/// The time for which each core keeps the token, in nanoseconds.
 const HOLD_NS: u64 = 10_000;
 
-/// How long the whole round may take: far more than it needs on a busy host.
+/// The limit on the whole round, in nanoseconds: far more than a busy host needs.
 const LIMIT_NS: u64 = 2_000_000_000;
 
-/// The steps that the token has made: two a core, its timer and the next one's wake-up.
+/// The steps made by the token: two a core, its timer and the next core's wake-up.
 static STEPS: AtomicU32 = AtomicU32::new(0);
 /// The sum of the numbers of these steps, as the bits of an `f64`.
 static SUM: AtomicU64 = AtomicU64::new(0);
 
-/// Sends the token round from core 0, which executes this, and says how far it came.
+/// Sends the token round from the executing core 0, and reports how far the token came.
 pub(crate) fn run() -> Result<(), AppError> {
     let cores = this_core::all().len();
     let start_ns = clock::now_ns();
     timer::set(Alarm::Hold, start_ns + HOLD_NS);
-    // Not halted: the interrupt that would end the halt may be what is missing.
+    // Do not halt: the interrupt that would end the halt may be the missing one.
     while steps() < 2 * cores && clock::now_ns() - start_ns < LIMIT_NS {
         cpu::relax();
     }
@@ -67,7 +66,7 @@ fn steps() -> usize {
     STEPS.load(Ordering::Acquire) as usize
 }
 
-/// Says what is missing, if anything is.
+/// Names the missing part, if there is one.
 fn judge(cores: usize, steps: usize, sum: f64) -> Result<(), AppError> {
     let (core, next) = (steps / 2, (steps / 2 + 1) % cores);
     let missing = match steps % 2 {
@@ -76,7 +75,7 @@ fn judge(cores: usize, steps: usize, sum: f64) -> Result<(), AppError> {
             if sum.to_bits() == right.to_bits() {
                 return Ok(());
             }
-            // Without the numbers: printing floating point would weigh 18 KiB.
+            // The message has no numbers: printing floating point would add 18 KiB to the image.
             "a core adds up wrongly in floating point".into()
         }
         0 => format!("core {core} took no timer interrupt"),
@@ -85,7 +84,7 @@ fn judge(cores: usize, steps: usize, sum: f64) -> Result<(), AppError> {
     Err(AppError::Failure(missing))
 }
 
-/// Handles the timer of the core that has the token.
+/// Handles the timer of the core with the token.
 fn pass_token_on(_: &mut Interrupted) {
     if timer::take_due(Alarm::Hold, clock::now_ns()) {
         step();
@@ -96,24 +95,24 @@ fn pass_token_on(_: &mut Interrupted) {
     timer::arm_earliest();
 }
 
-/// Handles the wake-up that comes with the token.
+/// Handles the wake-up that brings the token.
 fn take_token(_: &mut Interrupted) {
     step();
-    // Core 0 has begun the round.
+    // Core 0 began the round, so the token's return ends it.
     if this_core::get().index != 0 {
         timer::set(Alarm::Hold, clock::now_ns() + HOLD_NS);
     }
 }
 
 fn step() {
-    // Only the core with the token is here.
+    // Only the core with the token comes here, so the two stores need not be atomic together.
     let step = STEPS.load(Ordering::Acquire);
     let sum = f64::from_bits(SUM.load(Ordering::Acquire)) + f64::from(step);
     SUM.store(sum.to_bits(), Ordering::Release);
     STEPS.store(step + 1, Ordering::Release);
 }
 
-/// The work of every core but core 0: it halts.
+/// The work of every core but core 0: halting.
 fn rest() -> Parked {
     loop {
         interrupt_flag::enable_and_halt();

@@ -1,53 +1,55 @@
-//! The kernel's own words of the command line, which every app has.
+//! The kernel's own options of the command line, known to every app.
 //!
-//! | word | meaning | default |
-//! | --- | --- | --- |
-//! | `policy=static\|edf` | how ready instances are ordered | `static` |
-//! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
-//! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
-//! | `overheads_ns=S,D,I,R,C,E` | what a commit charges: context switch, dispatch, interrupt, for
-//! each instance that becomes ready, and a device's interrupt each E ns | 0,0,0,0,0,0 |
-//! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
-//! | `keep=N` | the record of the boot is sent, to QEMU's debug port or in lines: commits, events,
-//! times, and what crosses the edge of the run, from a buffer of N KiB; 0: it is not | 0 |
-//! | `events=off\|on` | without `keep`: commits, events and times are sent, when a run is
-//! over | `off` |
-//! | `latest=N` | without both, where there is a debug port: the inputs of each DAG's last N
-//! jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
-//! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
-//! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all
-//! states are recorded | all jobs |
-//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs,
-//! or a quarter of the free memory |
-//! | `bounds=judge\|observe` | whether a run fails that exceeds a proven bound | `judge` |
-//! | `log=off\|error\|warn\|info\|debug` | up to which level lines of the log are said | `info` |
-//! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner |
-//! `halt` |
-//! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or
-//! how much each subtask uses of its stack | `nothing` |
-//! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk
-//! to the kernel; `echo` sends back what is typed | `off` |
-//! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
-//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and
-//! computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is
-//! judged | |
-//! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see
-//! `probe` | `off` |
-//! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it
-//! holds from the start on | `halt` |
-//! | `clock=acpi-pm-timer\|hpet\|local-apic-1ghz\|pit` | by which clock time is measured at the
-//! start | the first of them that counts |
-//! | `avx=on\|off` | whether functions can use AVX, where the processor has it | `on` |
-//! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left
-//! them so, or an id asks for it, they are | `off` |
-//! | `cores=0-3,6` | which processors become cores, by their numbers | all |
-//! | `smt=on\|off` | whether siblings, processors that share a physical core, all become cores |
-//! `on` |
+//! - `policy=static|edf`: the order of ready instances. Default: `static`.
+//! - `preemption=on|off`: whether a started instance may lose its core. Default: `on`.
+//! - `budget_factor=N`: the budget of a subtask that states only a WCET, in WCETs; 0: no budget.
+//!   Default: 10.
+//! - `overheads_ns=S,D,I,R,C,E`: the overheads charged by a commit: context switch, dispatch,
+//!   interrupt, each instance becoming ready, and a device's interrupt every E ns. Default:
+//!   0,0,0,0,0,0.
+//! - `wcets=N`: the first N bytes of the loader's module are observed WCETs. Default: 0.
+//! - `keep=N`: sends the record of the boot, to QEMU's debug port or in lines: commits, events,
+//!   times, and the data crossing the edge of the run, from a buffer of N KiB; 0: no record.
+//!   Default: 0.
+//! - `events=off|on`: without `keep`, sends commits, events and times after each run. Default:
+//!   `off`.
+//! - `latest=N`: without both, and with a debug port, keeps the inputs of each DAG's last N jobs,
+//!   64 at most, and sends them after a fault; 0: keeps none. Default: 16.
+//! - `replay=N`: the next N bytes of the loader's module are a recording to be replayed. Default:
+//!   0.
+//! - `from=DAG/JOB`: the replay begins with that job, or with the last job before it whose states
+//!   are all recorded. Default: all jobs.
+//! - `trace_events=N`: the most events kept by a run's journal; 0: none. Default: as many as the
+//!   run needs, or as fit into a quarter of the free memory.
+//! - `bounds=judge|observe`: whether exceeding a proven bound makes a run fail. Default: `judge`.
+//! - `log=off|error|warn|info|debug`: the last level of the log that is printed. Default: `info`.
+//! - `idle=halt|poll`: whether idle cores halt, or poll for work, which wakes them sooner. Default:
+//!   `halt`.
+//! - `measure=nothing|interrupts|stacks`: whether to measure sections without interrupts, or each
+//!   subtask's use of its stack. Default: `nothing`.
+//! - `console=off|stop|on|echo`: whether a person can end a run by ctrl-C (`stop`), and talk to the
+//!   kernel (`on`); `echo` also sends back typed bytes. Default: `off`.
+//! - `status=N`: the seconds between two status lines of a run; 0: none. Default: 0.
+//! - `mode=...`: the host's name for the meaning of time. `deterministic`: timers settle and
+//!   computing cores take turns, see `machine::counted_time` and `turns`. `threads`: no bound is
+//!   judged.
+//! - `probe=off|on`: whether the image runs no app and only tests its machine, see `probe`.
+//!   Default: `off`.
+//! - `end=halt|off|reset`: the machine's action after the verdict, if no host ends it; takes effect
+//!   at the very start. Default: `halt`.
+//! - `clock=acpi-pm-timer|hpet|local-apic-1ghz|pit`: the clock used to measure time at the start.
+//!   Default: the first of them that counts.
+//! - `avx=on|off`: whether functions can use AVX, on a processor with AVX. Default: `on`.
+//! - `x2apic=off|on`: whether local APICs are put into x2APIC mode; they are in any case if the
+//!   firmware has left them so, or an id requires it. Default: `off`.
+//! - `cores=0-3,6`: the processors to become cores, by their numbers. Default: all.
+//! - `smt=on|off`: whether all siblings, processors that share a physical core, become cores.
+//!   Default: `on`.
 //!
-//! # Which of the machine's processors become cores: the words `cores=` and `smt=`
+//! # The processors that become cores: the options `cores=` and `smt=`
 //!
-//! A processor's *number* is its place in ACPI's table, but the one that boots is number 0, and
-//! always a core. Siblings share one physical core; of these `smt=off` keeps the first.
+//! A processor's *number* is its place in ACPI's table, except that the boot processor has number
+//! 0, and is always a core. Siblings share a physical core; `smt=off` keeps the first of them.
 
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
@@ -61,16 +63,17 @@ use front::options::{CommandLine, UsageError, whole_number};
 
 use crate::watch::background::{BackgroundOptions, ConsoleEcho};
 
-/// The settings of runs to come that the command line states; all else is set where it belongs.
+/// The settings of runs to come, as stated by the command line; settings for other parts take
+/// effect there at once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunSettings {
-    /// The settings that all platforms share.
+    /// The settings shared by all platforms.
     pub(crate) chosen: RunTerms,
-    /// Options of what people see, and say.
+    /// The options for people's view of a run, and for their commands.
     pub(crate) wishes: BackgroundOptions,
 }
 
-/// Has the runs to come recorded or replayed, if the words say so. Returns what is left of the
+/// Has the runs to come recorded or replayed, if the options say so. Returns the rest of the
 /// module.
 pub(crate) fn set_wish(
     options: &CommandLine<'static>,
@@ -114,9 +117,9 @@ pub(crate) fn set_wish(
     Ok(module)
 }
 
-/// Takes the kernel's words and does what they say.
+/// Takes the kernel's options and applies them.
 ///
-/// The machine has so many `processors`, cores or not.
+/// The machine has this many `processors`, cores or not.
 pub(crate) fn apply(
     options: &CommandLine<'_>,
     processors: usize,
@@ -136,19 +139,20 @@ pub(crate) fn apply(
         ("stacks", stacks::enable),
     ];
     options.choice("measure", &measures)?();
-    // What is right was taken at the start, so that a panic ends likewise.
+    // Already applied at the start, so that a panic ends the machine likewise; here wrong values
+    // are refused.
     options.choice("end", &[("halt", ()), ("off", ()), ("reset", ())])?;
-    // So were these, and what is wrong has been refused.
+    // These were applied at the start, too, where wrong values were refused.
     options.text("clock");
     options.text("mode");
-    // As were these; what is wrong is refused here.
+    // These were applied at the start as well; here wrong values are refused.
     options.choice("avx", &[("on", ()), ("off", ())])?;
     options.choice("x2apic", &[("off", ()), ("on", ())])?;
     options.choice("smt", &[("on", ()), ("off", ())])?;
     if let Some(list) = options.text("cores") {
         check(list, processors)?;
     }
-    // `on` never comes here: the probe runs in place of all this.
+    // `on` never gets here: the probe replaces all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
     let status_s = options.number("status", 0..=86_400, 0)?;
     let consoles = [
@@ -168,8 +172,9 @@ pub(crate) fn apply(
     })
 }
 
-/// Returns the APIC ids of those that become cores, of all processors by their numbers. Siblings
-/// have ids that differ in the lowest `sibling_bits` only; none are, if that is 0.
+/// Returns the APIC ids of the processors that become cores, from the ids of all processors in the
+/// order of their numbers. The ids of siblings differ in the lowest `sibling_bits` only; with 0
+/// bits there are no siblings.
 pub(super) fn select(
     ids: impl Iterator<Item = u32>,
     list: Option<&str>,
@@ -185,7 +190,7 @@ pub(super) fn select(
     selected
 }
 
-/// Counts those that have a sibling before them.
+/// Counts the ids with a sibling before them.
 pub(super) fn siblings(ids: &[u32], sibling_bits: u32) -> usize {
     let has_one = |place: &usize| is_sibling(&ids[..*place], ids[*place], sibling_bits);
     (0..ids.len()).filter(has_one).count()
@@ -196,7 +201,7 @@ fn is_sibling(ids: &[u32], id: u32, sibling_bits: u32) -> bool {
         .any(|other| other >> sibling_bits == id >> sibling_bits)
 }
 
-/// Makes sure that a list names some of so many processors, the first one among them.
+/// Checks that a list names some of `processors` processors, the first among them.
 pub(super) fn check(list: &str, processors: usize) -> Result<(), UsageError> {
     let last = processors.saturating_sub(1) as u64;
     let is_right = |part: Option<RangeInclusive<u64>>| {
@@ -215,7 +220,7 @@ fn names(list: &str, number: u64) -> bool {
     parts(list).flatten().any(|part| part.contains(&number))
 }
 
-/// Returns the ranges of a list; nothing in place of what is none.
+/// Returns the ranges of a list, and `None` in place of each malformed range.
 fn parts(list: &str) -> impl Iterator<Item = Option<RangeInclusive<u64>>> {
     list.split(',').map(|part| {
         let (first, last) = part.split_once('-').unwrap_or((part, part));

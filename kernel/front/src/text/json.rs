@@ -1,4 +1,4 @@
-//! The only printer of machine lines: a line is a single JSON object, with `{` in column 0.
+//! The only printer of machine lines: a line is a JSON object, with `{` in column 0.
 //!
 //! `docs/formats.md` lists the kinds. A closure that names the fields describes an object, so
 //! printing an object allocates nothing.
@@ -94,7 +94,7 @@ impl JsonObject<'_, '_> {
         })
     }
 
-    // Each of these serves all callers: an image has little room, and printing lines is not urgent.
+    // Each of these serves all callers: an image has little room, and printing is not urgent.
 
     #[inline(never)]
     fn whole(&mut self, name: &str, value: u64) -> &mut Self {
