@@ -1,10 +1,10 @@
-//! The end of a kernel that cannot go on: what happened, where, on which core.
+//! The end of a kernel that cannot go on: prints what happened, where, and on which core.
 //!
-//! The core that panics stops all others first, so the report is not torn
-//! apart and nothing runs on with broken data. A panic during the report ends
-//! the run with what was said so far. Faults of subtasks do not get here:
-//! `containment` ends their DAG instead. A `drop` of what a run has left behind does, after the
-//! run: that is one line, which names the DAG.
+//! The panicking core stops all others first, so that nothing tears the report apart or runs on
+//! with broken data. A panic during the report ends the run with the output so far. Faults of
+//! subtasks do not get here: `containment` ends their DAG instead. A failing `drop` of a value left
+//! behind by a run does get here, after the run; the report is then a single line with the DAG's
+//! name.
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
@@ -22,16 +22,16 @@ use fass::edge::Excerpt;
 use front::app::ending::AppExit;
 use front::json;
 
-/// The most recent events of this core that a report shows.
+/// The most recent events of this core shown in a report.
 const EVENTS_SHOWN: usize = 16;
 
-/// How much of the message is shown, in bytes.
+/// The most bytes of the message shown.
 const MESSAGE_BYTES: usize = 2048;
 
-/// The core whose report this is, `NOBODY` before there is one.
+/// The core reporting at present, or `NOBODY`.
 static REPORTING: AtomicU32 = AtomicU32::new(NOBODY);
 const NOBODY: u32 = u32::MAX;
-/// Stands for a core whose report has failed.
+/// Stands for a core after a failed report.
 const FAILED: u32 = NOBODY - 1;
 
 /// Ends the subtask that panics, or else the run.
@@ -49,11 +49,11 @@ pub(crate) fn exception(exception: &CpuException<'_>, interrupted: &mut Interrup
     }
 }
 
-/// The longest that what one DAG has left behind may take to be dropped.
+/// The longest time for dropping the values left behind by a single DAG, in nanoseconds.
 const LONGEST_CLEARING_NS: u64 = 5_000_000_000;
 
-/// Ends the kernel if the `drop` of something that a run has left behind does not return. In
-/// core 0's heartbeat.
+/// Ends the kernel if the `drop` of a value left behind by a run does not return. Called in core
+/// 0's heartbeat.
 pub(super) fn beat(now_ns: u64) {
     let took_ns = execution::look_at_clearing(|_, since_ns| now_ns.saturating_sub(since_ns));
     if took_ns > Some(LONGEST_CLEARING_NS) {
@@ -74,7 +74,7 @@ fn die(
     let mine = REPORTING.compare_exchange(NOBODY, index, Ordering::AcqRel, Ordering::Acquire);
     match mine {
         Ok(_) => {}
-        // What the message is made of panics itself.
+        // This core is reporting already: formatting its message has panicked.
         Err(reporting) if reporting == index => {
             REPORTING.store(FAILED, Ordering::Release);
             write_in_emergency(format_args!(
@@ -83,7 +83,7 @@ fn die(
             give_verdict(&what)
         }
         Err(FAILED) => power::exit(AppExit::Failure),
-        // Another core reports, and is about to stop this one.
+        // Another core is reporting, and is about to stop this one.
         Err(_) => cpu::halt_forever(),
     }
     if core.is_some() {
@@ -138,7 +138,7 @@ fn die(
     give_verdict(&what)
 }
 
-/// Says that the run has failed, and ends it.
+/// Reports that the run has failed, and ends it.
 fn give_verdict(what: &dyn Display) -> ! {
     let verdict = json::line("verdict", |line| {
         line.text("status", "failure").text("reason", what);

@@ -1,30 +1,30 @@
-//! The background: work of core 0 for people while a run goes on, when it has nothing else to do.
+//! The background: work of core 0 for people during a run, when it has nothing else to do.
 //!
-//! It prints progress, what functions say in the log, the faults that were contained, and the status
-//! if the command line asks for it, and holds the console's conversation. All this is core 0's background, which is suspended
+//! The background prints progress, the log's lines, contained faults and, if requested on the
+//! command line, the status. It also holds the console's conversation. The background is suspended
 //! whenever the core has an instance to run.
 //!
-//! It is not suspended within a *slice* of the status or the console, which holds a lock, with
-//! interrupts off: one line, and for the status a look at what the journal has of the time
-//! since the last one, 2,048 events at most. A release, or an instance that another core
-//! hands over, may come later by that; `status` waits for a time at which no event is near.
+//! It is not suspended within a *slice* of the status or the console. A slice holds a lock, with
+//! interrupts off, for a single line, and for the status also a look at the journal since the last
+//! line, 2,048 events at most. A release, or an instance handed over by another core, may be late
+//! by one slice; `status` waits for a time without events nearby.
 //!
-//! Under overload the background may never run again, and then a person wants most to see
-//! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat
-//! does the slices instead, and tells of a fault where nothing has a bound, which that would delay
-//! beyond it. The heartbeat also notices that an instance keeps its core for long ([`stall`]).
+//! Under overload the background may never run again, just when a person most wants to see the run,
+//! and to stop it. So if the background has not run for [`STARVED_NS`], core 0's heartbeat takes
+//! over the slices. It also reports a fault, but only in a run without bounds, because the report
+//! might delay the run beyond a bound. The heartbeat also notices an instance that keeps its core
+//! for long ([`stall`]).
 //!
-//! # Bytes from the serial port where no conversation takes them
+//! # Bytes from the serial port outside a conversation
 //!
-//! They come as events, each of which raises the signal of a sporadic DAG; and one ends the run in
-//! order before its time. That byte is what ctrl-C is on a serial line (ETX in ASCII). With
-//! `console=stop` core 0's
-//! heartbeat looks for it, four times a second, so it counts however busy the cores are.
+//! Such bytes are events: each raises the signal of a sporadic DAG. A single byte value ends the
+//! run early, but in order: ctrl-C on a serial line (ETX in ASCII). With `console=stop` core 0's
+//! heartbeat looks for that byte, four times a second, so ctrl-C works however busy the cores are.
 //!
-//! For events the port is looked at by core 0's background, each time that the core wakes up and
-//! has nothing else to do, and at least every [`PERIOD_NS`] if it is idle. The byte itself does
-//! not matter, but for the one that ends the run. How fast the bytes come does not either: the
-//! DAG's minimum inter-arrival time is enforced by the scheduler.
+//! For events, core 0's background polls the port each time the core wakes up and has nothing else
+//! to do, and at least every [`PERIOD_NS`] on an idle core. The value of a byte does not matter,
+//! except for ctrl-C. Nor does the rate of the bytes: the scheduler enforces the DAG's minimum
+//! inter-arrival time.
 //!
 //! [`PERIOD_NS`]: front::shell::PERIOD_NS
 
@@ -49,24 +49,24 @@ use status::{RunProgress, StatusPrinter};
 /// Options of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BackgroundOptions {
-    /// Whether there is a console, and whether it sends back what is typed.
+    /// Whether there is a console, and whether it sends back typed bytes.
     pub(crate) console: Option<ConsoleEcho>,
-    /// Whether one byte ends the run, in order.
+    /// Whether ctrl-C ends the run, in order.
     pub(crate) stops: bool,
-    /// The time between two lines of kind `status`; 0: none.
+    /// The time between two lines of kind `status`, in nanoseconds; 0: none.
     pub(crate) status_ns: u64,
 }
 
-/// Whether the console sends back what is typed.
+/// Whether the console sends back typed bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ConsoleEcho {
-    /// Each byte is sent back, for a terminal that does not show it by itself.
+    /// Each byte is sent back, for a terminal that does not show typed bytes by itself.
     On,
-    /// Nothing is sent back: the terminal shows what is typed.
+    /// Nothing is sent back: the terminal shows typed bytes.
     Off,
 }
 
-/// For how long the background may not run before the heartbeat helps out.
+/// The longest time without the background before the heartbeat helps out.
 const STARVED_NS: u64 = 200_000_000;
 
 /// Work done in slices, by the background or by the heartbeat.
@@ -80,10 +80,10 @@ static SLICED: SpinLock<SlicedWork> = SpinLock::new(SlicedWork {
     session: None,
 });
 
-/// When the background ran last, on the clock; `u64::MAX` outside runs.
+/// The time of the background's latest step, on the clock; `u64::MAX` outside runs.
 static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Whether the heartbeat may tell of a fault: nothing in the run has a bound.
+/// Whether the heartbeat may report a fault: nothing in the run has a bound.
 static TELLS_FAULTS: AtomicBool = AtomicBool::new(false);
 
 impl SlicedWork {
@@ -96,8 +96,7 @@ impl SlicedWork {
     }
 }
 
-/// Does in core 0's heartbeat what is its own, and a slice if the background does not
-/// come to it.
+/// Does the work of core 0's heartbeat, and a slice if the background is starved.
 pub(crate) fn beat(now_ns: u64) {
     stall::beat(now_ns);
     look_for_end();
@@ -113,19 +112,19 @@ pub(crate) fn beat(now_ns: u64) {
     console::send_what_goes_at_once();
 }
 
-/// The background of one run.
+/// The background of a single run.
 pub(crate) struct Background {
     progress: RunProgress,
     listener: Option<ByteListener>,
     /// Whether [`SLICED`] has something to do.
     is_sliced: bool,
-    /// The heartbeat that the core had before.
+    /// The core's heartbeat before the run.
     heartbeat_before_ns: u64,
 }
 
 impl Background {
-    /// Begins the background of a run of `total` jobs; 0 if their number is not known. Each byte
-    /// of input raises a sporadic DAG of a plan.
+    /// Begins the background of a run of `total` jobs; 0 if their number is unknown. Each byte of
+    /// input raises the sporadic DAG `input` of a plan.
     pub(crate) fn begin(
         wishes: BackgroundOptions,
         input: Option<(u64, DagId)>,
@@ -152,7 +151,7 @@ impl Background {
         RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         TELLS_FAULTS.store(!execution::has_bound(), Ordering::Relaxed);
         stall::start();
-        // What a person says to the console is no event.
+        // Bytes typed at the console are not events.
         let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| ByteListener::new(input, wishes.stops));
         watch_for_end(wishes.stops && wishes.console.is_none() && listener.is_none());
@@ -166,7 +165,7 @@ impl Background {
         }
     }
 
-    /// Does what is due. Reports whether there is more to do at once.
+    /// Does the work that is due. Reports whether there is more to do at once.
     pub(crate) fn step(&mut self) -> bool {
         RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         self.progress.print_when_due();
@@ -183,7 +182,7 @@ impl Background {
         SLICED.lock().slice(false) || has_more
     }
 
-    /// Ends it. Reports whether a person has asked for the run to end.
+    /// Ends the background. Reports whether a person has asked for the run's end.
     pub(crate) fn end(self) -> bool {
         heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
         stall::stop();
@@ -199,15 +198,15 @@ impl Background {
     }
 }
 
-/// Whether the heartbeat looks.
+/// Whether the heartbeat looks for ctrl-C.
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
 
-/// Has the heartbeat look for the byte that ends the run, or not.
+/// Makes the heartbeat look for ctrl-C, or not.
 fn watch_for_end(is_watched: bool) {
     IS_WATCHED.store(is_watched, Ordering::Relaxed);
 }
 
-/// Looks for that byte. In core 0's heartbeat.
+/// Looks for ctrl-C. Called in core 0's heartbeat.
 fn look_for_end() {
     /// The size of the port's FIFO.
     const MOST_BYTES: usize = 16;
@@ -218,11 +217,11 @@ fn look_for_end() {
     }
 }
 
-/// The DAG that bytes are for.
+/// The DAG raised by bytes.
 pub(super) struct ByteListener {
     plan: u64,
     dag: DagId,
-    /// Whether one byte ends the run instead.
+    /// Whether ctrl-C ends the run instead.
     stops: bool,
 }
 
@@ -231,9 +230,9 @@ impl ByteListener {
         Self { plan, dag, stops }
     }
 
-    /// Raises the signal for each byte that has come.
+    /// Raises the signal for each received byte.
     pub(super) fn step(&self) {
-        /// The port may not end to have some.
+        /// A limit, because the port may deliver bytes without an end.
         const MOST_BYTES: usize = 256;
         for _ in 0..MOST_BYTES {
             match serial::FIRST.receive() {

@@ -1,26 +1,25 @@
 //! Names an instance that keeps a core for long, once, before the host's timeout.
 //!
-//! A subtask that never returns and has no budget keeps its core, whether it loops or
-//! waits for a lock of the app's own, and a run may not end because of it. So core 0's
-//! heartbeat looks now and then at what the cores have noted for reports anyway: which
-//! instance each runs. If a core has run the same one for [`STALLED_NS`], and for
-//! longer than its WCET if that is known, a line says so, even if the other cores are idle.
-//! The run goes on: it may be no more than a long computation.
+//! A subtask that never returns and has no budget keeps its core, whether in a loop or waiting for
+//! one of the app's own locks, and the run may never end. So core 0's heartbeat looks now and then
+//! at the instance each core runs, as noted for reports anyway. If a core has run the same instance
+//! for [`STALLED_NS`], and for longer than its WCET if known, a line says so, even if the other
+//! cores are idle. The run goes on: the instance may be no more than a long computation.
 //!
-//! Between two looks nothing is counted, so this costs a run nothing. It also sees
-//! less: an instance that was preempted in between, or has waited, counts as if it had not.
+//! Nothing is counted between two looks, so watching costs a run nothing. The price: an instance
+//! that was preempted or has waited in between counts as running all the time.
 //!
-//! # Cores that watch each other: a core that takes no interrupts is noticed
+//! # Cores that watch each other: noticing a core that takes no interrupts
 //!
-//! Only code with `unsafe` can disable interrupts for long. Such a core can be reached by
-//! a non-maskable interrupt alone, and nothing on it can go on. So core 0 looks at all
-//! others in its heartbeat, and core 1 at core 0. A core that has taken no interrupt for
-//! [`QUIET_NS`] while it runs something is sent one; if it has taken none for
-//! [`SILENT_NS`], it is accused at each look, by a non-maskable interrupt. If interrupts turn
-//! out to be enabled there, it was the host that did not let it run, and it goes on. If they
-//! are disabled at several looks in a row, it reports where it is, and ends the run.
+//! Only code with `unsafe` can disable interrupts for long. Such a core can be reached by a
+//! non-maskable interrupt alone, and nothing on it can go on. So core 0 watches all others in its
+//! heartbeat, and core 1 watches core 0. After [`QUIET_NS`] without an interrupt, a core running
+//! something is sent an interrupt. After [`SILENT_NS`] the core is accused at each look, by a
+//! non-maskable interrupt. If interrupts turn out to be enabled there, the host has kept the core
+//! from running, and the core goes on. If they are disabled at several looks in a row, the core
+//! reports its place in the code, and ends the run.
 //!
-//! A machine of one core has nobody to notice.
+//! On a machine with a single core, nobody can notice.
 
 use core::sync::atomic::Ordering;
 
@@ -33,30 +32,31 @@ use executive::text::console;
 use front::json;
 use sched_dag::Instance;
 
-/// The time between two looks. Heartbeats may come more often.
+/// The time between two looks. Heartbeats may be more frequent.
 pub(super) const LOOK_NS: u64 = 250_000_000;
 
-/// For how long an instance may run without a word. In an emulated processor whose
-/// clock counts instructions this may take some ten seconds of the host's time.
+/// The longest run of an instance without a report. In an emulated processor whose clock counts
+/// instructions, this may take some ten seconds of the host's time.
 const STALLED_NS: u64 = 500_000_000;
 
-/// The most cores that are looked at.
+/// The most cores watched.
 const MOST_CORES: usize = 64;
 
-/// The most instances that are named in a run.
+/// The most instances named in a run.
 const MOST_NAMED: usize = 16;
 
-/// The state of the watch in this run. It begins as zeros, which take no room in an image.
+/// The state of the watch in this run. Its initial value is all zeros, which takes no room in an
+/// image.
 struct StallWatch {
     /// Whether there is a run.
     looks: bool,
-    /// When to look again, on the clock.
+    /// The time of the next look, on the clock.
     next_look_ns: u64,
     cores: [SeenInstance; MOST_CORES],
     named: usize,
 }
 
-/// The instance that a core was seen to run.
+/// The instance seen running on a core.
 #[derive(Clone, Copy, Debug)]
 struct SeenInstance {
     instance: Option<Instance>,
@@ -82,8 +82,8 @@ impl SeenInstance {
         is_named: false,
     };
 
-    /// Takes a look at what the core runs. Returns it, and for how long it has run, if
-    /// it is to be named: by then it has, longer than `least_ns` says.
+    /// Looks at the instance `running` on the core. If the instance has to be named, returns it and
+    /// its time on the core, which then exceeds the result of `least_ns`.
     fn look(
         &mut self,
         now_ns: u64,
@@ -107,7 +107,7 @@ impl SeenInstance {
     }
 }
 
-/// Begins to look, at a run that begins now.
+/// Begins to watch a run that begins now.
 pub(super) fn start() {
     *WATCH.lock() = StallWatch {
         looks: true,
@@ -116,12 +116,12 @@ pub(super) fn start() {
     };
 }
 
-/// Looks no longer.
+/// Stops watching.
 pub(super) fn stop() {
     WATCH.lock().looks = false;
 }
 
-/// Takes a look if one is due. In core 0's heartbeat.
+/// Takes a look when the next look is due. Called in core 0's heartbeat.
 #[inline(never)]
 pub(super) fn beat(now_ns: u64) {
     let Some(mut watch) = WATCH.try_lock() else {
@@ -143,12 +143,12 @@ pub(super) fn beat(now_ns: u64) {
         }
     }
     if *named > 0 {
-        // No core may ever be idle to send it.
+        // Send the line now, because no core may ever be idle to do so.
         console::send_what_goes_at_once();
     }
 }
 
-/// Returns the WCET of an instance, 0 if it is not known.
+/// Returns the WCET of an instance, 0 if unknown.
 fn wcet_ns(instance: Instance) -> u64 {
     let task_set = execution::task_set();
     let wcet_ns = task_set.and_then(|task_set| {
@@ -158,7 +158,7 @@ fn wcet_ns(instance: Instance) -> u64 {
     wcet_ns.unwrap_or(0)
 }
 
-/// Says which instance keeps a core.
+/// Names an instance that keeps a core.
 #[cold]
 #[inline(never)]
 fn report(core: u32, instance: Instance, still_ns: u64) {
@@ -185,10 +185,10 @@ fn report(core: u32, instance: Instance, still_ns: u64) {
     });
 }
 
-/// After this time without an interrupt a core is sent one. Core 0 gets its own.
+/// The time without an interrupt until a core is sent an interrupt. Core 0 gets its own.
 const QUIET_NS: u64 = 1_500_000_000;
 
-/// After this time without an interrupt a core is accused.
+/// The time without an interrupt until a core is accused.
 const SILENT_NS: u64 = 4_000_000_000;
 
 const _: () = assert!(
@@ -204,7 +204,7 @@ enum StallResponse {
     Accuse,
 }
 
-/// Judges a core that took its last interrupt so long ago.
+/// Judges a core that took its last interrupt `silent_ns` ago.
 const fn judge(silent_ns: u64) -> StallResponse {
     match silent_ns {
         SILENT_NS.. => StallResponse::Accuse,
@@ -213,7 +213,7 @@ const fn judge(silent_ns: u64) -> StallResponse {
     }
 }
 
-/// Looks at the cores that are this core's to watch. In a heartbeat.
+/// Looks at the cores watched by this core. Called in a heartbeat.
 pub(crate) fn look(own: &Core, now_ns: u64) {
     let cores = this_core::all();
     let watched = match own.index {

@@ -1,21 +1,20 @@
-//! Status lines: how a run does, now and then.
+//! Status lines: the state of a run, now and then.
 //!
-//! The load of each core is computed from the journal, so that counting it costs
-//! nothing between two lines. Where the journal holds less than that time, or more than
-//! 2,048 events of it, the load is of the latest; where events are not recorded there is
-//! none.
+//! The load of each core is computed from the journal, so counting costs nothing between two lines.
+//! If the journal does not reach back to the previous line, or more than 2,048 events have happened
+//! since, the load covers the latest events only. Without recorded events there is no load.
 //!
-//! # How busy the cores were
+//! # The load of the cores
 //!
-//! The events of the time in question are read from the latest one back, a few at a
-//! time: only while they are copied is the scheduler's lock held.
+//! The events in question are read from the latest one backwards, a few at a time; the scheduler's
+//! lock is held only while they are copied.
 //!
-//! # When a line is printed that is due: if nothing else is, or when it has waited long
+//! # The time of printing a due line: when nothing else is due, or after a long wait
 //!
-//! To print takes core 0 some microseconds, of which a few have interrupts disabled,
-//! and a release that falls on these is late. So a line waits until the scheduler's next
-//! event leaves time for it. Where events come without a gap it would never be over:
-//! then it is printed all the same, and may cost a release those microseconds.
+//! Printing takes core 0 some microseconds, a few of them with interrupts disabled, and delays a
+//! release during that time. So a line waits until the scheduler's next event leaves time for
+//! printing. With events in dense succession that wait would never end. In such a run the line is
+//! printed after [`PATIENCE_NS`] all the same, and may delay a release by those microseconds.
 
 use executive::machine::{clock, this_core};
 use executive::run::execution;
@@ -26,23 +25,24 @@ use sched_dag::journal::{Event, EventKind};
 
 use super::KernelRun;
 
-/// How many events are read where time is short.
+/// The most events read if time is short.
 const FEW_EVENTS: u64 = 128;
 
-/// How many are read otherwise: some tens of microseconds, in which core 0 takes no interrupt.
+/// The most events read otherwise: some tens of microseconds during which core 0 takes no
+/// interrupt.
 const MOST_EVENTS: u64 = 2048;
 
-/// When and what to print.
+/// The printer of status lines: when to print, and what.
 pub(super) struct StatusPrinter {
     period_ns: u64,
     total: u64,
-    /// When the last line was printed.
+    /// The time of the last line.
     last_ns: u64,
     patience: LinePatience,
 }
 
 impl StatusPrinter {
-    /// Begins with the first line due after `period_ns`.
+    /// Creates a printer whose first line is due after `period_ns`.
     pub(super) fn every(period_ns: u64, total: u64) -> Self {
         Self {
             period_ns,
@@ -86,7 +86,7 @@ impl StatusPrinter {
     }
 }
 
-/// How far a run has come.
+/// The progress of a run.
 pub(super) struct RunProgress {
     total: u64,
     printed: u64,
@@ -94,7 +94,7 @@ pub(super) struct RunProgress {
 }
 
 impl RunProgress {
-    /// Begins with no job ended of `total`; 0: there is no end to come nearer to.
+    /// Begins with none of `total` jobs ended; 0: the run has no end to approach.
     pub(super) const fn new(total: u64) -> Self {
         Self {
             total,
@@ -103,8 +103,7 @@ impl RunProgress {
         }
     }
 
-    /// Prints how many jobs have ended, if that is a step further, and the line need
-    /// not wait.
+    /// Prints the number of ended jobs, if it has grown by a step, and the line need not wait.
     pub(super) fn print_when_due(&mut self) {
         if self.total == 0 {
             return;
@@ -123,9 +122,9 @@ impl RunProgress {
 /// The most cores.
 const CORES: usize = 64;
 
-/// Returns for each core for which part of a time, in thousandths, it had an
-/// instance; nothing if events are not recorded. Where the journal, or its latest
-/// `most` events, do not reach back to `from_ns`, the part is of what they reach.
+/// Returns each core's load between `from_ns` and `to_ns`, the time with an instance, in
+/// thousandths; nothing if events are not recorded. If the journal, or its latest `most` events, do
+/// not reach back to `from_ns`, the load is that of the time they cover.
 pub(crate) fn loads_permille(
     from_ns: u64,
     to_ns: u64,
@@ -138,7 +137,7 @@ pub(crate) fn loads_permille(
             Some(loads) => {
                 let first = execution::first_core(cluster) as usize;
                 let its = permille.iter_mut().skip(first).zip(0..);
-                // Beyond the cluster's cores it is 0, until the next one is looked at.
+                // Beyond the cluster's cores this stores 0, until the next cluster is read.
                 its.for_each(|(place, core)| *place = loads.permille(core));
             }
             None => is_recorded = false,
@@ -152,7 +151,7 @@ pub(crate) fn loads_permille(
     permille.into_iter().take(cores)
 }
 
-/// Takes the events of a cluster's journal; nothing if they are not recorded.
+/// Takes the events of a cluster's journal; `None` if they are not recorded.
 fn of_cluster(cluster: usize, mut loads: CoreLoads, most: u64) -> Option<CoreLoads> {
     let is_on =
         execution::with_scheduler(cluster, |scheduler| scheduler.log.journal.is_recording());
@@ -164,7 +163,7 @@ fn of_cluster(cluster: usize, mut loads: CoreLoads, most: u64) -> Option<CoreLoa
     Some(loads)
 }
 
-/// The loads, while events are taken from the latest one back.
+/// The loads, while events are taken from the latest one backwards.
 #[derive(Clone, Debug)]
 struct CoreLoads {
     from_ns: u64,
@@ -172,8 +171,8 @@ struct CoreLoads {
     /// The time of the oldest event taken.
     oldest_ns: u64,
     busy_ns: [u64; CORES],
-    /// When each core stopped running an instance of which it is not known yet when it
-    /// began; first the end of the time, for one that may still run.
+    /// For each core, the end of an instance whose start has not been found yet; initially `to_ns`,
+    /// for an instance that may still run.
     stopped_ns: [Option<u64>; CORES],
     /// Whether anything is known of each core.
     is_known: [bool; CORES],
@@ -184,7 +183,7 @@ struct CoreLoads {
 impl CoreLoads {
     fn new(from_ns: u64, to_ns: u64) -> Self {
         Self {
-            // What the journal holds may all have happened since `to_ns` was read.
+            // All events in the journal may have happened since `to_ns` was read.
             from_ns: from_ns.min(to_ns),
             to_ns,
             oldest_ns: to_ns,
@@ -225,7 +224,7 @@ impl CoreLoads {
         if !self.is_known.get(core).is_some_and(|is_known| *is_known) {
             return 0;
         }
-        // It had begun before the first event that is known.
+        // The instance had begun before the first known event.
         let begun_before = self.stopped_ns[core];
         let before_ns = begun_before.map_or(0, |stopped_ns| stopped_ns.saturating_sub(from_ns));
         let busy_ns = self.busy_ns[core] + before_ns;
@@ -234,13 +233,13 @@ impl CoreLoads {
     }
 }
 
-/// The time that a line takes, with room.
+/// The time to print a line, with a margin.
 const TIME_TO_PRINT_NS: u64 = 100_000;
 
-/// For how long a line waits at most.
+/// The longest wait of a line.
 const PATIENCE_NS: u64 = 100_000_000;
 
-/// Since when a line has waited.
+/// The time since when a line has waited.
 pub(super) struct LinePatience {
     since_ns: Option<u64>,
 }
@@ -250,8 +249,7 @@ impl LinePatience {
         Self { since_ns: None }
     }
 
-    /// Reports whether the line that is due is to be printed now, and if so begins
-    /// anew for the next one.
+    /// Reports whether the due line is to be printed now; if so, starts over for the next line.
     fn is_over(&mut self) -> bool {
         self.ends(clock::now_ns(), execution::next_event_ns())
     }

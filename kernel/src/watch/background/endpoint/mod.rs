@@ -1,8 +1,8 @@
-//! Endpoints: what a wire is connected to on the machine.
+//! Endpoints: the devices of the machine that wires are connected to.
 //!
-//! An endpoint is one type that implements [`Endpoint`], in a file of its own, and one row of
-//! [`ENDPOINTS`]. It is reached through these only, so an image whose app connects no wire has no
-//! code for any.
+//! An endpoint is a type that implements [`Endpoint`], in a file of its own, and a row of
+//! [`ENDPOINTS`]. Endpoints are reached through the trait and the table only, so the image of an
+//! app that connects no wire contains no code for any endpoint.
 
 mod network;
 mod script;
@@ -25,15 +25,16 @@ use executive::run::execution;
 use front::app::ending::AppError;
 use front::app::endpoint::EndpointWord;
 
-/// A device that a run serves, besides people.
+/// A device served during a run, besides people.
 pub(crate) trait Endpoint: Send + Sync {
     /// Begins a run.
     fn begin_run(&self, _now_ns: u64) {}
 
-    /// Takes what has arrived, if it does so on this core. In each core's heartbeat.
+    /// Takes arrived bytes, if they arrive on this core. Called in each core's heartbeat.
     fn beat(&self, core: &Core, now_ns: u64);
 
-    /// Sends some of what is to go, and reports whether there may be more. In the background.
+    /// Sends a part of the waiting output, and reports whether there may be more. Called in the
+    /// background.
     fn step(&self) -> bool {
         false
     }
@@ -41,19 +42,20 @@ pub(crate) trait Endpoint: Send + Sync {
     /// Ends the run: sends the rest.
     fn end_run(&self) {}
 
-    /// Tells of the run that has ended.
+    /// Prints the endpoint's report of the finished run.
     fn tell(&self);
 }
 
-/// The words that say which endpoint is meant: the app's command line, and the loader's module.
+/// The words that select an endpoint: the app's command line, and the loader's module.
 pub(crate) struct EndpointWords<'a> {
     pub(crate) options: &'a CommandLine<'static>,
     pub(crate) module: &'a Cell<Option<&'static [u8]>>,
-    /// That of the wire, if there is one.
+    /// The option of the wire, if given.
     pub(crate) word: Option<EndpointWord>,
 }
 
-/// Adds an endpoint of a wire, if the words mean this one, and reports whether they do.
+/// Adds an endpoint for a wire, if the words select this kind of endpoint, and reports whether they
+/// do.
 ///
 /// # Errors
 ///
@@ -62,16 +64,16 @@ type Open = fn(&Wire, &EndpointWords<'_>) -> Opened;
 
 type Opened = Result<bool, AppError>;
 
-/// Every endpoint, in the order in which they are asked. The last one takes any words.
+/// All kinds of endpoints, in the order in which they are tried. The last one accepts any words.
 const ENDPOINTS: &[Open] = &[udp::open, script::open, serial::open];
 
-/// The endpoints of the wires that the app has connected.
+/// The endpoints of the wires connected by the app.
 pub(crate) static CONNECTED: Chain<Box<dyn Endpoint>> = Chain::new();
 
-/// The time between two looks at a device.
+/// The time between two looks at a device, in nanoseconds.
 pub(super) const PERIOD_NS: u64 = 1_000_000;
 
-/// Values for good, to which others are added before the commit.
+/// A list of permanent values, extended before the commit.
 pub(crate) struct Chain<T: 'static>(SetOnce<&'static ChainLink<T>>);
 
 struct ChainLink<T: 'static> {
@@ -84,7 +86,7 @@ impl<T: Send + Sync> Chain<T> {
         Self(SetOnce::new())
     }
 
-    /// Adds a value, as the last one.
+    /// Appends a value.
     fn add(&self, value: T) {
         let mut last = self;
         while let Some(link) = last.0.get() {
@@ -104,7 +106,7 @@ impl<T: Send + Sync> Chain<T> {
     }
 }
 
-/// Connects a wire to the endpoint that the words name.
+/// Connects a wire to the endpoint named by the words.
 pub(crate) fn connect(wire: &Wire, words: &EndpointWords<'_>) -> Result<(), AppError> {
     for open in ENDPOINTS {
         if open(wire, words)? {
@@ -114,7 +116,7 @@ pub(crate) fn connect(wire: &Wire, words: &EndpointWords<'_>) -> Result<(), AppE
     Ok(())
 }
 
-/// Returns the other end of a wire, for an endpoint.
+/// Returns the device end of a wire, for an endpoint.
 fn end_of(wire: &Wire) -> Result<DeviceEnd, AppError> {
     let end = DeviceEnd::of(wire);
     end.ok_or_else(|| failure(&name_of(wire), "has a device already; connect it once"))

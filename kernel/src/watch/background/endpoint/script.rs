@@ -1,22 +1,22 @@
 //! A script: bytes with their times, which arrive in place of a device's.
 //!
-//! Where runs have to repeat, input is a script in the loader's module. An entry of it is
+//! For repeatable runs, input comes from a script in the loader's module. An entry of the script is
 //!
 //! | bytes | meaning |
 //! | --- | --- |
 //! | 8 | a time of the run, in nanoseconds |
 //! | 4, 2 | the address and the port of the peer; the port is 0 where there is none |
-//! | 2, 2 | the lengths of the two that follow |
-//! | | the name of the wire; the first wire of the script may go without |
+//! | 2, 2 | the lengths of the next two fields |
+//! | | the name of the wire; may be empty for the first wire of the script |
 //! | | the bytes |
 //!
-//! Numbers have their lowest byte first, and an address the order in which it is written. With a peer
-//! the bytes are a packet. They arrive by the heartbeat's alarm. The host has made the script, and so
-//! what is no entry is its end.
+//! Numbers have their lowest byte first; an address has the order of its text. With a peer the
+//! bytes are a packet. Bytes arrive by the heartbeat's alarm. The host has made the script, so
+//! anything but an entry counts as its end.
 //!
-//! Sent bytes go by the serial port: of one wire, as they are, or, of wires with the word
-//! `wire.NAME=file`, each packet as a line of text, `wire.NAME PEER "BYTES"`, without a peer if none is
-//! stated.
+//! Output goes to the serial port. A single wire's bytes are sent as they are. For wires with the
+//! option `wire.NAME=file`, each packet is sent as a line of text, `wire.NAME PEER "BYTES"`,
+//! without a peer if none is stated.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -40,15 +40,15 @@ use executive::run::execution;
 use front::app::endpoint::EndpointWord;
 use front::report;
 
-/// The most bytes of a line: those of a packet, its peer, and a name.
+/// The most bytes of a line: a packet's bytes, its peer, and a name.
 const MOST_OF_LINE: usize = 512 + 4 * MOST_PAYLOAD;
 
 struct Script {
     entries: &'static [u8],
-    /// Whether it has a wire, and whether a line that goes has the port.
+    /// Whether the script has a wire, and whether lines of output have the port.
     has_wire: AtomicBool,
     has_port: AtomicBool,
-    /// The line that is going, and how much of it has gone. In core 0's background.
+    /// The line being sent, and the number of its bytes sent so far. Used in core 0's background.
     line: SpinLock<(String, usize)>,
 }
 
@@ -63,7 +63,7 @@ struct ScriptEndpoint {
 }
 
 struct Playing {
-    /// The entries that are still to arrive in this run, those of other wires among them.
+    /// The entries still to arrive in this run, among them those of other wires.
     rest: &'static [u8],
     /// The packet that arrives next.
     packet: Buffer,
@@ -97,7 +97,7 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
     }
     let end = end_of(wire)?;
     if sends_lines {
-        // The background finds what is to go.
+        // The background finds waiting packets, so nobody has to be called.
         end.begin_packets(MOST_PAYLOAD, || ());
     }
     let playing = SpinLock::new(Playing {
@@ -114,7 +114,7 @@ pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
     Ok(true)
 }
 
-/// Cuts the script off the module: it stands behind the app's own bytes.
+/// Cuts the script off the module: it follows the app's own bytes.
 fn cut(words: &EndpointWords<'_>) -> Result<Script, UsageError> {
     let bytes = words.options.number("input", 0..=1 << 32, 0)?;
     let file = words.module.get().unwrap_or_default();
@@ -152,8 +152,8 @@ fn first(script: &[u8]) -> Option<(Entry<'_>, &[u8])> {
 }
 
 impl ScriptEndpoint {
-    /// Takes what the script has for now. Reports whether there was an entry; if not, the heartbeat
-    /// comes for the next one.
+    /// Lets the next entry arrive if it is due. Reports whether an entry was due; if not, the
+    /// heartbeat is set for the next entry.
     fn play(&self, now_ns: u64) -> bool {
         let mut playing = self.playing.lock();
         let Playing { rest, packet } = &mut *playing;
@@ -189,9 +189,10 @@ impl ScriptEndpoint {
         true
     }
 
-    /// Sends a part of the line, or of the next one. Reports whether there was one.
+    /// Sends a part of the current line, or of the next line. Reports whether there was something
+    /// to send.
     fn send_line(&self, is_ready: impl Fn() -> bool, send: impl Fn(u8)) -> bool {
-        // Not under the lock, which keeps interrupts away: a line may be long.
+        // The line is long, and the lock disables interrupts: so send outside of the lock.
         let (mut line, mut gone) = core::mem::take(&mut *self.script.line.lock());
         if gone == line.len() {
             line.clear();
@@ -209,7 +210,7 @@ impl ScriptEndpoint {
         }
         let rest = &line.as_bytes()[gone..];
         let has_rest = !rest.is_empty();
-        // What takes bytes at once, as QEMU does, is ready again and again.
+        // QEMU takes bytes at once and is ready again and again, so a limit is needed.
         let parts = rest.chunks(FIFO_BYTES).take(64);
         for part in parts.take_while(|_| is_ready()) {
             part.iter().copied().for_each(&send);
@@ -227,7 +228,7 @@ impl Endpoint for ScriptEndpoint {
     }
 
     fn beat(&self, core: &Core, now_ns: u64) {
-        // As often as the script has entries.
+        // As often as the script has entries that are due.
         while core.index == 0 && self.play(now_ns) {}
     }
 

@@ -1,9 +1,9 @@
 //! The second serial port.
 //!
-//! The port is looked at in core 0's heartbeat, every [`PERIOD_NS`](super::PERIOD_NS): at 115200
-//! baud its FIFO of 16 bytes is full after 1.4 ms. So bytes arrive whatever the core runs, and cost
-//! it no interrupt more. Bytes go from the background, when the core is idle, and what is left at
-//! the run's end goes then.
+//! Core 0's heartbeat polls the port every [`PERIOD_NS`](super::PERIOD_NS): at 115200 baud its FIFO
+//! of 16 bytes is full after 1.4 ms. So bytes arrive whatever the core runs, and cost no additional
+//! interrupt. The background sends bytes when the core is idle; any rest is sent at the end of the
+//! run.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -23,7 +23,7 @@ pub(super) const FIFO_BYTES: usize = 16;
 
 struct SerialEndpoint {
     end: DeviceEnd,
-    /// Whether a run goes on: bytes that come between runs are of none.
+    /// Whether a run goes on: bytes between runs belong to none.
     is_run: AtomicBool,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn take_port(wire: &Wire) -> Result<(), UsageError> {
     }
 }
 
-/// Sends some of a wire's bytes, and reports whether there were some.
+/// Sends some of a wire's bytes, and reports whether there were any.
 pub(super) fn step(end: &DeviceEnd) -> bool {
     if !end.has_bytes_to_go() {
         return false;
@@ -66,7 +66,7 @@ pub(super) fn step(end: &DeviceEnd) -> bool {
     true
 }
 
-/// Sends the rest of them.
+/// Sends all remaining bytes of a wire.
 pub(super) fn send_rest(end: &DeviceEnd) {
     core::iter::from_fn(|| end.depart()).for_each(|byte| SECOND.send(byte));
     SECOND.drain();

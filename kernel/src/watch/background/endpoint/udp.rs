@@ -1,8 +1,9 @@
-//! Datagrams: what a wire sends goes to a peer, and what peers send to its port arrives on it.
+//! Datagrams: a wire sends its output to a peer, and receives the datagrams that peers send to its
+//! port.
 //!
-//! A wire with the word `udp://:PORT` hears everyone, and answers whom an instance
-//! [says](fass::shared::Sender::to), or else who has sent last. One with a peer's address hears that
-//! peer alone, from a port of its own: 49152 for the app's first wire, and so on.
+//! A wire with the option `udp://:PORT` hears everyone, and answers the peer named by an
+//! [instance](fass::shared::Sender::to), or else the latest sender. A wire with a peer's address
+//! hears that peer alone, from a port of its own: 49152 for the app's first wire, and so on.
 
 use fass::shared::Wire;
 use front::app::endpoint::EndpointWord;
@@ -11,10 +12,10 @@ use net::MOST_PAYLOAD;
 use super::network::{self, UdpWire};
 use super::{EndpointWords, Opened, end_of, name_of};
 
-/// The time from one interrupt to the next if no word says so, in microseconds.
+/// The default time between two interrupts, in microseconds.
 const DISTANCE_US: u64 = 170;
 
-/// Gives the wire a place in the network, if its word says so.
+/// Gives the wire a place in the network, if its option says so.
 pub(super) fn open(wire: &Wire, words: &EndpointWords<'_>) -> Opened {
     let (port, peer) = match words.word {
         Some(EndpointWord::Peer(peer)) => (None, Some(peer)),

@@ -1,22 +1,23 @@
-//! The machine's network: its first card, and the interface at which wires hear and send.
+//! The machine's network: its first card, and the interface on which wires hear and send.
 //!
-//! Frames that come are taken in the card's interrupt, on one core: the first one of the cluster
-//! whose DAG the first wire releases. What is sent goes on the core that has completed the instance,
-//! by an interrupt that this core sends itself, so when it has dropped the scheduler's lock.
+//! The card's interrupt takes incoming frames, on a single core: the first core of the cluster
+//! whose DAG is released by the first wire. Output is sent on the core that has completed the
+//! instance, by an interrupt the core sends to itself, and thus after the core has dropped the
+//! scheduler's lock.
 //!
 //! # A storm is bounded by law
 //!
 //! An interrupt takes [`Law::most`] frames. Then the card is masked: the next interrupt comes
 //! [`Law::distance_ns`] later, by an alarm of the same core, and takes as many. Meanwhile the card
-//! drops what it has no buffer for, at no cost. So whatever comes, it costs that core at most one
-//! such interrupt in each distance, which bounds are charged.
+//! drops frames without a buffer, at no cost. So any storm costs that core at most one such
+//! interrupt in each distance, and bounds are charged for exactly this.
 //!
 //! # Locks
 //!
-//! The card's two halves have a lock each. That of the sending half is held for a frame that is heard
-//! or a packet that is sent, not longer. Neither is held where functions are told: a wait that ends
-//! needs the scheduler's. A [protocol] has a lock of its own, which is taken within the
-//! receiving half's, and the sending half's within it.
+//! The card's two halves have a lock each. The sending half's lock is held for a heard frame or a
+//! sent packet, not longer. Neither lock is held while functions are told, because a wait that ends
+//! needs the scheduler's lock. A [protocol] has a lock of its own, taken within the receiving
+//! half's; the sending half's is taken within the protocol's.
 
 pub(super) mod protocol;
 mod wire;
@@ -46,27 +47,27 @@ use protocol::PROTOCOLS;
 use wire::Sent;
 pub(super) use wire::UdpWire;
 
-/// The most that a storm costs.
+/// The limit on the cost of a storm.
 #[derive(Clone, Copy)]
 struct Law {
-    /// How many frames are taken, or packets sent, in an interrupt.
+    /// The number of frames taken, or packets sent, in an interrupt.
     most: u64,
     /// The least time from one interrupt to the next, in nanoseconds.
     distance_ns: u64,
-    /// Whether the app's words state the charge.
+    /// Whether the app's options state the charge.
     is_stated: bool,
 }
 
 impl Law {
-    /// Takes the words, and charges the commits to come, unless `overheads_ns` states a device.
+    /// Reads the options, and charges the commits to come, unless `overheads_ns` states a device.
     ///
-    /// The charge is of the longest interrupt in instructions, each a nanosecond: with its entry and
-    /// exit, the release of a DAG, the alarm, and the packet that a heartbeat sends. What a core sends
-    /// behind a completion is charged as a part of the dispatch. What cores wait for each other, where
-    /// they have the card at once, is not charged.
+    /// The charge is that of the longest interrupt in instructions, each a nanosecond: with its
+    /// entry and exit, the release of a DAG, the alarm, and the packet sent by a heartbeat. Packets
+    /// sent by a core behind a completion are charged as a part of the dispatch. Not charged is the
+    /// time cores wait for each other when they need the card at once.
     fn charged(options: &CommandLine<'static>, distance_us: u64) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
-        // Not beyond a heartbeat, which sends as well.
+        // No longer than a heartbeat, because the heartbeat sends as well.
         let distance_us = options.number("net_us", 10..=1_000, distance_us)?;
         let mut overheads = KERNEL.terms().overheads;
         let is_stated = overheads.device_ns > 0;
@@ -84,7 +85,7 @@ impl Law {
         Ok(law)
     }
 
-    /// Charges so much more for an interrupt, and for what is sent behind a completion.
+    /// Charges this much more for an interrupt, and for the packets sent behind a completion.
     fn charge_more(&self, device_ns: u64, dispatch_ns: u64) -> Result<(), UsageError> {
         let mut overheads = KERNEL.terms().overheads;
         if !self.is_stated {
@@ -109,7 +110,7 @@ impl Law {
 }
 
 /// The times of an interrupt of the card without its frames, of the release by another wire, of a
-/// frame of the longest ones, of a packet that is sent, and of the interrupt by which a core sends.
+/// frame of the greatest length, of a sent packet, and of the interrupt by which a core sends.
 const RELEASE_NS: u64 = 3_600;
 const WIRE_NS: u64 = 2_300;
 const FRAME_NS: u64 = 1_700;
@@ -122,17 +123,17 @@ pub(super) struct Network {
     receiver: SpinLock<Box<dyn Receive>>,
     sender: SpinLock<NetworkSender>,
     law: Law,
-    /// The core that the card interrupts.
+    /// The core interrupted by the card.
     core: AtomicU32,
-    /// When the card may interrupt again, if it may not now; else `u64::MAX`.
+    /// The time when the masked card may interrupt again; `u64::MAX` if it is not masked.
     unmask_ns: AtomicU64,
     is_run: AtomicBool,
     is_linked: AtomicBool,
     interrupts: AtomicU64,
-    /// Those that have come to another core.
+    /// The interrupts that came to another core.
     elsewhere: AtomicU64,
     longest_ns: AtomicU64,
-    /// Datagrams to no wire.
+    /// The datagrams to no wire.
     unheard: AtomicU64,
 }
 
@@ -141,7 +142,7 @@ struct NetworkSender {
     transmitter: Box<dyn Transmit>,
     interface: Interface<Buffer>,
     dhcp: Option<Client>,
-    /// For frames of our own: questions, and messages of DHCP.
+    /// For the machine's own frames: ARP questions, and messages of DHCP.
     own: Buffer,
 }
 
@@ -149,10 +150,10 @@ static NETWORK: SetOnce<Network> = SetOnce::new();
 static LINE: SetOnce<Line> = SetOnce::new();
 static BELL: SetOnce<Bell> = SetOnce::new();
 
-/// The first port of what has none by its word (RFC 6335, 6).
+/// The first port for a wire or protocol without a stated port (RFC 6335, 6).
 const FIRST_OWN_PORT: u16 = 49_152;
 
-/// Returns the network, which is opened for the first one, with that distance if no word says so.
+/// Returns the network. The first call opens it, with `distance_us` between interrupts by default.
 pub(super) fn open(
     who: &str,
     options: &CommandLine<'static>,
@@ -187,7 +188,7 @@ pub(super) fn open(
     Ok(network)
 }
 
-/// Takes the word for the address: `net=ADDRESS/PREFIX`, with `,GATEWAY` or not, or `dhcp`.
+/// Takes the option for the address: `net=ADDRESS/PREFIX`, with or without `,GATEWAY`, or `dhcp`.
 fn address(options: &CommandLine<'static>) -> Result<Option<Address>, UsageError> {
     let Some(value) = options.text("net").filter(|value| *value != "dhcp") else {
         return Ok(None);
@@ -211,7 +212,7 @@ fn address(options: &CommandLine<'static>) -> Result<Option<Address>, UsageError
     })
 }
 
-/// Has what is to go sent by this core, behind the completion that it makes.
+/// Makes this core send the waiting output, after the completion it is making.
 pub(super) fn ring() {
     if let Some(bell) = BELL.get() {
         bell.ring(this_core::get());
@@ -221,7 +222,7 @@ pub(super) fn ring() {
 /// The card's message: frames have come.
 struct CardLine;
 
-/// A core's message to itself: there is something to go.
+/// A core's message to itself: there is output to send.
 struct SendLine;
 
 impl DeviceLine for CardLine {
@@ -235,7 +236,7 @@ impl DeviceLine for CardLine {
 impl DeviceLine for SendLine {
     fn interrupt(&self, now_ns: u64) {
         if let Some(network) = NETWORK.get() {
-            // At the begin of a run there may be frames already.
+            // At the beginning of a run there may be frames already.
             network.unmask(this_core::get(), now_ns);
             network.send(network.law.most, now_ns);
         }
@@ -246,7 +247,7 @@ impl Network {
     fn new(card: Card, address: Option<Address>, law: Law) -> Self {
         let room = || Buffer::new(Buffer::LEAST_BYTES);
         let first = address.unwrap_or(Address::NONE);
-        // Unlikely to be another client's: the time at which this one has booted.
+        // The time of this boot makes the number unlikely to be another client's.
         let transaction = u32::from_le_bytes(card.mac.0[2..].try_into().unwrap_or_default());
         let transaction = transaction.wrapping_add(clock::now_ns().to_le_bytes()[2].into());
         Self {
@@ -273,7 +274,7 @@ impl Network {
         }
     }
 
-    /// Returns the port that is stated, or a free one.
+    /// Returns the stated port, or a free one.
     pub(super) fn port(&self, who: &str, stated: Option<u16>) -> Result<u16, AppError> {
         let taken = || {
             let wires = self.wires.iter().map(|wire| wire.port);
@@ -293,7 +294,7 @@ impl Network {
         Ok(port)
     }
 
-    /// Adds a wire, and charges it: each of an interrupt's packets may release another DAG.
+    /// Adds a wire, and charges for it: each of an interrupt's packets may release another DAG.
     pub(super) fn add(&self, wire: UdpWire) -> Result<(), UsageError> {
         let others = self.wires.iter().count() as u64;
         self.wires.add(wire);
@@ -304,7 +305,7 @@ impl Network {
 
     /// Takes the frames of an interrupt, and masks the card until the next one.
     fn receive(&self, now_ns: u64) {
-        // One that was on its way when the card was masked, or the run ended.
+        // The interrupt was on its way when the card was masked, or the run ended.
         if self.unmask_ns.load(Ordering::Relaxed) != u64::MAX {
             return;
         }
@@ -313,7 +314,7 @@ impl Network {
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, until_ns);
         let mut receiver = self.receiver.lock();
         receiver.set_interrupt(false);
-        // The run's end waits for the lock, and then nothing more is heard.
+        // The end of the run waits for the lock, and nothing may be heard after the end.
         if !self.is_run.load(Ordering::Relaxed) {
             return;
         }
@@ -335,7 +336,7 @@ impl Network {
             .fetch_add(is_elsewhere.into(), Ordering::Relaxed);
     }
 
-    /// Lets the card interrupt this core again, when the distance has passed.
+    /// Lets the card interrupt this core again, once the distance has passed.
     fn unmask(&self, core: &Core, now_ns: u64) {
         let is_ours = core.index == self.core.load(Ordering::Relaxed);
         let until_ns = self.unmask_ns.load(Ordering::Relaxed);
@@ -360,7 +361,7 @@ impl Network {
             Heard::Nothing => {}
             Heard::Answer { length, resolved } => {
                 frame.set_range(start..start + length);
-                // Without room it is lost, as it may be on any way.
+                // Without room the answer is lost, as it may be anywhere on its way.
                 let _ = sender.transmitter.send(frame);
                 sender.send_kept(resolved);
             }
@@ -382,7 +383,7 @@ impl Network {
         }
     }
 
-    /// Sends what is to go, so many packets at most. Reports whether something has gone.
+    /// Sends waiting output, at most `most` packets. Reports whether anything was sent.
     fn send(&self, most: u64, now_ns: u64) -> bool {
         let mut left = most;
         for wire in self.wires.iter() {
@@ -405,9 +406,9 @@ impl Network {
         has_gone
     }
 
-    // What follows is not within the ways of wires, which it would make longer.
+    // The functions below are kept out of the wires' code, so that its longest path stays short.
 
-    /// Has a protocol hear a datagram that is no wire's.
+    /// Passes a datagram that belongs to no wire to the protocols.
     #[inline(never)]
     fn hear_elsewhere(&self, datagram: &[u8], port: u16, from: Peer, now_ns: u64) {
         let mut places = PROTOCOLS.iter();
@@ -416,7 +417,7 @@ impl Network {
         }
     }
 
-    /// Sends what protocols have to say, so many datagrams at most. Returns how many are left.
+    /// Sends the output of protocols, at most `left` datagrams. Returns how many more may be sent.
     #[inline(never)]
     fn send_elsewhere(&self, mut left: u64, now_ns: u64) -> u64 {
         let mut send = |packet: &mut Buffer, port, to| self.sender.lock().send(packet, port, to);
@@ -436,14 +437,14 @@ impl Network {
 
 impl Endpoint for &'static Network {
     fn begin_run(&self, _now_ns: u64) {
-        // By the first wire, or else by what a protocol hears first.
+        // By the first wire, or else by the first protocol that releases a DAG.
         let released = match self.wires.iter().next() {
             Some(wire) => wire.end.released(),
             None => PROTOCOLS.iter().find_map(|place| place.released()),
         };
         let core = released.map_or(0, |(_, dag)| execution::first_core_of(dag));
         let routed = LINE.get().map(|line| line.route(core));
-        // A core that messages do not reach leaves the card to core 0.
+        // If messages do not reach that core, core 0 takes the card.
         let core = if matches!(routed, Some(Ok(()))) {
             core
         } else {
@@ -453,7 +454,7 @@ impl Endpoint for &'static Network {
         let is_up = self.is_linked.load(Ordering::Relaxed);
         PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
         self.is_run.store(true, Ordering::Relaxed);
-        // There may be frames already, of which there is no message.
+        // Frames may be there already, without any message for them.
         self.unmask_ns.store(0, Ordering::Relaxed);
         if let (Some(bell), Some(core)) = (BELL.get(), this_core::all().get(core as usize)) {
             bell.ring(core);
@@ -476,8 +477,8 @@ impl Endpoint for &'static Network {
             self.wires.iter().for_each(|wire| wire.end.set_link(is_up));
             PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
         }
-        // What found no room, or no address, what was more than a bell sends, and what is due to a
-        // protocol's peer.
+        // Sends packets that found no room or no address, packets beyond a bell's limit, and
+        // packets due to a protocol's peer.
         if !has_asked {
             self.send(1, now_ns);
         }
@@ -485,7 +486,7 @@ impl Endpoint for &'static Network {
 
     fn step(&self) -> bool {
         PROTOCOLS.iter().for_each(|place| place.tell_news());
-        // What was more than a completion sends.
+        // Packets beyond the limit of a completion.
         self.send(1, clock::now_ns())
     }
 
@@ -539,12 +540,12 @@ impl Endpoint for &'static Network {
 }
 
 impl NetworkSender {
-    /// Sends a packet, which has room for its headers in front.
+    /// Sends a packet that has room for its headers in front.
     fn send(&mut self, packet: &mut Buffer, port: u16, to: Peer) -> Sent {
         let interface = &mut self.interface;
         match interface.address_datagram(packet.content_mut(), port, to) {
             Route::Ready if self.transmitter.send(packet) => Sent::Gone,
-            // It has no way, and would keep those behind it.
+            // There is no route, and the packet would hold up those behind it.
             Route::None if !interface.address().ip.is_unspecified() => Sent::Gone,
             Route::Ready | Route::None => Sent::Waits,
             Route::Unresolved(neighbour) => {
@@ -558,7 +559,7 @@ impl NetworkSender {
         }
     }
 
-    /// Sends a frame whose neighbour has answered, and what else was sent before.
+    /// Sends a frame whose neighbour has answered, and any frames handed to the card before.
     fn send_kept(&mut self, kept: Option<Kept>) {
         if let Some(kept) = kept {
             let _ = self.transmitter.send(self.interface.kept(kept));
@@ -566,7 +567,7 @@ impl NetworkSender {
         self.transmitter.ring();
     }
 
-    /// Sends the message to the server of addresses that is due, and reports whether one was.
+    /// Sends the message due to the DHCP server, and reports whether one was due.
     fn ask_server(&mut self, now_ns: u64) -> bool {
         let client = self.dhcp.as_mut();
         let Some(client) = client.filter(|client| client.due_ns() <= now_ns) else {
@@ -587,7 +588,7 @@ impl NetworkSender {
         true
     }
 
-    /// Takes a message of a server of addresses.
+    /// Takes a message of a DHCP server.
     fn hear_server(&mut self, message: &Buffer, now_ns: u64) {
         if let Some(client) = &mut self.dhcp
             && client.take(message.content(), now_ns)

@@ -1,7 +1,7 @@
 //! A protocol's place in the network: its port, its peer, and the wires behind it.
 //!
-//! One lock has the protocol. It is held for a datagram that is heard or sent, and dropped before
-//! functions are told.
+//! A single lock guards the protocol. The lock is held for a heard or sent datagram, and dropped
+//! before functions are told.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -24,40 +24,41 @@ use crate::options::CommandLine;
 /// The protocols of this machine.
 pub(super) static PROTOCOLS: Chain<Box<dyn Station>> = Chain::new();
 
-/// A place in the network with a protocol. The network knows it by this, so that an image whose app
-/// has none has no code for any.
+/// A place in the network with a protocol. The network uses this trait, so that the image of an app
+/// without protocols contains no code for any.
 pub(super) trait Station: Send + Sync {
-    /// Returns its port.
+    /// Returns the protocol's port.
     fn port(&self) -> u16;
 
-    /// Takes a datagram, and reports whether it is the protocol's.
+    /// Takes a datagram, and reports whether it belongs to the protocol.
     fn hear(&self, datagram: &[u8], port: u16, from: Peer, now_ns: u64) -> bool;
 
-    /// Tells the app's functions of what has come. In the card's interrupt, as it may release DAGs.
+    /// Tells the app's functions about arrived packets. Called in the card's interrupt, because the
+    /// call may release DAGs.
     fn tell_come(&self);
 
-    /// Lets `send` have the next datagram that is to go. Reports whether one has gone.
+    /// Passes the next waiting datagram to `send`. Reports whether a datagram was sent.
     fn send(&self, now_ns: u64, send: &mut dyn FnMut(&mut Buffer, u16, Peer) -> Sent) -> bool;
 
-    /// Returns the first DAG that its packets release.
+    /// Returns the first DAG released by the protocol's packets.
     fn released(&self) -> Option<(u64, DagId)>;
 
-    /// Says whether the card has a link and an address.
+    /// Tells the protocol whether the card has a link and an address.
     fn set_link(&self, is_up: bool);
 
     /// Says goodbye to the peer.
     fn close(&self);
 
-    /// Says whether a session was opened or lost, in the background.
+    /// Prints whether a session was opened or lost. Called in the background.
     fn tell_news(&self);
 
-    /// Tells of the run that has ended.
+    /// Prints the protocol's report of the finished run.
     fn tell(&self);
 }
 
-/// The part of a frame's time that is a protocol's, at most: that of a message, and more for each topic.
-/// Then, once an interrupt, as its fragments fill many datagrams, that of copying a message of 8 KiB.
-/// And the time of a datagram that it sends, with more for each topic.
+/// The longest times spent in a protocol: for a message heard, and more for each topic; once an
+/// interrupt, for copying a message of 8 KiB, because its fragments fill many datagrams; for a
+/// datagram sent, again with more for each topic.
 const MESSAGE_NS: u64 = 600;
 const TOPIC_NS: u64 = 30;
 const COPIED_NS: u64 = 11_000;
@@ -66,7 +67,7 @@ const PUT_NS: u64 = 1_500;
 /// The most messages of a datagram, of which one may have come in fragments.
 const MESSAGES: u64 = 16;
 
-/// The time from one interrupt to the next if no word says so, in microseconds.
+/// The default time between two interrupts, in microseconds.
 const DISTANCE_US: u64 = 500;
 
 struct ProtocolPlace {
@@ -74,7 +75,7 @@ struct ProtocolPlace {
     ends: Box<[Arc<DeviceEnd>]>,
     port: u16,
     peer: Peer,
-    /// The wires with a packet that is not announced, as bits.
+    /// The wires with unannounced packets, as bits.
     come: AtomicU64,
 }
 

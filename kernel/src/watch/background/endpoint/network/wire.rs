@@ -1,4 +1,4 @@
-//! A wire's place in the network: its port, and whom it exchanges datagrams with.
+//! A wire's place in the network: its port, and the peers it exchanges datagrams with.
 
 use core::net::Ipv4Addr;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -13,22 +13,22 @@ pub(in super::super) struct UdpWire {
     pub(super) end: DeviceEnd,
     pub(super) port: u16,
     peer: Option<Peer>,
-    /// The peer that has sent last: its address and port, or 0.
+    /// The latest sender: its address and port, or 0.
     last: AtomicU64,
-    /// Whether a packet has come that is not announced, or one has gone that is not told.
+    /// Whether a packet has come but is not announced, or was sent but is not reported.
     has_come: AtomicBool,
     has_gone: AtomicBool,
 }
 
-/// The fate of a packet that is to be sent.
+/// The fate of a packet to be sent.
 pub(super) enum Sent {
-    /// It has gone, or can go nowhere.
+    /// The packet was sent, or can go nowhere.
     Gone,
-    /// It waits for room, or for an address.
+    /// The packet waits for room, or for an address.
     Waits,
 }
 
-/// Lets `send` have a packet with room for its headers. Reports whether it has gone.
+/// Passes a packet with room for its headers to `send`. Reports whether it is done with.
 pub(super) fn with_headers(packet: &mut Buffer, send: impl FnOnce(&mut Buffer) -> Sent) -> bool {
     let payload = packet.range();
     packet.set_range(payload.start - HEADERS..payload.end);
@@ -53,12 +53,12 @@ impl UdpWire {
         }
     }
 
-    /// Reports whether a datagram to this port is the wire's.
+    /// Reports whether a datagram to `port` belongs to the wire.
     pub(super) fn hears(&self, port: u16, from: Peer) -> bool {
         port == self.port && self.peer.is_none_or(|peer| peer == from)
     }
 
-    /// Takes a datagram, whose payload is the buffer's content.
+    /// Takes a datagram whose payload is the buffer's content.
     pub(super) fn take(&self, payload: &mut Buffer, from: Peer, now_ns: u64) {
         let bits = u64::from(from.ip().to_bits()) << 16 | u64::from(from.port());
         self.last.store(bits, Ordering::Relaxed);
@@ -67,12 +67,12 @@ impl UdpWire {
         }
     }
 
-    /// Lets `send` have the oldest packet that is to go, with room for its headers, and whom it is
-    /// to. Reports whether it has gone.
+    /// Passes the oldest waiting packet, with room for its headers, and its receiver to `send`.
+    /// Reports whether the packet is done with.
     pub(super) fn send(&self, mut send: impl FnMut(&mut Buffer, u16, Peer) -> Sent) -> bool {
         let has_gone = self.end.swap_out(|packet, to| {
             let Some(to) = to.or(self.peer).or_else(|| self.last()) else {
-                // Nobody has sent anything yet, so there is nobody whom it could be for.
+                // Nobody has sent anything yet, so the packet has no receiver.
                 return true;
             };
             with_headers(packet, |packet| send(packet, self.port, to))
@@ -90,7 +90,8 @@ impl UdpWire {
         (bits > 0).then(|| Peer::new(ip, u16::from_be_bytes([high, low])))
     }
 
-    /// Tells the app's functions of what has come. In the card's interrupt, as it may release a DAG.
+    /// Tells the app's functions about an arrived packet. Called in the card's interrupt, because
+    /// the call may release a DAG.
     pub(super) fn tell_come(&self) {
         if self.has_come.swap(false, Ordering::Relaxed)
             && let Some((plan, dag)) = self.end.announce()
@@ -99,7 +100,7 @@ impl UdpWire {
         }
     }
 
-    /// Tells those that wait of what has gone.
+    /// Tells waiting functions that a packet was sent.
     pub(super) fn tell_gone(&self) {
         if self.has_gone.swap(false, Ordering::Relaxed) {
             self.end.tell_gone();
