@@ -1,5 +1,5 @@
-//! Intel's 82574 (82574 GbE Controller Family Datasheet), as QEMU's `e1000e` has it: legacy
-//! descriptors, one ring each way, one message.
+//! The driver for Intel's 82574 (82574 GbE Controller Family Datasheet), as emulated by QEMU's
+//! `e1000e`: legacy descriptors, a single ring each way, a single message.
 
 use core::sync::atomic::{Ordering, fence};
 
@@ -26,7 +26,7 @@ mod register {
     pub(super) const LENGTH: u64 = 0x5408;
 }
 
-/// Registers of a ring, from its first.
+/// Registers of a ring, relative to its first register.
 const RING_LENGTH: u64 = 8;
 const RING_TAIL: u64 = 0x18;
 
@@ -34,31 +34,31 @@ const RING_TAIL: u64 = 0x18;
 const RESET: u32 = 1 << 26;
 const SET_LINK_UP: u32 = 1 << 6;
 const LINK_UP: u32 = 1 << 1;
-/// A message leaves the mask as it is.
+/// A message leaves the mask unchanged.
 const KEEP_MASK: u32 = 1 << 27;
 
-/// The cause of a received frame, where it has a message of its own, and the registers' word
-/// for number 0 as that message.
+/// The cause "frame received", for a message of its own, and the value of the message register that
+/// makes it message 0.
 const RECEIVED: u32 = 1 << 20;
 const MESSAGE_IS_RECEIVED: u32 = 1 << 3;
 
-/// On, with broadcasts, without check sums, by buffers of 2048 bytes.
+/// On, with broadcasts, without check sums, with buffers of 2048 bytes.
 const RECEIVE_ON: u32 = 1 << 1 | 1 << 15 | 1 << 26;
-/// On, with short frames padded, and the times of half-duplex that the data sheet names.
+/// On, with short frames padded, and the times of half-duplex given in the data sheet.
 const TRANSMIT_ON: u32 = 1 << 1 | 1 << 3 | 0x0f << 4 | 0x40 << 12;
 
 /// A descriptor: the buffer's address, 8 bytes; its length and the commands; its state.
 const DESCRIPTOR: usize = 16;
 const LENGTH: usize = 8;
 const STATE: usize = 12;
-/// Bits of the state: the card is done with it; the frame ends here. Errors are above them.
+/// Bits of the state: the card is done with the descriptor; the frame ends here. Errors are above.
 const DONE: u32 = 1;
 const WHOLE: u32 = 1 << 1;
 const ERRORS: u32 = 0xff << 8;
-/// The commands of a frame that is sent: it ends here, has a check sum, and its state is wanted.
+/// The commands of a sent frame: it ends here, gets a check sum, and its state is reported.
 const SEND: u32 = 0b1011 << 24;
 
-/// Buffers are given back to the card so many at a time: each time costs a register.
+/// The number of buffers given back to the card at a time: each time costs a write to a register.
 const BATCH: u16 = 8;
 
 /// Opens a card.
@@ -91,13 +91,14 @@ fn start(registers: Registers) -> Result<[LegacyRing; 2], Fault> {
     Ok(queues)
 }
 
-/// A ring. The card has the descriptors from its head, which it moves, to the tail, which it is
-/// told; where both are the same it has none. So of those that were given it has one less.
+/// A ring. The card has the descriptors from the head, which the card moves, to the tail, which the
+/// driver sets. If both are the same, the card has none. So the card has one descriptor less than
+/// it was given.
 struct LegacyRing {
     registers: Registers,
     first: u64,
     memory: DmaMemory,
-    /// How many descriptors were given, and how many were taken back, ever.
+    /// The total numbers of descriptors given to the card, and of descriptors taken back.
     given: u16,
     taken: u16,
 }
@@ -133,7 +134,7 @@ impl Ring for LegacyRing {
     fn post(&mut self, id: u16, address: u64, length: u16) {
         let place = DESCRIPTOR * usize::from(id);
         self.memory.write64(place, address);
-        // The state, above, becomes 0.
+        // The state, in the word's upper half, becomes 0.
         let word = u64::from(SEND | u32::from(length));
         self.memory.write64(place + LENGTH, word);
         self.given = self.given.wrapping_add(1);
@@ -166,8 +167,9 @@ impl Ring for LegacyRing {
         if !is_on {
             return self.registers.write32(register::MASK_CLEAR, RECEIVED);
         }
-        // The card forgets the frames that came since it was off: they are seen without a message.
-        // It has done so when it answers the read, before anyone looks at the ring.
+        // Clearing the cause makes the card forget the frames received with the message off; the
+        // caller sees them without a message. Once the read is answered, the card has done so,
+        // before anyone looks at the ring.
         self.registers.write32(register::CAUSE, RECEIVED);
         self.registers.write32(register::MASK_SET, RECEIVED);
         let _ = self.registers.read32(register::STATUS);
@@ -175,7 +177,7 @@ impl Ring for LegacyRing {
 
     fn is_linked(&self) -> bool {
         let status = self.registers.read32(register::STATUS);
-        // All ones: it is not there any more.
+        // All ones: the card is not there any more.
         status & LINK_UP != 0 && status != u32::MAX
     }
 }

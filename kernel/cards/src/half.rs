@@ -1,4 +1,4 @@
-//! Half a driver: a ring of one kind of card, and the buffers of its descriptors.
+//! Half of a driver: a ring of some kind of card, and the buffers of its descriptors.
 
 use alloc::boxed::Box;
 use core::mem::ManuallyDrop;
@@ -8,44 +8,45 @@ use fass::platform::Buffer;
 
 use super::{Receive, Transmit};
 
-/// The descriptors of a ring.
+/// The number of descriptors of a ring.
 pub(crate) const RING: u16 = 64;
 
-/// The bytes of a buffer that a card may fill.
+/// The size of a buffer for a card to fill, in bytes.
 pub(crate) const FILLED: u16 = 2048;
 const _: () = assert!(FILLED as usize == Buffer::LEAST_BYTES);
 
-/// The lengths of frames: of Ethernet's header, of the shortest that is sent, and of the longest.
+/// The lengths of frames, in bytes: of Ethernet's header, of the shortest frame sent, and of the
+/// longest frame.
 const LEAST_FRAME: usize = 14;
 const PADDED_FRAME: usize = 60;
 const MOST_FRAME: usize = 1514;
 
-/// The buffers of a ring, by the numbers of their descriptors.
+/// The buffers of a ring, indexed by the numbers of their descriptors.
 pub(crate) type Buffers = ManuallyDrop<Box<[Buffer]>>;
 
-/// A ring of descriptors. What it says is what the card says.
+/// A ring of descriptors. Its answers are the card's, and so not trusted.
 pub(crate) trait Ring: Send + 'static {
     /// The bytes of the header before each frame.
     const HEADER: usize;
 
-    /// Returns a descriptor that the card does not have.
+    /// Returns a descriptor not held by the card.
     fn free(&self) -> Option<u16>;
-    /// Gives the card a descriptor that it does not have, with a buffer.
+    /// Gives the card a descriptor not held by it, with a buffer.
     fn post(&mut self, id: u16, address: u64, length: u16);
-    /// Tells the card of descriptors that it was given.
+    /// Tells the card about the descriptors it was given.
     fn ring(&mut self);
     /// Returns whether the card is done with a descriptor.
     fn is_done(&self) -> bool;
-    /// Takes that descriptor back, with the end of what was filled, 0 if that is no frame. `None`:
-    /// the card says what cannot be.
+    /// Takes back the descriptor, with the end of the filled bytes, 0 if they are no frame. Returns
+    /// `None` if the card's answer is impossible.
     fn take(&mut self) -> Option<(u16, usize)>;
-    /// Has the card send its message for a descriptor that it is done with, or not.
+    /// Allows or stops the card's message about a descriptor it is done with.
     fn set_interrupt(&mut self, is_on: bool);
     /// Returns whether the card has a link.
     fn is_linked(&self) -> bool;
 }
 
-/// A ring and its buffers. It is dead after the card has said what cannot be.
+/// A ring and its buffers. The half is dead after an impossible answer of the card.
 pub(crate) struct Half<R> {
     pub(crate) ring: R,
     pub(crate) buffers: Buffers,
@@ -69,7 +70,7 @@ impl<R: Ring> Half<R> {
         (0..RING).for_each(|id| self.fill(id));
     }
 
-    /// Gives the card a buffer to be filled. Of one that is too short the half dies.
+    /// Gives the card a buffer to be filled. A buffer that is too short kills the half.
     fn fill(&mut self, id: u16) {
         let bytes = self.buffers[usize::from(id)].whole();
         if bytes.len() < FILLED.into() {
@@ -109,7 +110,8 @@ impl<R: Ring> Receive for Half<R> {
 
     fn set_interrupt(&mut self, is_on: bool) -> bool {
         self.ring.set_interrupt(is_on && !self.is_dead);
-        // What the card has done by now is seen; of what it does after that it tells.
+        // This sees everything the card had done before the fence; the card's message tells about
+        // the rest.
         fence(Ordering::SeqCst);
         self.is_done()
     }
@@ -125,7 +127,8 @@ impl<R: Ring> Receive for Half<R> {
 
 impl<R: Ring> Transmit for Half<R> {
     fn send(&mut self, frame: &mut Buffer) -> bool {
-        // Two, so that each frame pays for one at most besides its own, and all come back.
+        // Each frame sent takes back two buffers at most: a bounded cost, and yet all buffers come
+        // back.
         (0..2).all(|_| self.take().is_some());
         let Some(id) = self.ring.free().filter(|_| !self.is_dead) else {
             return false;
@@ -148,8 +151,8 @@ fn address(bytes: &mut [u8]) -> u64 {
     bytes.as_mut_ptr().expose_provenance() as u64
 }
 
-/// Puts zeros before a frame, a header of a card, and after it where it is short. Returns the
-/// address of the header and the whole length; `None`: that is no frame.
+/// Puts zeros before a frame, as a card's header, and after a short frame. Returns the address of
+/// the header and the whole length, or `None` if the buffer has no valid frame.
 fn framed(buffer: &mut Buffer, header: usize) -> Option<(u64, u16)> {
     let frame = buffer.range();
     let start = frame.start.checked_sub(header)?;

@@ -1,17 +1,17 @@
-//! Network cards, by PCI: virtio-net and Intel's 82574.
+//! Drivers for PCI network cards: virtio-net and Intel's 82574.
 //!
-//! A card has two rings of descriptors, each of which names a buffer: one ring of buffers that it
-//! fills, one of buffers that it sends. A driver is in two halves, one for each ring, so that one
-//! core may receive while another sends. Frames are not copied: their buffers are swapped.
+//! A card has two rings of descriptors: a ring of buffers to fill, and a ring of buffers to send.
+//! Each descriptor names a buffer. A driver has two halves, one for each ring, so that a core may
+//! receive while another core sends. Frames are not copied: their buffers are swapped.
 //!
-//! **Reach invariant**: a card is told the addresses of its rings, which are [DMA
-//! memory](executive::devices::dma), and of the buffers of its halves, each with a length within
-//! it. A buffer leaves these when the card has said that it is done with it. Those of a driver
-//! that is dropped are never given back.
+//! **Reach invariant**: a card is told only the addresses of its rings, which are [DMA
+//! memory](executive::devices::dma), and of its halves' buffers, each with a length within the
+//! buffer. A buffer leaves its half only after the card has reported that it is done with the
+//! buffer. The buffers of a dropped driver are never freed.
 //!
-//! Nothing that a card says is believed. A length that cannot be costs the frame. A statement
-//! about buffers that cannot be ends the ring: it receives or sends nothing any more. Against a
-//! card that writes where it was not told, nothing here helps.
+//! Nothing a card reports is trusted. An impossible length costs the frame. An impossible statement
+//! about buffers ends the ring, which then receives or sends nothing any more. Nothing here helps
+//! against a card that writes outside of its buffers.
 
 #![no_std]
 
@@ -35,51 +35,54 @@ use net::Mac;
 
 use half::{Half, Ring};
 
-/// A card that is ready. It sends no message before it [is told to](Receive::set_interrupt).
+/// A card ready for use. It sends no message before [a call](Receive::set_interrupt) allows
+/// messages.
 pub struct Card {
-    /// Its address.
+    /// The card's address.
     pub mac: Mac,
-    /// The number of its message that tells of received frames.
+    /// The number of the card's message about received frames.
     pub message: u16,
-    /// The half that receives.
+    /// The receiving half.
     pub receiver: Box<dyn Receive>,
-    /// The half that sends.
+    /// The sending half.
     pub transmitter: Box<dyn Transmit>,
 }
 
-/// The half of a driver that receives.
+/// The receiving half of a driver.
 pub trait Receive: Send {
-    /// Takes the next frame that came, and hands its buffer to `each`, which may swap it for
-    /// another of at least [`Buffer::LEAST_BYTES`]; the card fills it next. Returns false if there
-    /// was none. A frame that cannot be is dropped: it counts as one, and `each` is not called.
+    /// Takes the next received frame, and hands its buffer to `each`. `each` may swap the buffer
+    /// for another of at least [`Buffer::LEAST_BYTES`], which the card fills next. Returns false if
+    /// there was no frame. An impossible frame is dropped: it counts as a frame, but `each` is not
+    /// called.
     fn receive(&mut self, each: &mut dyn FnMut(&mut Buffer)) -> bool;
 
-    /// Has the card send its message when a frame comes, or not. Returns whether there are frames
-    /// already: of these there may be no message. One that was on its way comes all the same.
+    /// Allows or stops the card's message about a received frame. Returns whether frames have been
+    /// received already; there may be no message about them. A message on its way comes all the
+    /// same.
     fn set_interrupt(&mut self, is_on: bool) -> bool;
 
     /// Returns whether the card has a link, and works.
     fn is_linked(&self) -> bool;
 
-    /// Returns how many frames were dropped since they cannot be.
+    /// Returns the number of frames dropped as impossible.
     fn dropped(&self) -> u64;
 }
 
-/// The half of a driver that sends.
+/// The sending half of a driver.
 pub trait Transmit: Send {
-    /// Takes a frame: swaps its buffer for a free one. Returns false if there is no room; the
-    /// buffer is as before. What is no frame, by its length or without 12 bytes before it for the
-    /// header of a card, is dropped.
+    /// Takes a frame: swaps its buffer for a free one. Returns false, with the buffer unchanged, if
+    /// there is no room. A buffer with no valid frame, judged by its length, or without 12 bytes of
+    /// room before the frame for a card's header, is dropped.
     fn send(&mut self, frame: &mut Buffer) -> bool;
 
-    /// Tells the card of what was sent since.
+    /// Tells the card about the frames sent since the last call.
     fn ring(&mut self);
 }
 
-/// Why a card cannot be used.
+/// The reason why a card cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardError {
-    /// The place of its function.
+    /// The place of the card's PCI function.
     pub place: Place,
     /// The fault.
     pub fault: Fault,
@@ -88,9 +91,9 @@ pub struct CardError {
 /// A fault of a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Its registers cannot be had.
+    /// The card's registers are not accessible.
     Range(PciError),
-    /// There is none of this, which its driver needs.
+    /// The card lacks this, which its driver needs.
     Lacks(&'static str),
 }
 
@@ -104,10 +107,10 @@ impl fmt::Display for CardError {
     }
 }
 
-/// How a driver gets a range of its function's registers.
+/// A function by which a driver gets a range of its card's registers.
 type Map<'m> = &'m dyn Fn(u8) -> Result<Registers, PciError>;
 
-/// Opens a function if it is a card that is known, and allocates all that it will ever need.
+/// Opens a PCI function if it is a known card, and allocates everything it will ever need.
 #[must_use]
 pub fn open(function: &Function<'_>) -> Option<Result<Card, CardError>> {
     open_by(function, &|bar| Registers::of(function, bar))
@@ -119,13 +122,13 @@ fn open_by(function: &Function<'_>, map: Map<'_>) -> Option<Result<Card, CardErr
         (0x8086, 0x10d3) => e1000e::open,
         _ => return None,
     };
-    // Whatever it was told before, it reaches no memory until it has been reset.
+    // Whatever the card was told before, it reaches no memory until it has been reset.
     function.enable();
     let place = function.place;
     Some(open(function, map).map_err(|fault| CardError { place, fault }))
 }
 
-/// Makes a card of its address and its rings.
+/// Makes a card from its address and its rings.
 fn card<R: Ring>(mac: [u8; 6], [receive, transmit]: [R; 2]) -> Result<Card, Fault> {
     let is_one = mac[0] & 1 == 0 && mac != [0; 6];
     let lacks = Fault::Lacks("address of one card; give it one");
@@ -140,17 +143,18 @@ fn card<R: Ring>(mac: [u8; 6], [receive, transmit]: [R; 2]) -> Result<Card, Faul
     })
 }
 
-/// The message of received frames, of either card.
+/// The message about received frames, of either card.
 const MESSAGE: u16 = 0;
 
 /// Lets a card reach memory, after its reset.
 #[expect(unsafe_code, reason = "the one step that the compiler cannot judge")]
 fn enable_reach(function: &Function<'_>) {
-    // SAFETY: it is told nothing but its rings and the buffers of its halves (reach invariant).
+    // SAFETY: the card is told nothing but its rings and the buffers of its halves (reach
+    // invariant).
     unsafe { function.enable_reach() };
 }
 
-/// Waits for the end of a card's reset. A read of a register takes a good part of a microsecond.
+/// Waits for the end of a card's reset. Reading a register takes a good part of a microsecond.
 fn wait(is_reset: impl Fn() -> bool) -> Result<(), Fault> {
     let lacks = Fault::Lacks("end of its reset; turn the machine off and on");
     (0..100_000).any(|_| is_reset()).then_some(()).ok_or(lacks)
@@ -162,7 +166,7 @@ fn new_memory() -> Result<DmaMemory, Fault> {
     DmaMemory::new(4096).ok_or(lacks)
 }
 
-/// Tells a card an address, by the two registers of its halves.
+/// Tells a card an address, by the two registers of the address's halves.
 fn tell_address(registers: Registers, register: u64, address: u64) {
     let [a, b, c, d, high @ ..] = address.to_le_bytes();
     registers.write32(register, u32::from_le_bytes([a, b, c, d]));

@@ -1,7 +1,7 @@
-//! virtio-net by PCI (Virtual I/O Device Version 1.1: 2.6 split rings, 4.1 PCI, 5.1 network).
+//! virtio-net on PCI (Virtual I/O Device Version 1.1: 2.6 split rings, 4.1 PCI, 5.1 network).
 //!
-//! A frame is one descriptor: its header, which is zeros as nothing of it is negotiated, lies
-//! right before it in its buffer.
+//! A frame is a single descriptor. The frame's header lies right before it in its buffer, and is
+//! all zeros, because no header feature is negotiated.
 
 use core::sync::atomic::{Ordering, fence};
 
@@ -38,13 +38,14 @@ const AT_WORK: u8 = CHOSEN | 4;
 const ADDRESS_AND_LINK: u32 = 1 << 5 | 1 << 16;
 const VERSION_1: u32 = 1;
 
-/// The link's state among the registers of the device, behind its address, and their length.
+/// The link's state among the device's registers, after the device's address, and the length of
+/// these registers.
 const LINK: u64 = 6;
 const DEVICE: u64 = 8;
 
-/// The parts of a ring's page: descriptors, those that the card is given, those that it is done
-/// with. The latter two begin with flags, of which bit 0 is "do not call", and an index; the last
-/// one's elements, behind these, are words of 8 bytes.
+/// The parts of a ring's page: descriptors, descriptors given to the card, descriptors the card is
+/// done with. The latter two begin with flags, whose bit 0 means "do not call", and an index. The
+/// elements of the last part, after the index, are words of 8 bytes.
 const GIVEN: usize = 16 * RING as usize;
 const DONE: usize = 2052;
 
@@ -59,18 +60,18 @@ pub(super) fn open(function: &Function<'_>, map: Map<'_>) -> Result<Card, Fault>
     card(mac, interface.start()?)
 }
 
-/// A card's registers.
+/// The registers of a card.
 #[derive(Clone, Copy)]
 struct Interface {
     common: Registers,
     bells: Registers,
-    /// The distance of two bells.
+    /// The distance between two bells, in bytes.
     distance: u32,
     device: Registers,
 }
 
 impl Interface {
-    /// Finds the registers by the capabilities that tell of them (4.1.4).
+    /// Finds the registers by the capabilities describing them (4.1.4).
     fn find(function: &Function<'_>, map: Map<'_>) -> Result<Self, Fault> {
         const VENDOR: u8 = 9;
         let lacks = Fault::Lacks("interface of virtio 1.0; use QEMU's virtio-net-pci");
@@ -126,9 +127,9 @@ impl Interface {
 /// A ring: number 0 is filled, number 1 is sent.
 struct SplitRing {
     memory: DmaMemory,
-    /// The descriptors that the card has, a bit each.
+    /// A bit for each descriptor held by the card.
     out: u64,
-    /// How many it was given, and how many were taken back, ever.
+    /// The numbers of descriptors given to the card, and taken back, ever.
     given: u16,
     taken: u16,
     number: u16,
@@ -170,12 +171,13 @@ impl SplitRing {
         })
     }
 
-    /// Returns the place of an element of a part, behind flags and index, by its number ever.
+    /// Returns the place of an element of a part, after flags and index, by the element's number
+    /// since the start.
     fn place(&self, part: usize, bytes: usize, number: u16) -> usize {
         part + 4 + bytes * usize::from(number & (RING - 1))
     }
 
-    /// Returns how many descriptors the card is done with, as it says.
+    /// Returns the number of descriptors the card reports as done.
     fn done(&self) -> u16 {
         self.memory.read16(DONE + 2).wrapping_sub(self.taken)
     }
@@ -204,7 +206,7 @@ impl Ring for SplitRing {
 
     fn ring(&mut self) {
         fence(Ordering::SeqCst);
-        // It may not want to know.
+        // The card may not want to be called.
         if self.memory.read16(DONE) & 1 == 0 {
             self.bell.write16(0, self.number);
         }
@@ -219,7 +221,7 @@ impl Ring for SplitRing {
         let element = self.memory.read64(self.place(DONE, 8, self.taken));
         let (id, end) = (element & 0xffff_ffff, element >> 32);
         let is_out = id < 64 && self.out >> id & 1 == 1;
-        // One that it was not given, or more than it was given?
+        // A descriptor not held by the card, or more than it was given? Then the ring ends.
         if !is_out || self.done() > self.given.wrapping_sub(self.taken) {
             return None;
         }

@@ -5,10 +5,10 @@ use core::net::Ipv4Addr;
 use crate::Mac;
 use crate::bytes::{array, ip_at, mac_at, u16_at};
 
-/// The number of neighbours that are known at a time.
+/// The number of neighbours known at a time.
 const NEIGHBOURS: usize = 8;
 
-/// The bytes of an ARP packet, behind the Ethernet header.
+/// The bytes of an ARP packet, after the Ethernet header.
 pub(crate) const LENGTH: usize = 28;
 
 /// Ethernet and IPv4, with addresses of 6 and 4 bytes.
@@ -49,14 +49,14 @@ impl ArpPacket {
 }
 
 struct Neighbour<B> {
-    /// Unspecified in a place that is free.
+    /// Unspecified in a free place.
     ip: Ipv4Addr,
-    /// None while the question for it has no answer.
+    /// None while the question for the address has no answer.
     mac: Option<Mac>,
-    /// Room for the latest frame that waits for the answer, and whether there is one.
+    /// Room for the latest frame waiting for the answer, and whether there is such a frame.
     frame: B,
     is_waiting: bool,
-    /// Counts the uses of the table; 0 if nothing was ever sent to this neighbour.
+    /// The count of uses at the latest use of this neighbour; 0 if nothing was ever sent to it.
     last_use: u64,
 }
 
@@ -85,8 +85,8 @@ impl<B> Neighbours<B> {
         self.table.iter_mut().find(|known| known.ip == ip)
     }
 
-    /// Returns the neighbour of an address. The one that was not sent to for the longest time
-    /// makes room for a new one, so strangers who ask displace each other only.
+    /// Returns the neighbour of an address. A new neighbour replaces the neighbour not sent to for
+    /// the longest time, so strangers with questions displace only each other.
     fn entry(&mut self, ip: Ipv4Addr) -> &mut Neighbour<B> {
         let oldest = (0..NEIGHBOURS).min_by_key(|&place| {
             let known = &self.table[place];
@@ -101,7 +101,7 @@ impl<B> Neighbours<B> {
         place
     }
 
-    /// Returns the Ethernet address of a neighbour that a frame is to be sent to, if it is known.
+    /// Returns the Ethernet address of the neighbour a frame is to be sent to, if known.
     pub(crate) fn resolve(&mut self, ip: Ipv4Addr) -> Option<Mac> {
         self.uses += 1;
         let uses = self.uses;
@@ -115,8 +115,8 @@ impl<B> Neighbours<B> {
         self.table.iter_mut().for_each(|known| known.mac = None);
     }
 
-    /// Keeps a frame until its neighbour has answered, by swapping it for the one that was kept
-    /// before.
+    /// Keeps a frame until its neighbour has answered, by swapping the frame for the previously
+    /// kept frame.
     pub(crate) fn keep(&mut self, ip: Ipv4Addr, frame: &mut B) {
         let uses = self.uses;
         let neighbour = self.entry(ip);
@@ -127,7 +127,7 @@ impl<B> Neighbours<B> {
 
     /// Learns from a packet, and returns the place of the frame that has waited for it.
     ///
-    /// Only those are added that ask for us; those known, or asked for, are renewed.
+    /// Only neighbours asking for us are added; neighbours known, or asked for, are renewed.
     pub(crate) fn learn(&mut self, (mac, ip): (Mac, Ipv4Addr), asks_us: bool) -> Option<usize> {
         let neighbour = match asks_us {
             true => self.entry(ip),

@@ -1,4 +1,4 @@
-//! Numbers in the order of the network, and the check sum of RFC 1071.
+//! Numbers in network byte order, and the check sum of RFC 1071.
 
 use core::net::Ipv4Addr;
 
@@ -29,15 +29,15 @@ pub(crate) fn mac_at(bytes: &[u8], at: usize) -> Option<Mac> {
 ///
 /// # Panics
 ///
-/// Panics if they do not fit: a buffer has room for all headers.
+/// Panics if the bytes do not fit: a buffer has room for all headers.
 pub(crate) fn put(bytes: &mut [u8], at: usize, what: &[u8]) {
     bytes[at..at + what.len()].copy_from_slice(what);
 }
 
 /// Adds bytes to a sum of 16-bit words. An odd last byte is the upper half of a word.
 ///
-/// Words of 64 bits are added in this machine's order: their sum has the same remainder as that of
-/// their quarters, but for the order of two bytes.
+/// Words of 64 bits are added in this machine's byte order: their sum has the same remainder as the
+/// sum of their quarters, except for the order of two bytes.
 pub(crate) fn sum(bytes: &[u8], before: u64) -> u64 {
     let word = |word: &[u8; 8]| u128::from(u64::from_le_bytes(*word));
     let (words, rest) = bytes.as_chunks::<8>();
@@ -51,12 +51,12 @@ pub(crate) fn sum(bytes: &[u8], before: u64) -> u64 {
     before + u64::from(folded(whole).swap_bytes())
 }
 
-/// Returns the check sum of what was added: 0 if it was added with its own right check sum.
+/// Returns the check sum of the added bytes: 0 if they include their own right check sum.
 pub(crate) fn check_sum(sum: u64) -> u16 {
     !folded(sum.into())
 }
 
-/// Adds the words of 16 bits that a number has, and so on, until it is one.
+/// Adds a number's words of 16 bits, repeatedly, until a single word is left.
 fn folded(sum: u128) -> u16 {
     let half = |sum: u128, bits: u32| (sum & ((1 << bits) - 1)) + (sum >> bits);
     // The halves of 65 bits have 33, and so on.

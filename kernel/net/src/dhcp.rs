@@ -1,4 +1,5 @@
-//! The client of DHCP (RFC 2131): an address from a server, renewed while it answers.
+//! The client of DHCP (RFC 2131): gets an address from a server, and renews it as long as the
+//! server answers.
 
 use core::net::Ipv4Addr;
 
@@ -6,10 +7,10 @@ use crate::bytes::{array, ip_at, put, u32_at};
 use crate::interface::is_host;
 use crate::{Address, Mac, Peer};
 
-/// The bytes of a message that is sent: with fewer some relays drop it (RFC 1542, 2.1).
+/// The bytes of a sent message: some relays drop shorter messages (RFC 1542, 2.1).
 const LENGTH: usize = 300;
 
-/// The most options that are read, padding among them: an interrupt is not to be longer by it.
+/// The most options read, padding included: a limit on the time spent in an interrupt.
 const MOST_OPTIONS: usize = 64;
 
 const COOKIE_AT: usize = 236;
@@ -23,14 +24,14 @@ const NAK: u8 = 6;
 
 const NS_PER_S: u64 = 1_000_000_000;
 
-/// An address that a server has given.
+/// An address given by a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lease {
     /// The address.
     pub address: Address,
     /// The server.
     pub server: Ipv4Addr,
-    /// Its length in seconds; `u32::MAX` has no end.
+    /// The length of the lease in seconds; `u32::MAX` means without an end.
     pub seconds: u32,
 }
 
@@ -38,21 +39,22 @@ pub struct Lease {
 enum State {
     /// Looks for a server.
     Discovering,
-    /// Asks for what a server has offered.
+    /// Asks for the lease offered by a server.
     Requesting(Lease),
     /// Has an address until a time, and renews it.
     Bound { lease: Lease, end_ns: u64 },
 }
 
-/// A client. Its messages go from port [`Client::PORT`] to [`Client::SERVERS`], and come to that
-/// port. It has no clock: each call is told the time.
+/// A client. Its messages go from port [`Client::PORT`] to [`Client::SERVERS`], and the answers
+/// come to that port. The client has no clock: each call is told the time.
 pub struct Client {
     mac: Mac,
     transaction: u32,
     state: State,
     /// The time at which the next message is due.
     due_ns: u64,
-    /// The time to the message after it, if none answers. It doubles up to 64 s.
+    /// The time from the next message to the one after it, if nobody answers. It doubles up to 64
+    /// s.
     patience_ns: u64,
 }
 
@@ -63,8 +65,8 @@ impl Client {
     /// All servers of the network.
     pub const SERVERS: Peer = Peer::new(Ipv4Addr::BROADCAST, 67);
 
-    /// Returns a client that looks for a server at once. `transaction` is any number that clients
-    /// in the same network are unlikely to share.
+    /// Returns a client that looks for a server at once. `transaction` is any number unlikely to be
+    /// shared by clients in the same network.
     pub const fn new(mac: Mac, transaction: u32) -> Self {
         Self {
             mac,
@@ -80,7 +82,7 @@ impl Client {
         self.due_ns
     }
 
-    /// Returns the address that a server has given, while its time lasts.
+    /// Returns the lease given by a server, while its time lasts.
     pub const fn lease(&self) -> Option<Lease> {
         match self.state {
             State::Bound { lease, .. } => Some(lease),
@@ -88,8 +90,8 @@ impl Client {
         }
     }
 
-    /// Writes the message that is due, and returns its length. At the end of a lease that no
-    /// server has renewed the address is lost, and the client begins anew.
+    /// Writes the message that is due, and returns its length. At the end of a lease not renewed by
+    /// any server, the address is lost, and the client starts over.
     ///
     /// # Panics
     ///
@@ -141,7 +143,7 @@ impl Client {
             State::Discovering => DISCOVER,
             _ => REQUEST,
         };
-        // The kind, and what is asked for: mask, router, length of the lease, server.
+        // The kind, and the requested values: mask, router, length of the lease, server.
         put(message, 240, &[53, 1, kind, 55, 4, 1, 3, 51, 54, 255]);
         match self.state {
             State::Discovering => {}
@@ -156,8 +158,8 @@ impl Client {
         }
     }
 
-    /// Takes a message, and returns whether [`Client::lease`] has changed. A message that is
-    /// malformed, or not for this client, changes nothing.
+    /// Takes a message, and returns whether [`Client::lease`] has changed. A malformed message, or
+    /// a message to another client, changes nothing.
     pub fn take(&mut self, payload: &[u8], now_ns: u64) -> bool {
         let Some((kind, server, lease)) = self.read(payload) else {
             return false;
@@ -180,7 +182,8 @@ impl Client {
                 self.enter(State::Bound { lease, end_ns }, renewal_ns);
                 before != Some(lease)
             }
-            // Not of anyone: who can send might else have this client ask without an end.
+            // Only the asked server counts: otherwise any sender could keep this client asking
+            // forever.
             (State::Requesting(asked) | State::Bound { lease: asked, .. }, NAK, _)
                 if server == Some(asked.server) =>
             {
@@ -192,7 +195,7 @@ impl Client {
         }
     }
 
-    /// Reads the kind of an answer to this client, its server, and the lease in it if there is a
+    /// Reads the kind of an answer to this client, the server, and the lease if the answer has a
     /// whole one.
     fn read(&self, message: &[u8]) -> Option<(u8, Option<Ipv4Addr>, Option<Lease>)> {
         let is_ours = array(message, 0)? == [2, 1, 6]
@@ -229,7 +232,7 @@ impl Client {
         let lease = || {
             let (mask, seconds) = (mask?, seconds?);
             let is_network = mask.leading_ones() + mask.trailing_zeros() == 32;
-            // What is shorter than two seconds would be asked for without an end.
+            // A lease shorter than two seconds would be renewed almost without a pause.
             let prefix = u8::try_from(mask.leading_ones()).ok()?;
             let address = Address {
                 ip,

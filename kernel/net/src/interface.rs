@@ -1,4 +1,5 @@
-//! The interface: what each frame that came means, and the headers of what is sent.
+//! The interface: finds the meaning of each received frame, and writes the headers of each sent
+//! frame.
 
 use core::net::Ipv4Addr;
 use core::ops::Range;
@@ -11,7 +12,7 @@ use crate::{Mac, Peer, udp};
 /// The bytes of all headers before a datagram's payload: Ethernet, IPv4, UDP.
 pub const HEADERS: usize = ipv4::START + ipv4::LENGTH + udp::LENGTH;
 
-/// The most bytes of a datagram's payload, which make a frame of 1514 bytes.
+/// The most bytes of a datagram's payload; they make a frame of 1514 bytes.
 pub const MOST_PAYLOAD: usize = 1500 - ipv4::LENGTH - udp::LENGTH;
 
 const TYPE_IPV4: u16 = 0x0800;
@@ -22,7 +23,7 @@ const TYPE_ARP: u16 = 0x0806;
 pub struct Address {
     /// The address; unspecified (0.0.0.0) while there is none.
     pub ip: Ipv4Addr,
-    /// The number of leading bits that all addresses of the network share, 0 to 32.
+    /// The number of leading bits shared by all addresses of the network, 0 to 32.
     pub prefix: u8,
     /// The router to all other networks.
     pub gateway: Option<Ipv4Addr>,
@@ -36,7 +37,7 @@ impl Address {
         gateway: None,
     };
 
-    /// Returns whether it may be that of one host, by a router that may be one.
+    /// Returns whether the address, and that of the router, may each belong to a single host.
     #[must_use]
     pub fn is_of_a_host(&self) -> bool {
         let mut ips = [Some(self.ip), self.gateway].into_iter().flatten();
@@ -52,30 +53,30 @@ impl Address {
     }
 
     fn is_for_all(&self, ip: Ipv4Addr) -> bool {
-        // Networks of two addresses and of one have no address of all.
+        // Networks of two addresses and of one have no broadcast address.
         ip == Ipv4Addr::BROADCAST || self.prefix < 31 && ip == self.broadcast()
     }
 
-    /// Returns the neighbour by which an address is reached.
+    /// Returns the neighbour through which an address is reached.
     fn next_hop(&self, ip: Ipv4Addr) -> Option<Ipv4Addr> {
         let is_near = (self.ip.to_bits() ^ ip.to_bits()) & !self.host_bits() == 0;
         if is_near { Some(ip) } else { self.gateway }
     }
 }
 
-/// Returns whether an address may be that of one host.
+/// Returns whether an address may belong to a single host.
 pub(crate) fn is_host(ip: Ipv4Addr) -> bool {
     !(ip.is_unspecified() || ip.is_multicast() || ip.is_broadcast())
 }
 
-/// The numbers of frames that came, by what they were.
+/// The numbers of received frames, by their kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// All frames.
     pub frames: u64,
-    /// Those with a wrong length, check sum or header.
+    /// Frames with a wrong length, check sum or header.
     pub malformed: u64,
-    /// Those of other addresses, other protocols, and fragments.
+    /// Frames for other addresses, of other protocols, and fragments.
     pub foreign: u64,
     /// ARP packets.
     pub arps: u64,
@@ -85,14 +86,14 @@ pub struct Counts {
     pub datagrams: u64,
 }
 
-/// A datagram in the frame that was heard.
+/// A datagram in the received frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Datagram {
     /// The sender.
     pub from: Peer,
-    /// The port to which it was sent.
+    /// The port to which the datagram was sent.
     pub port: u16,
-    /// The place of its payload in the frame.
+    /// The place of the payload in the frame.
     pub payload: Range<usize>,
 }
 
@@ -105,9 +106,9 @@ pub struct Kept(usize);
 pub enum Heard {
     /// Nothing is to be done.
     Nothing,
-    /// The frame's first bytes have become the answer to it, which is to be sent.
+    /// The frame's first bytes have become the answer, which is to be sent.
     Answer {
-        /// The number of these bytes.
+        /// The number of the answer's bytes.
         length: usize,
         /// A kept frame whose neighbour has become known by the question.
         resolved: Option<Kept>,
@@ -118,13 +119,13 @@ pub enum Heard {
     Datagram(Datagram),
 }
 
-/// The way of a frame whose headers have been written.
+/// The next step for a frame whose headers have been written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
     /// The frame is whole, and is to be sent.
     Ready,
     /// This neighbour is to be [asked](Interface::question), and the frame to be
-    /// [kept](Interface::keep) until it answers.
+    /// [kept](Interface::keep) until the neighbour answers.
     Unresolved(Ipv4Addr),
     /// No neighbour leads to the address, as there is no gateway or no address yet.
     None,
@@ -140,8 +141,8 @@ pub struct Interface<B> {
 }
 
 impl<B: AsMut<[u8]>> Interface<B> {
-    /// Returns the interface of a card. Each `room` is for a frame that waits for a neighbour's
-    /// answer.
+    /// Returns the interface of a card. Each call of `room` makes a buffer for a frame waiting for
+    /// a neighbour's answer.
     pub fn new(mac: Mac, address: Address, room: impl FnMut() -> B) -> Self {
         Self {
             mac,
@@ -157,17 +158,17 @@ impl<B: AsMut<[u8]>> Interface<B> {
         self.address
     }
 
-    /// Takes another address, as DHCP gives and withdraws it.
+    /// Sets another address, as DHCP gives and withdraws addresses.
     pub fn set_address(&mut self, address: Address) {
         self.address = address;
     }
 
-    /// Returns the numbers of frames that came.
+    /// Returns the numbers of received frames.
     pub const fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Returns the meaning of a frame that came. An answer is made in place.
+    /// Returns the meaning of a received frame. An answer is made in place.
     pub fn hear(&mut self, frame: &mut [u8]) -> Heard {
         self.counts.frames += 1;
         let (Some(to), Some(kind)) = (mac_at(frame, 0), u16_at(frame, 12)) else {
@@ -189,7 +190,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
         })
     }
 
-    /// Takes an ARP packet; none if it is malformed.
+    /// Takes an ARP packet; returns `None` if the packet is malformed.
     fn hear_arp(&mut self, frame: &mut [u8]) -> Option<Heard> {
         let packet = arp::ArpPacket::read(&frame[ipv4::START..])?;
         self.counts.arps += 1;
@@ -215,13 +216,13 @@ impl<B: AsMut<[u8]>> Interface<B> {
         Some(resolved.map_or(Heard::Nothing, Heard::Resolved))
     }
 
-    /// Takes an IPv4 packet; none if it is malformed.
+    /// Takes an IPv4 packet; returns `None` if the packet is malformed.
     fn hear_ipv4(&mut self, frame: &mut [u8]) -> Option<Heard> {
         let packet = Ipv4Packet::read(frame)?;
         let is_ours = packet.to == self.address.ip && !packet.to.is_unspecified();
         let is_for_all = self.address.is_for_all(packet.to);
         let from = packet.from;
-        // What is answered in the name of no host, or of all, would go to all.
+        // An answer to a sender that is no host, or is the broadcast address, would go to all.
         let is_from_host =
             is_host(from) && !self.address.is_for_all(from) && from != self.address.ip;
         match packet.protocol {
@@ -243,15 +244,16 @@ impl<B: AsMut<[u8]>> Interface<B> {
         Some(Heard::Nothing)
     }
 
-    /// Takes an ICMP message, and answers an echo request; none if it is malformed.
+    /// Takes an ICMP message, and answers an echo request; returns `None` if the message is
+    /// malformed.
     fn hear_icmp(&mut self, frame: &mut [u8], packet: &Ipv4Packet) -> Option<Heard> {
         let message = &frame[packet.payload.clone()];
         if message.len() < 8 || check_sum(sum(message, 0)) != 0 {
             return None;
         }
         let to = mac_at(frame, 6)?;
-        // A question in the name of a group would have the whole group answered, and one with options
-        // would have to move for an answer without them.
+        // A question in the name of a group would have the whole group answered, and a question
+        // with options would have to move for an answer without options.
         let has_options = packet.payload.start > ipv4::START + ipv4::LENGTH;
         if message[..2] != [8, 0] || to.is_group() || has_options {
             self.counts.foreign += 1;
@@ -259,8 +261,8 @@ impl<B: AsMut<[u8]>> Interface<B> {
         }
         self.counts.echoes += 1;
         let end = packet.payload.end;
-        // The kind becomes 0, and the check sum follows it (RFC 1624): a sum of all would cost as much
-        // as the first one.
+        // The kind changes from 8 to 0, and the check sum is adapted (RFC 1624): summing all bytes
+        // again would cost as much as the first sum.
         let check = !check_sum(u64::from(u16_at(message, 2)?) + 0x0800);
         let message = &mut frame[packet.payload.clone()];
         message[0] = 0;
@@ -274,8 +276,8 @@ impl<B: AsMut<[u8]>> Interface<B> {
         })
     }
 
-    /// Writes the headers of a datagram, whose payload begins at [`HEADERS`] of the frame and ends
-    /// with it.
+    /// Writes the headers of a datagram, whose payload extends from [`HEADERS`] to the end of the
+    /// frame.
     ///
     /// # Panics
     ///
@@ -299,18 +301,18 @@ impl<B: AsMut<[u8]>> Interface<B> {
         mac.map_or(Route::Unresolved(hop), |_| Route::Ready)
     }
 
-    /// Forgets the neighbours, which may be others behind a link that was down.
+    /// Forgets the neighbours: after the link was down, they may be others.
     pub fn forget_neighbours(&mut self) {
         self.neighbours.forget();
     }
 
-    /// Keeps a frame until its neighbour has answered, by swapping it for the one that was kept
-    /// before: one is kept for each neighbour.
+    /// Keeps a frame until its neighbour has answered, by swapping the frame for the previously
+    /// kept frame: a single frame is kept for each neighbour.
     pub fn keep(&mut self, neighbour: Ipv4Addr, frame: &mut B) {
         self.neighbours.keep(neighbour, frame);
     }
 
-    /// Returns a frame whose neighbour has answered, until another one is kept.
+    /// Returns a frame whose neighbour has answered, until another frame is kept.
     #[must_use]
     pub fn kept(&mut self, Kept(place): Kept) -> &mut B {
         self.neighbours.frame(place)

@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use crate::bytes::{check_sum, ip_at, put, sum, u16_at};
 
-/// The bytes of the header that is written. One that is read may have options.
+/// The bytes of a written header. A header that is read may have options.
 pub(crate) const LENGTH: usize = 20;
 
 /// The offset of the header in a frame.
@@ -39,7 +39,7 @@ impl Ipv4Packet {
             protocol: bytes[9],
             from: ip_at(bytes, 12)?,
             to: ip_at(bytes, 16)?,
-            // More fragments, or not the first one.
+            // More fragments follow, or this is not the first.
             is_fragment: u16_at(bytes, 6)? & 0x3fff != 0,
             payload: START + header..START + total,
         })

@@ -1,11 +1,11 @@
 //! The part of IPv4 that a node with one address needs to exchange datagrams: Ethernet (IEEE
 //! 802.3), ARP (RFC 826), IPv4 (RFC 791), ICMP echo (RFC 792), UDP (RFC 768), DHCP (RFC 2131).
 //!
-//! Nothing here has a clock, memory or a device of its own, so the machine, a test and a fuzzer
-//! run the same code: the caller gives a frame that came, or a buffer for a frame to be sent. No
-//! length in a frame is believed, no loop is longer than the frame, and nothing allocates.
+//! Nothing here has a clock, memory or a device of its own, so the machine, a test and a fuzzer run
+//! the same code. The caller passes a received frame, or a buffer for a frame to be sent. No length
+//! in a frame is trusted, no loop is longer than the frame, and nothing allocates.
 //!
-//! Fragments are not put together, and none is sent. TCP is not here.
+//! Fragments are neither reassembled nor sent. TCP is not supported.
 
 #![no_std]
 
@@ -33,7 +33,7 @@ impl Mac {
     /// The address of every card.
     pub const BROADCAST: Self = Self([0xff; 6]);
 
-    /// Returns whether it is the address of several cards.
+    /// Returns whether the address is that of several cards.
     const fn is_group(self) -> bool {
         self.0[0] & 1 != 0
     }

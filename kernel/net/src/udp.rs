@@ -15,8 +15,8 @@ fn pseudo_header((from, to): (Ipv4Addr, Ipv4Addr), length: u16) -> u64 {
     addresses + u64::from(ipv4::UDP) + u64::from(length)
 }
 
-/// Reads a datagram, if its length and its check sum are right: the ports it is from and to, and
-/// the place of its payload in the frame.
+/// Reads a datagram, if its length and its check sum are right: the sender's and the receiver's
+/// port, and the place of the payload in the frame.
 pub(crate) fn read(frame: &[u8], packet: &Ipv4Packet) -> Option<(u16, u16, Range<usize>)> {
     let bytes = &frame[packet.payload.clone()];
     let length = u16_at(bytes, 4)?;
@@ -29,7 +29,7 @@ pub(crate) fn read(frame: &[u8], packet: &Ipv4Packet) -> Option<(u16, u16, Range
     is_right.then_some((u16_at(datagram, 0)?, u16_at(datagram, 2)?, payload))
 }
 
-/// Writes the header of a datagram, whose payload follows it in the frame.
+/// Writes the header of a datagram, whose payload follows the header in the frame.
 pub(crate) fn write(datagram: &mut [u8], ports: (u16, u16), addresses: (Ipv4Addr, Ipv4Addr)) {
     let length = u16::try_from(datagram.len()).unwrap_or(u16::MAX);
     put(datagram, 0, &ports.0.to_be_bytes());

@@ -1,20 +1,20 @@
 //! The program's way to the app's function, and its end.
 //!
-//! # The words of the command line that virtual time takes
+//! # The command-line options in virtual time
 //!
-//! | word | meaning | default |
+//! | option | meaning | default |
 //! | --- | --- | --- |
 //! | `cores=N` | the number of cores | 8 |
 //! | `module=FILE` | a file for the app | |
-//! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
-//! | `keep=FILE`, `events=FILE\|on` | the record of the run is written there; `on` is for lines of the output | |
+//! | `wcets=N` | the first N bytes of the file are observed WCETs | 0 |
+//! | `keep=FILE`, `events=FILE\|on` | the file for the run's record; `on`: lines of the output | |
 //! | `tests=off\|on` | whether each test of the commit is asked for its own bounds | `off` |
 //!
-//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
-//! what they mean on the machine.
+//! In addition, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
+//! the same as on the machine.
 //!
-//! If the file has parts, between form feeds, the app is run for each. The lines of each
-//! end with its verdict.
+//! If the file has parts, separated by form feeds, the app is run for each part. The lines of each
+//! run end with its verdict.
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -31,8 +31,8 @@ use crate::host_system::{HostSystem, Machine, with_terms};
 use crate::program;
 pub use crate::program::write_as;
 
-/// Makes an app's function the one that the program runs: the function `program`, for the file
-/// that has the app's `main.rs` as its module.
+/// Makes an app's function the function run by the program: defines the function `program`, for the
+/// file with the app's `main.rs` as its module.
 #[macro_export]
 macro_rules! entry {
     ($app:path) => {
@@ -47,11 +47,11 @@ macro_rules! entry {
 
 type App = fn(&Machine) -> Result<(), AppError>;
 
-/// An app's file, or a part of it.
+/// An app's file, or a part of the file.
 type Module = Option<&'static [u8]>;
 
-/// Runs an app with the words of the program's command line; of several parts, the exit code is
-/// that of the last one.
+/// Runs an app with the options of the program's command line. With several parts, returns the exit
+/// code of the last part.
 pub fn start(name: &'static str, app: App) -> ExitCode {
     let line = program::command_line();
     let module = CommandLine::parse(line).and_then(|options| {
@@ -83,7 +83,7 @@ fn attempt(
     let options = CommandLine::parse(line)?;
     let chosen = RunTerms::read(&options)?;
     let cores = options.number("cores", 1..=1024, 8)?;
-    // The word is taken, though the file is read already.
+    // Mark the option as taken; the file has been read already.
     let _ = options.text("module");
     let (wcets, module) = terms::split_wcets(&options, module?)?;
     let mut terms = RunConfig::default();

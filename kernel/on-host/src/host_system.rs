@@ -1,4 +1,4 @@
-//! Virtual time as the system below an app's machine.
+//! Virtual time as the platform below an app's machine.
 
 use std::cell::{Cell, RefCell};
 use std::fs;
@@ -24,27 +24,27 @@ use virtual_time::VirtualTime;
 /// The machine, lent to the app's function for the time of the run.
 pub type Machine = front::app::machine::Machine<HostSystem>;
 
-/// Virtual time, as an app's machine knows it.
+/// Virtual time, as seen by an app's machine.
 #[derive(Debug)]
 pub struct HostSystem {
-    /// The machine of the next run: each has its own.
+    /// The machine of the next run: each run has its own.
     pub(crate) machine: RefCell<VirtualTime>,
     /// The file for the record of the run; `on` is for lines of the output.
     pub(crate) record_to: Cell<Option<&'static str>>,
     /// Whether each test is asked for its own bounds.
     pub(crate) tells_tests: bool,
-    /// Whether the app wants events of a window taken together, not only those of an instant.
+    /// Whether the app wants all events of a window taken together, not only those of an instant.
     pub(crate) has_window: Cell<bool>,
 }
 
-/// The most DAGs whose bounds are told test by test.
+/// The most DAGs whose bounds are printed test by test.
 const MOST_TOLD: usize = 32;
 
 impl HostSystem {
-    /// Tells of each DAG the bound that each test gives.
+    /// Prints the bound of each DAG by each test.
     fn tell_tests(&self, run: &Run) {
         let task_set = run.task_set();
-        // For each of very many DAGs the tests would take minutes.
+        // With very many DAGs the tests would take minutes.
         if task_set.dags().len() > MOST_TOLD {
             return;
         }
@@ -63,14 +63,14 @@ impl HostSystem {
     }
 }
 
-/// Makes a machine with these terms.
+/// Makes a machine with the given terms.
 pub(crate) fn with_terms(terms: RunConfig) -> VirtualTime {
     let machine = VirtualTime::new().contain_panics();
     machine.change(|own| *own = terms);
     machine
 }
 
-/// Returns a refusal of a request that needs a machine.
+/// Refuses a request that needs a machine.
 fn refused<T>(what: &str) -> Result<T, AppError> {
     let line = format!("{what} is for the machine; there is none in virtual time, leave it out");
     Err(UsageError::new(line).into())
@@ -120,7 +120,8 @@ impl System for HostSystem {
                 fs::write(path, bytes).map_err(|why| failure(format!("`{path}`: {why}")))?;
             }
         }
-        // What the app counts leaves out R5, which on the machine needs a tolerance.
+        // The app's own count of violations leaves out rule R5, which needs a tolerance on the
+        // machine.
         let late = run.dispatch_violations(0);
         let late = late.expect("in virtual time no event is lost");
         for violation in &late {
@@ -168,7 +169,7 @@ impl System for HostSystem {
     }
 }
 
-/// No run that a person could talk to.
+/// Stands for the lack of a run that a person could talk to.
 #[derive(Debug)]
 pub struct NoRun;
 

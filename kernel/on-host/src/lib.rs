@@ -1,14 +1,14 @@
-//! The kernel as an app sees it, in virtual time.
+//! The kernel in virtual time, for apps.
 //!
-//! An app's `main.rs` names `kernel`. This crate offers the same by the same names, as
-//! `kernel-on-linux` does, and `virtual-time` does the work: so the file that is an image is a
-//! program that schedules its DAGs in no time, without a machine. Lines, words, reports and
-//! verdicts are `front`'s, as the kernel's are.
+//! An app's `main.rs` names `kernel`. This crate offers the same items by the same names, as does
+//! `kernel-on-linux`, and `virtual-time` does the work. So the file of an image is also a program
+//! that schedules its DAGs in no time, without a machine. Lines, options, reports and verdicts come
+//! from `front`, as in the kernel.
 //!
 //! # What is guaranteed
 //!
-//! - Lines, verdict and the words of the command line are those of the machine.
-//! - A word that means nothing in virtual time is refused.
+//! - Lines, verdict and command-line options are those of the machine.
+//! - An option without meaning in virtual time is refused.
 //! - A run has neither overheads nor latencies, so the law allows it no tolerance.
 //!
 //! # What is not

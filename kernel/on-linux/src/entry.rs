@@ -1,26 +1,30 @@
 //! The program's way to the app's function, and its end.
 //!
-//! # The words of the command line that Linux takes, and those that it has no use for
+//! # The command-line options on Linux
 //!
-//! | word | meaning | default |
-//! | --- | --- | --- |
-//! | `cores=N` | how many of the processors that the program may use are its cores | all of them |
-//! | `share=off\|on` | whether several cores share a processor where there are more cores | `off` |
-//! | `mechanism=fifo\|sched_ext\|normal\|poll` | by which class of Linux's threads run | `fifo` |
-//! | `module=FILE` | a file for the app | |
-//! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
-//! | `wire.NAME=udp://[ADDRESS]:PORT` | that wire hears everyone on this port, or this peer alone | |
-//! | `input=-` | what comes on standard input arrives on the app's other wire | |
-//! | `output=FILE` | what the app sends on that goes there | |
-//! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
-//! | `keep=FILE` | the record of the run is written there, also while it goes on | |
-//! | `events=FILE\|on` | without `keep`: its commits, events and times are, when a run is over; `on` is for lines of the output | |
-//! | `replay=FILE` | the run replays that recording | |
-//! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded | all jobs |
-//! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
+//! - `cores=N`: the number of cores, out of the processors available to the program. Default: all
+//!   of them.
+//! - `share=off|on`: whether several cores share a processor if there are more cores than
+//!   processors. Default: `off`.
+//! - `mechanism=fifo|sched_ext|normal|poll`: the scheduling class of Linux used for threads.
+//!   Default: `fifo`.
+//! - `module=FILE`: a file for the app.
+//! - `wcets=N`: the first N bytes of the file are observed WCETs. Default: 0.
+//! - `wire.NAME=udp://[ADDRESS]:PORT`: the wire hears everyone on this port, or this peer alone.
+//! - `input=-`: bytes from standard input arrive on the app's other wire.
+//! - `output=FILE`: the file for bytes sent by the app on that wire.
+//! - `console=off|on`: whether a person at standard input can talk with a run. Default: `off`.
+//! - `keep=FILE`: the file for the record of the run, written also during the run.
+//! - `events=FILE|on`: without `keep`, the file for the run's commits, events and times, written
+//!   when a run is over; `on` is for lines of the output.
+//! - `replay=FILE`: the run replays this recording.
+//! - `from=DAG/JOB`: the replay begins with that job, or with the last job before it whose states
+//!   are all recorded. Default: all jobs.
+//! - `limit_ms=N`: Linux ends the program when a thread has run at a real-time level for so long
+//!   without waiting; 0: never. Default: 0.
 //!
-//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
-//! what they mean on the machine.
+//! In addition, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
+//! the same as on the machine.
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -42,8 +46,8 @@ use crate::linux_system::{LinuxSystem, Machine, memory_kib};
 pub use crate::program::write_as;
 use crate::program::{self, read};
 
-/// Makes an app's function the one that the program runs: the function `program`, for the file
-/// that has the app's `main.rs` as its module.
+/// Makes an app's function the function run by the program: defines the function `program`, for the
+/// file with the app's `main.rs` as its module.
 #[macro_export]
 macro_rules! entry {
     ($app:path) => {
@@ -59,7 +63,7 @@ macro_rules! entry {
     };
 }
 
-/// Runs an app with the words of the program's command line.
+/// Runs an app with the options of the program's command line.
 pub fn start(name: &'static str, app: fn(&Machine) -> Result<(), AppError>) -> ExitCode {
     program::run(|| run(name, program::command_line(), app))
 }
@@ -69,7 +73,7 @@ fn run(
     line: &'static str,
     app: fn(&Machine) -> Result<(), AppError>,
 ) -> Result<(), AppError> {
-    // Who sees the first line may ask for an end.
+    // A reader of the first line may ask for an end at once.
     let signals = EndSignals::catch_first();
     let options = CommandLine::parse(line)?;
     let (linux, module) = apply(name, &options)?;
@@ -84,7 +88,8 @@ fn run(
             .text("command_line", line);
     };
     json::report("boot", boot);
-    // The record, which the tool may never see, says by what it is to be judged.
+    // The record states by which options it is to be judged, because the tool may never see the
+    // output.
     Linux::note(&format!("{}\n", json::line("boot", boot)));
     for warning in linux.warnings() {
         crate::println!("fass-linux: {warning}");
@@ -104,8 +109,8 @@ fn run(
     result.and_then(|()| kept.map_err(|why| AppError::Failure(format!("the record: {why}"))))
 }
 
-/// Takes the words, and makes the machine that they describe. Returns what they say besides, and
-/// the app's file.
+/// Reads the options, and makes the machine described by them. Returns the machine, and the app's
+/// file.
 #[allow(clippy::too_many_lines, reason = "one word after the other")]
 pub(crate) fn apply(
     app: &'static str,

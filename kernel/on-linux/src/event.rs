@@ -1,11 +1,11 @@
-//! The kernel's event, by a condition variable.
+//! The kernel's event, implemented with a condition variable.
 
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Something that instances wait for: a count that only goes up, its *version*. A waiter has
-/// read the version, then looked for what it wants in vain, and now waits until the version is
-/// another one.
+/// An event that instances can wait for: a count that only goes up, its *version*. A waiter reads
+/// the version, then looks for its condition. If the condition fails, it waits until the version
+/// has changed.
 #[derive(Debug, Default)]
 pub struct Event {
     version: Mutex<u64>,
@@ -26,7 +26,7 @@ impl Event {
         *self.version.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Raises the version: all that wait go on.
+    /// Raises the version: all waiters go on.
     pub fn notify(&self) {
         let mut version = self.version.lock().unwrap_or_else(PoisonError::into_inner);
         *version += 1;
@@ -34,8 +34,8 @@ impl Event {
         self.changed.notify_all();
     }
 
-    /// Waits until the version is not `seen` or the time is `until_ns`, on the clock of
-    /// [`fass::now_ns`]; `u64::MAX` is never.
+    /// Waits until the version differs from `seen` or the time `until_ns` has come, on the clock of
+    /// [`fass::now_ns`]; `u64::MAX` means no limit.
     pub fn wait(&self, seen: u64, until_ns: u64) {
         let mut version = self.version.lock().unwrap_or_else(PoisonError::into_inner);
         while *version == seen {

@@ -1,26 +1,26 @@
-//! The program's allocator: the system's, and it counts.
+//! The program's allocator: the system's, with counts of its own.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
 use front::report::HeapUsage;
 
-/// The allocator that an app's program has.
+/// The allocator of an app's program.
 #[derive(Debug)]
 pub struct Heap;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// Those in threads of a run.
+/// The allocations made in threads of a run.
 static OF_RUNS: AtomicU64 = AtomicU64::new(0);
 static IN_USE: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 
-/// Returns how often memory was allocated so far by threads that release or run jobs.
+/// Returns the number of allocations so far by threads that release or run jobs.
 pub(crate) fn allocations_of_runs() -> u64 {
     OF_RUNS.load(Relaxed)
 }
 
-/// Returns how much memory is and was in use, of so many bytes that there are.
+/// Returns the present and the peak use of memory, out of `capacity_bytes`.
 pub(crate) fn usage(capacity_bytes: usize) -> HeapUsage {
     HeapUsage {
         allocations: ALLOCATIONS.load(Relaxed),

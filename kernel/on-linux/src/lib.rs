@@ -1,8 +1,8 @@
-//! The kernel as an app sees it, with Linux below it.
+//! The kernel on top of Linux, for apps.
 //!
-//! An app's `main.rs` names `kernel`: the machine that it is lent, the words of its command
-//! line, what it prints, the run that it gets back. This crate offers the same by the same
-//! names, and `linux` does the work. So the file that is an image is a program of Linux, too:
+//! An app's `main.rs` names `kernel`: the machine lent to the app, the options of its command line,
+//! its output, the run it gets back. This crate offers the same items by the same names, and
+//! `linux` does the work. So the file of an image is also a program for Linux:
 //!
 //! ```ignore
 //! extern crate kernel_on_linux as kernel;
@@ -15,17 +15,17 @@
 //! }
 //! ```
 //!
-//! Lines, words, reports and verdicts are `front`'s, as the kernel's are.
+//! Lines, options, reports and verdicts come from `front`, as in the kernel.
 //!
 //! # What is guaranteed
 //!
-//! - Lines, verdict and the words of the command line are those of the machine.
-//! - A word that means nothing on Linux is refused; none is ignored.
+//! - Lines, verdict and command-line options are those of the machine.
+//! - An option without meaning on Linux is refused; none is ignored.
 //!
 //! # What is not
 //!
-//! - Bounds are not judged (`bound_exceeded` is said, and the verdict leaves it): Linux states
-//!   no worst case for what it does itself.
+//! - Bounds are not judged (`bound_exceeded` is printed, but does not affect the verdict), because
+//!   Linux states no worst case for its own work.
 
 #![deny(unsafe_code)]
 
@@ -52,7 +52,7 @@ pub use linux_system::Machine;
 #[doc(inline)]
 pub use sched_dag::engine::Run;
 
-/// Reports whether functions may use AVX: the processor has it.
+/// Reports whether functions may use AVX: whether the processor has it.
 pub fn has_avx() -> bool {
     #[cfg(target_arch = "x86_64")]
     return std::is_x86_feature_detected!("avx");

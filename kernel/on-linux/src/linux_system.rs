@@ -1,8 +1,7 @@
-//! Linux as the system below an app's machine: so many cores of this computer.
+//! Linux as the platform below an app's machine: some cores of this computer.
 //!
-//! While a run goes on, people see the log, and at the console a person at standard input talks
-//! with
-//! the run.
+//! During a run people see the log, and with a console a person at standard input can talk with the
+//! run.
 
 use std::cell::{Cell, RefCell};
 use std::fmt;
@@ -33,7 +32,7 @@ use crate::heap;
 /// The machine, lent to the app's function for the time of the run.
 pub type Machine = front::app::machine::Machine<LinuxSystem>;
 
-/// Linux, as an app's machine knows it.
+/// Linux, as seen by an app's machine.
 #[derive(Debug)]
 pub struct LinuxSystem {
     pub(crate) linux: Linux,
@@ -42,7 +41,7 @@ pub struct LinuxSystem {
     pub(crate) protocols: RefCell<Vec<(SocketAddrV4, UdpConnection)>>,
     /// The refusal of a request that Linux cannot serve.
     pub(crate) refusal: RefCell<Option<UsageError>>,
-    /// The reasons that end a run before its time.
+    /// The signals that end a run early.
     pub(crate) signals: EndSignals,
     /// Whether a person can talk with a run.
     pub(crate) has_console: bool,
@@ -50,7 +49,7 @@ pub struct LinuxSystem {
     pub(crate) is_closed: Cell<bool>,
 }
 
-/// An app's wire, and what it is connected to.
+/// An app's wire, and the ends it is connected to.
 #[derive(Clone, Debug)]
 pub(crate) struct WireEnds {
     wire: Wire,
@@ -59,14 +58,14 @@ pub(crate) struct WireEnds {
 
 #[derive(Clone, Copy, Debug)]
 enum Ends {
-    /// Whether bytes come on standard input, and the file that they go to.
+    /// Whether bytes come from standard input, and the file they are sent to.
     Bytes(bool, Option<&'static str>),
-    /// Datagrams to an own port, and of one peer alone, if there is one.
+    /// Datagrams to an own port, from a single peer if one is given.
     Udp(u16, Option<SocketAddrV4>),
 }
 
 impl WireEnds {
-    /// Connects them for a run that is committed, until what it returns is dropped.
+    /// Connects the ends for a committed run, until the returned value is dropped.
     fn connect(&self, machine: &Linux) -> Result<Box<dyn fmt::Debug>, AppError> {
         let connected: io::Result<Box<dyn fmt::Debug>> = match self.ends {
             Ends::Udp(port, peer) => (machine.connect_udp(&self.wire, port, peer))
@@ -121,7 +120,7 @@ impl System for LinuxSystem {
         let wires = self.wires.borrow();
         let connected = wires.iter().map(|ends| ends.connect(&self.linux));
         let connected = connected.collect::<Result<Vec<_>, _>>()?;
-        // What a person says at the console is no event.
+        // Bytes typed at the console are not events.
         if let Some(signal) = input.filter(|_| !self.has_console) {
             match self.linux.raise_on_input(signal, &io::stdin()) {
                 Err(why) if why.kind() == io::ErrorKind::PermissionDenied => front::println!(
@@ -231,7 +230,7 @@ impl System for LinuxSystem {
     fn seed() -> u128 {
         let mut bytes = [0; 16];
         let read = File::open("/dev/urandom").and_then(|mut file| file.read_exact(&mut bytes));
-        // Where there is none, the time has to do.
+        // Without the device, the time has to do.
         let time = || Self::unix_ns().unwrap_or(0).into();
         read.map_or_else(|_| time(), |()| u128::from_le_bytes(bytes))
     }
@@ -252,7 +251,7 @@ impl System for LinuxSystem {
     }
 }
 
-/// Says which faults there were, as the kernel does at once.
+/// Prints the faults of the run, in the form printed by the kernel at once.
 fn tell_faults(run: &linux::Run) {
     for fault in run.faults() {
         let instance = fault.instance;
@@ -279,7 +278,7 @@ fn tell_faults(run: &linux::Run) {
     }
 }
 
-/// Returns how much memory the computer has.
+/// Returns the computer's memory size, in KiB.
 pub(crate) fn memory_kib() -> u64 {
     let text = fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("MemTotal:"));
@@ -287,7 +286,7 @@ pub(crate) fn memory_kib() -> u64 {
     number.unwrap_or(0)
 }
 
-/// Bytes of standard input; the thread that reads it lasts as long as the program.
+/// Bytes of standard input; the reading thread lasts as long as the program.
 static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
 
 /// The run of this program.
@@ -302,7 +301,7 @@ impl LiveRun for LinuxRun {
     fn control(dag: DagId, change: fn(DagId) -> Request) {
         if let Some(live) = Control::get() {
             live.change(dag, change);
-            // What is shown next shows it.
+            // The next output has to show the change.
             live.wait_for_letters(dag);
         }
     }
@@ -319,7 +318,7 @@ impl LiveRun for LinuxRun {
         let input = INPUT.get()?.lock().unwrap_or_else(PoisonError::into_inner);
         match input.try_recv() {
             Ok(byte) => Some(byte),
-            // Nobody could end it any more.
+            // Nobody could end such a run any more.
             Err(TryRecvError::Disconnected) if is_endless() => Some(END),
             Err(_) => None,
         }
@@ -337,8 +336,8 @@ fn is_endless() -> bool {
     !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Control::get().is_none_or(has_end)
 }
 
-/// Shows the log and, if there is a console, talks, from another thread, as long as `run` takes.
-/// Reports whether the person has ended it.
+/// Shows the log and, if there is a console, talks with a person, from another thread, while `run`
+/// runs. Reports whether the person has ended the run.
 pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, bool) {
     let listen = || {
         let (bytes, input) = channel();
@@ -357,7 +356,7 @@ pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, 
         INPUT.get_or_init(listen);
     }
     IS_SHUT_DOWN.store(false, Ordering::Relaxed);
-    // It is not scoped: where `run` panics, nobody waits for it.
+    // The thread is not scoped: if `run` panics, nobody waits for it.
     let shared = Arc::new((Barrier::new(2), AtomicBool::new(false)));
     let (has_begun, is_over) = &*shared;
     let own = Arc::clone(&shared);
@@ -378,7 +377,7 @@ pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, 
             thread::park_timeout(Duration::from_nanos(PERIOD_NS));
         }
     });
-    // What it allocates to begin is not the run's.
+    // The allocations at the thread's start must not count as the run's.
     has_begun.wait();
     let result = run();
     is_over.store(true, Ordering::Release);

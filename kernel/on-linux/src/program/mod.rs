@@ -1,5 +1,5 @@
-//! An app as a program of this computer, in real time or, by `kernel-on-host`, in virtual time:
-//! its words, its file, its output and its end.
+//! An app as a program of this computer, in real time or, with `kernel-on-host`, in virtual time:
+//! its options, its file, its output and its end.
 
 mod output;
 
@@ -13,13 +13,13 @@ use front::options::UsageError;
 
 pub use output::write_as;
 
-/// Returns the program's words as one line.
+/// Returns the program's arguments as a single line.
 pub(crate) fn command_line() -> &'static str {
     let words: Vec<String> = env::args().skip(1).collect();
     words.join(" ").leak()
 }
 
-/// Runs an app, and tells how it has ended; a panic is a failure. The exit code is 0 after a
+/// Runs an app, and prints how it has ended; a panic is a failure. The exit code is 0 after a
 /// success, 1 after a failure, 2 if the command line is refused.
 pub(crate) fn run(app: impl FnOnce() -> Result<(), AppError>) -> ExitCode {
     let result = catch_unwind(AssertUnwindSafe(app)).unwrap_or_else(|panic| {
@@ -37,7 +37,7 @@ pub(crate) fn run(app: impl FnOnce() -> Result<(), AppError>) -> ExitCode {
     }
 }
 
-/// Reads the file that a word names. It stays as long as the program, as the loader's does.
+/// Reads the file named by an option. The bytes stay as long as the program, as the loader's do.
 pub(crate) fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
     let bytes = fs::read(path);
     let bytes = bytes.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;

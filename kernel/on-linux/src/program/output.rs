@@ -1,8 +1,9 @@
 //! Text on the standard output.
 //!
-//! It is made into pieces as on the machine, on the stack of the thread that prints, outside the
-//! lock: so printing allocates nothing, and what a value's `Display` does is its own affair. Text
-//! and machine lines are told apart: only `json` can print a line that begins with `{`.
+//! As on the machine, text is split into pieces, on the stack of the printing thread and outside
+//! the lock. Printing therefore allocates nothing, and a value's `Display` affects only its own
+//! thread. Text and machine lines are told apart: only `json` can print a line that begins with
+//! `{`.
 
 use std::fmt::{self, Write as _};
 use std::io::{Write as _, stdout};
@@ -10,10 +11,10 @@ use std::sync::{Mutex, PoisonError};
 
 use front::console::{OutputKind, TextPieces};
 
-/// Whether the output is at the begin of a line.
+/// Whether the output is at the beginning of a line.
 static BEGINS: Mutex<bool> = Mutex::new(true);
 
-/// Takes all text of a program; its entry names this to [`front::output!`].
+/// Takes all text of a program; the program's entry names this function to [`front::output!`].
 pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
     let mut pieces = TextPieces::new(kind, |piece, is_first| hand_over(piece, kind, is_first));
     // Only a `Display` that fails of its own accord can fail here.
@@ -30,7 +31,7 @@ fn hand_over(piece: &[u8], kind: OutputKind, is_first: bool) {
     };
     *begins = piece.ends_with(b"\n");
     let mut out = stdout().lock();
-    // If nobody reads any more, nobody misses it.
+    // If nobody reads any more, nobody misses the text.
     let written = out.write_all(before).and_then(|()| out.write_all(piece));
     let _ = written.and_then(|()| out.flush());
 }
