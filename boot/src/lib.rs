@@ -1,20 +1,20 @@
-//! Boot information: all that the machine tells the kernel at its start.
+//! Boot information: everything the machine tells the kernel at its start.
 //!
-//! A loader that speaks PVH (`qemu -kernel` does) or Multiboot2 (GRUB does) jumps to
-//! `pvh_entry` of the crate `boot-entry` in 32-bit mode, which enters 64-bit mode, has what
-//! the loader tells collected here in a [`BootInfo`] and hands over to the image's
+//! A loader that speaks PVH (such as `qemu -kernel`) or Multiboot2 (such as GRUB) jumps to
+//! `pvh_entry` of the crate `boot-entry` in 32-bit mode. `pvh_entry` enters 64-bit mode, collects
+//! the loader's information in a [`BootInfo`], using this crate, and hands over to the image's
 //! `kernel_main` for good.
 //!
-//! Words: the *image* is the program as linked, the *boot processor* the one
-//! that the firmware started, an *application processor* any other.
+//! Terms: the *image* is the program as linked, the *boot processor* the processor started by the
+//! firmware, an *application processor* any other.
 //!
-//! The state at the handover: interrupts are off, SSE is on, memory up to
-//! 4 GiB is identity-mapped and writable, and the stack is part of the image and
-//! has no guard page. The kernel replaces tables and stack as soon as it can.
+//! The state at the handover: interrupts are off, SSE is on, memory up to 4 GiB is identity-mapped
+//! and writable, and the stack is part of the image and has no guard page. The kernel replaces
+//! tables and stack as soon as it can.
 //!
-//! Everything that interprets bytes ([`acpi`], [`multiboot2`], [`pvh`]) works on a borrowed view
-//! of memory and is tested on the host; `unsafe` is in `physical`, `screen` and
-//! `memory_functions` only.
+//! All code that interprets bytes ([`acpi`], [`multiboot2`], [`pvh`]) works on a borrowed view of
+//! memory and is tested on the host; `unsafe` is confined to `physical`, `screen` and
+//! `memory_functions`.
 
 #![cfg_attr(not(test), no_std)]
 
@@ -36,25 +36,25 @@ use physical::PhysicalMemory;
 pub use list::{Full, List};
 pub use memory_map::{MAX_REGIONS, MEMORY_END, MemoryMap, MemoryRegion};
 
-/// The most processors that are told apart.
+/// The most processors told apart.
 pub const MAX_PROCESSORS: usize = 255;
 
-/// The most modules that are noted; loaders in use pass one.
+/// The most modules noted; loaders in use pass one.
 pub const MAX_MODULES: usize = 4;
 
-/// The most bytes of the loader's words that are kept.
+/// The most bytes kept of the loader's command line.
 pub const MOST_COMMAND_LINE_BYTES: usize = 2048;
 
 /// Information about the machine when the kernel takes over.
 pub struct BootInfo {
-    /// The words that the loader passed, without interpretation.
+    /// The command line passed by the loader, without interpretation.
     pub command_line: List<u8, MOST_COMMAND_LINE_BYTES>,
-    /// Whether the loader passed more than that.
+    /// Whether the loader's command line was longer.
     pub is_command_line_cut: bool,
     /// The physical memory map, as the loader told it until it is put in order.
     pub memory: MemoryMap,
-    /// The files that the loader left in memory, in its order. Where they lie is the
-    /// loader's word, which the kernel compares with the memory map.
+    /// The files left in memory by the loader, in its order. Their places are the loader's word;
+    /// the kernel compares them with the memory map.
     pub modules: List<Module, MAX_MODULES>,
     /// The screen, if the loader left one.
     pub screen: Option<Framebuffer>,
@@ -80,26 +80,26 @@ pub struct Framebuffer {
 }
 
 impl Framebuffer {
-    /// Returns the memory that it takes.
+    /// Returns the range of memory taken by the screen.
     pub fn range(&self) -> core::ops::Range<u64> {
         let bytes = u64::from(self.pitch) * u64::from(self.height);
         self.start..self.start.saturating_add(bytes)
     }
 }
 
-/// A file that the loader left in memory: `qemu -initrd FILE`, GRUB's `module2 FILE`.
+/// A file left in memory by the loader: `qemu -initrd FILE`, GRUB's `module2 FILE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Module {
-    /// The physical address of its first byte.
+    /// The physical address of the first byte.
     pub start: u64,
-    /// The physical address after its last byte, above `start`.
+    /// The physical address after the last byte, above `start`.
     pub end: u64,
 }
 
-/// The loader's information is collected piece by piece. Nothing here can fail: a loader that
-/// tells less leaves lists empty, and the kernel, which can print, says what it misses.
+/// The loader's information is collected piece by piece. Nothing here can fail: a loader that tells
+/// less leaves lists empty, and the kernel, which can print, reports missing information.
 impl BootInfo {
-    /// Creates what is known without a loader's help: when Rust code began to run, in ticks
+    /// Creates the information known without a loader's help: when Rust code began to run, in ticks
     /// of the time stamp counter.
     pub const fn new(entry_tsc: u64) -> Self {
         Self {
@@ -113,8 +113,8 @@ impl BootInfo {
         }
     }
 
-    /// Takes the command line: the bytes from `start` on, up to the first 0. Of more than
-    /// 2048 bytes, which the kernel refuses, it keeps the first.
+    /// Takes the command line: the bytes from `start` on, up to the first 0. Keeps the first 2048
+    /// bytes of a longer command line; the kernel refuses such a line.
     fn take_command_line(&mut self, memory: &impl PhysicalMemory, start: u64) {
         let text = (start..)
             .map_while(|at| memory.u8(at))
@@ -127,8 +127,8 @@ impl BootInfo {
         }
     }
 
-    /// Takes an entry of a memory map: PVH and Multiboot2 have the same beginning of one, start,
-    /// size and kind by E820's numbers. Returns nothing if it is not there or does not fit.
+    /// Takes an entry of a memory map. PVH and Multiboot2 entries begin alike: start, size and kind
+    /// by E820's numbers. Returns `None` if the entry is missing or does not fit.
     fn take_region(&mut self, memory: &impl PhysicalMemory, entry: u64) -> Option<()> {
         /// The kind of ordinary memory.
         const USABLE: u32 = 1;
@@ -150,13 +150,13 @@ impl BootInfo {
     ///
     /// # Errors
     ///
-    /// If it is not UTF-8.
+    /// If the command line is not UTF-8.
     pub fn command_line(&self) -> Result<&str, core::str::Utf8Error> {
         core::str::from_utf8(self.command_line.as_slice()).map(str::trim)
     }
 
-    /// Returns the value of the word `key=value`, if the command line has it. It takes no
-    /// memory, so it can be asked before there is any.
+    /// Returns the value of the option `key=value`, if the command line has it. Nothing is
+    /// allocated, so options can be read before there is a heap.
     pub fn value(&self, key: &str) -> Option<&str> {
         let mut words = self.command_line().ok()?.split_whitespace();
         words.find_map(|word| word.strip_prefix(key)?.strip_prefix('='))

@@ -1,18 +1,17 @@
-//! The few functions that compiled code calls without being asked, by their C names.
+//! The few functions that compiled code calls implicitly, by their C names.
 //!
 //! The [`memory_functions!`](crate::memory_functions!) macro defines them in a freestanding
-//! program, not in this library, so that programs of the host that use the library keep
-//! their own.
+//! program, not in this library, so that host programs linked with the library keep their own.
 
 use core::arch::asm;
 
-/// Defines the functions that the compiler assumes to exist, by their C names.
+/// Defines the functions assumed by the compiler to exist, by their C names.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! memory_functions {
     () => {
-        // SAFETY: each function has the signature and the meaning that the
-        // compiler assumes of its name (ISO C, 7.24; `bcmp`: POSIX.1-2001).
+        // SAFETY: each function has the signature and the meaning that the compiler assumes of its
+        // name (ISO C, 7.24; `bcmp`: POSIX.1-2001).
         #[unsafe(no_mangle)]
         unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
             // SAFETY: the caller vouches for both ranges.
@@ -51,8 +50,8 @@ macro_rules! memory_functions {
         #[unsafe(no_mangle)]
         extern "C" fn rust_eh_personality() {}
 
-        // SAFETY: called by the landing pads of the precompiled library only,
-        // and nothing unwinds: a panic ends where it happens.
+        // SAFETY: called by the landing pads of the precompiled library only, and nothing unwinds:
+        // a panic ends where it happens.
         #[unsafe(no_mangle)]
         extern "C" fn _Unwind_Resume() -> ! {
             unreachable!("nothing unwinds")
@@ -64,8 +63,8 @@ macro_rules! memory_functions {
 ///
 /// # Safety
 ///
-/// `length` bytes are readable at `from` and writable at `to`; if the ranges
-/// overlap, `to` is the lower one.
+/// `length` bytes are readable at `from` and writable at `to`; if the ranges overlap, `to` is the
+/// lower one.
 #[inline]
 pub unsafe fn copy_up(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
     // SAFETY: the caller vouches for the ranges; the direction flag is clear.
@@ -87,13 +86,11 @@ pub unsafe fn copy_up(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
 #[inline]
 pub unsafe fn copy_any(to: *mut u8, from: *const u8, length: usize) -> *mut u8 {
     if (to as usize).wrapping_sub(from as usize) >= length {
-        // SAFETY: the caller vouches for the ranges, and `to` does not lie
-        // within the source, so ascending order reads each byte before it is
-        // overwritten.
+        // SAFETY: the caller vouches for the ranges, and `to` does not lie within the source, so
+        // ascending order reads each byte before it is overwritten.
         return unsafe { copy_up(to, from, length) };
     }
-    // SAFETY: the caller vouches for the ranges; the direction flag is set for
-    // this copy alone.
+    // SAFETY: the caller vouches for the ranges; the direction flag is set for this copy alone.
     unsafe {
         asm!(
             "std", "rep movsb", "cld",
@@ -124,7 +121,7 @@ pub unsafe fn fill(to: *mut u8, value: i32, length: usize) -> *mut u8 {
     to
 }
 
-/// Compares bytes as unsigned numbers: negative, 0 or positive.
+/// Compares bytes as unsigned numbers, and returns a negative number, 0 or a positive number.
 ///
 /// # Safety
 ///

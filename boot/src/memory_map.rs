@@ -1,25 +1,26 @@
 //! The machine's memory map, put in order.
 //!
-//! A firmware may name ranges in any order, in hundreds of pieces, and one over another. In
-//! order, they ascend, no two overlap, and neighbours of one kind are one. Where a piece is named
-//! twice, it is memory only if all that name it say so.
+//! A firmware may name ranges in any order, in hundreds of pieces, and overlapping. In order, the
+//! ranges ascend without overlaps, and adjacent ranges of a kind are merged. A piece named several
+//! times is memory only if every range naming it is memory.
 
 use crate::List;
 
-/// The most ranges that are kept.
+/// The most ranges kept.
 pub const MAX_REGIONS: usize = 128;
 
-/// Where memory ends that the kernel can use: from 512 GiB on it maps what has other addresses.
+/// The end of memory usable by the kernel: from 512 GiB on, it maps memory at addresses other than
+/// the physical ones.
 pub const MEMORY_END: u64 = 1 << 39;
 
-/// A range of physical memory of one kind.
+/// A range of physical memory of a single kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryRegion {
-    /// The address of its first byte.
+    /// The address of the first byte.
     pub start: u64,
-    /// The address after its last byte.
+    /// The address after the last byte.
     pub end: u64,
-    /// Whether it is ordinary memory that nobody uses.
+    /// Whether the range is ordinary memory that nobody uses.
     pub usable: bool,
 }
 
@@ -29,10 +30,10 @@ const FILLER: MemoryRegion = MemoryRegion {
     usable: false,
 };
 
-/// The ranges that a loader has told.
+/// The ranges told by a loader.
 pub struct MemoryMap {
     regions: List<MemoryRegion, MAX_REGIONS>,
-    /// Whether some did not fit.
+    /// Whether some ranges did not fit.
     pub is_cut: bool,
 }
 
@@ -49,7 +50,8 @@ impl MemoryMap {
         self.regions.as_slice()
     }
 
-    /// Adds a range. If there is no room, the ranges are put in order first, which leaves fewer.
+    /// Adds a range. If there is no room, the ranges are put in order first, which leaves fewer
+    /// ranges.
     pub(crate) fn add(&mut self, start: u64, size: u64, usable: bool) {
         let end = start.saturating_add(size).min(MEMORY_END);
         let region = MemoryRegion { start, end, usable };
@@ -59,8 +61,8 @@ impl MemoryMap {
         }
     }
 
-    /// Appends a range, and reports whether there was room. One that continues the last of its
-    /// kind becomes one with it.
+    /// Appends a range, and reports whether there was room. A range continuing the last range of
+    /// the same kind is merged with it.
     fn push(&mut self, region: MemoryRegion) -> bool {
         if let Some(last) = self.regions.as_mut_slice().last_mut()
             && (last.end, last.usable) == (region.start, region.usable)
@@ -71,7 +73,8 @@ impl MemoryMap {
         self.regions.push(region).is_ok()
     }
 
-    /// Puts the ranges in order: from each place where one begins or ends to the next one.
+    /// Puts the ranges in order, going from each beginning or end of a range to the next such
+    /// place.
     #[inline(never)]
     pub fn put_in_order(&mut self) {
         let told = self.regions;

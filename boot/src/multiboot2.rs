@@ -1,34 +1,34 @@
-//! Information of a Multiboot2 loader: a list of tags, as GRUB gives it under BIOS and UEFI.
+//! Information of a Multiboot2 loader: a list of tags, as given by GRUB under BIOS and UEFI.
 //!
-//! The layout is that of the Multiboot2 specification 2.0, 3.6. The loader's list lies in
-//! memory that counts as free, so all that is wanted is copied here; of the ACPI root
-//! pointer, of which a tag holds a copy, only its place is kept. Unknown tags are passed
-//! over, and of a list that is cut short the tags before the cut count.
+//! The layout is that of the Multiboot2 specification 2.0, 3.6. The loader's list lies in memory
+//! that counts as free, so everything needed is copied here. Only of the ACPI root pointer, a copy
+//! of which lies in a tag, the place alone is kept. Unknown tags are passed over. Of a truncated
+//! list, the tags before the cut count.
 
 use crate::physical::PhysicalMemory;
 use crate::{BootInfo, Framebuffer};
 
-/// The kinds of tags that are read.
+/// The kinds of tags read.
 pub mod tag {
     /// The end of the list.
     pub const END: u32 = 0;
     /// The command line.
     pub const COMMAND_LINE: u32 = 1;
-    /// A file that the loader left in memory.
+    /// A file left in memory by the loader.
     pub const MODULE: u32 = 3;
     /// The memory map.
     pub const MEMORY_MAP: u32 = 6;
     /// The screen.
     pub const SCREEN: u32 = 8;
-    /// A copy of the ACPI root pointer, as it was before ACPI 2.0.
+    /// A copy of the ACPI root pointer, in the form before ACPI 2.0.
     pub const OLD_RSDP: u32 = 14;
-    /// A copy of the ACPI root pointer since then.
+    /// A copy of the ACPI root pointer, in the form since ACPI 2.0.
     pub const NEW_RSDP: u32 = 15;
 }
 
-/// Adds what the list of tags at `address` tells to `info`.
+/// Adds the contents of the list of tags at `address` to `info`.
 pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
-    /// Of a tag: its kind and its size. The list begins with as many.
+    /// The bytes of a tag's kind and size. The list begins with as many.
     const HEADER: u64 = 8;
     let end = address + u64::from(memory.u32(address).unwrap_or(0));
     let mut at = address + HEADER;
@@ -45,13 +45,13 @@ pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
     }
 }
 
-/// How the name begins that the tool's ISO gives to a module which only keeps the others from
-/// page 0.
+/// The first letters of the name that the tool's ISO gives to a filler: a module whose only purpose
+/// is to keep the others from page 0.
 const FILLER: u32 = u32::from_le_bytes(*b"fill");
 
-/// Reads one tag, whose content lies in `start..end`.
+/// Reads a single tag, whose content lies in `start..end`.
 fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info: &mut BootInfo) {
-    /// Where a root pointer has its revision (ACPI 5.2.5.3).
+    /// The offset of the revision in a root pointer (ACPI 5.2.5.3).
     const REVISION: u64 = 15;
     match kind {
         tag::COMMAND_LINE => info.take_command_line(memory, start),
@@ -60,13 +60,13 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
             if let (Some(from), Some(to)) = place
                 && memory.u32(start + 8) != Some(FILLER)
             {
-                // More than there is room for is more than the kernel uses.
+                // Modules without room are more than the kernel uses.
                 let _ = info.add_module(u64::from(from), u64::from(to));
             }
         }
         tag::SCREEN => info.screen = read_screen(memory, start),
         tag::MEMORY_MAP => read_memory_map(memory, start, end, info),
-        // This copy ends before what a later revision would have.
+        // This copy ends before the fields of later revisions.
         tag::OLD_RSDP if memory.u8(start + REVISION) == Some(0) => {
             info.rsdp.get_or_insert(start);
         }
@@ -75,7 +75,7 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
     }
 }
 
-/// Reads where the screen is, unless it has text alone, or colours by numbers.
+/// Reads the place of the screen, unless the screen has text alone, or colours by numbers.
 fn read_screen(memory: &impl PhysicalMemory, at: u64) -> Option<Framebuffer> {
     const DIRECT_COLOUR: u8 = 1;
     let screen = Framebuffer {
@@ -91,7 +91,7 @@ fn read_screen(memory: &impl PhysicalMemory, at: u64) -> Option<Framebuffer> {
 }
 
 fn read_memory_map(memory: &impl PhysicalMemory, start: u64, end: u64, info: &mut BootInfo) {
-    /// The bytes that are read of an entry; later versions may have more.
+    /// The bytes read of an entry; later versions may have more.
     const KNOWN: u64 = 20;
     let entry_size = memory.u32(start).map_or(0, u64::from);
     if entry_size < KNOWN {

@@ -2,8 +2,8 @@
 
 /// A view of physical memory.
 pub trait PhysicalMemory {
-    /// Returns `length` bytes from physical address `address` on, or `None` if
-    /// the view does not cover them.
+    /// Returns `length` bytes from physical address `address` on, or `None` if the view does not
+    /// cover them.
     fn bytes(&self, address: u64, length: usize) -> Option<&[u8]>;
 
     /// Returns the little-endian 8-bit value at `address`.
@@ -22,12 +22,13 @@ pub trait PhysicalMemory {
     }
 }
 
-/// The machine's own memory below 4 GiB, as the boot page table shows it a second time. There
-/// no address is null, and a loader may leave what it tells at address 0.
+/// The machine's own memory below 4 GiB, through its second mapping in the boot page table. No
+/// address is null there, and a loader may leave its information at address 0.
 #[derive(Clone, Copy, Debug)]
 pub struct LowMemory(());
 
-/// Where it is shown: `entry.s` makes the second entry of the root table the first's twin.
+/// The address of the second mapping: `entry.s` makes the second entry of the root table the
+/// first's twin.
 const WINDOW: usize = 1 << 39;
 
 impl LowMemory {
@@ -35,9 +36,9 @@ impl LowMemory {
     ///
     /// # Safety
     ///
-    /// 1. The boot page table is in use for as long as the value, a copy of it, or a slice
-    ///    that it gave is.
-    /// 2. Nothing writes to what is read through it meanwhile.
+    /// 1. The boot page table is in use for as long as the value, a copy of it, or a slice obtained
+    ///    from it is.
+    /// 2. Nothing writes to the memory read in the meantime.
     pub const unsafe fn new() -> Self {
         Self(())
     }
@@ -50,8 +51,8 @@ impl PhysicalMemory for LowMemory {
             return None;
         }
         let start = (WINDOW + usize::try_from(address).ok()?) as *const u8;
-        // SAFETY: the range lies below 4 GiB, which conditions 1 and 2 of `new` make
-        // readable and constant.
+        // SAFETY: the range lies below 4 GiB; conditions 1 and 2 of `new` make it readable and
+        // constant.
         Some(unsafe { core::slice::from_raw_parts(start, length) })
     }
 }

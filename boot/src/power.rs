@@ -1,17 +1,17 @@
-//! How ACPI says that a machine is powered off and reset.
+//! Reads from ACPI how to power off and reset the machine.
 //!
-//! The FADT names registers (ACPI specification 6.5, 5.2.9), and the object `_S5_` of the DSDT
-//! what to write to be off (7.4.2). That object is found by its bytes, without an interpreter:
+//! The FADT names registers (ACPI specification 6.5, 5.2.9), and the object `_S5_` of the DSDT the
+//! values to write to power off (7.4.2). That object is found by its bytes, without an interpreter:
 //! it is a package of small constants. Missing or malformed parts count as absent.
 
 use crate::physical::PhysicalMemory;
 
-/// The registers by which a machine is ended.
+/// The registers used to end a machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Power {
-    /// How to power it off.
+    /// The way to power the machine off.
     pub off: Option<Off>,
-    /// The register that resets it, and what to write there.
+    /// The register that resets the machine, and the value to write there.
     pub reset: Option<(Register, u8)>,
 }
 
@@ -24,15 +24,16 @@ pub enum Register {
     Memory(u64),
 }
 
-/// How to power a machine off.
+/// The way to power a machine off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Off {
-    /// By the power management control registers, of which there are one or two: for each
-    /// its port and the type of sleep (4.8.3.2).
+    /// By the one or two power management control registers: for each, its port and the type of
+    /// sleep (4.8.3.2).
     Control {
         /// The registers; the second one may be missing.
         registers: [Option<(u16, u8)>; 2],
-        /// Where to write what, if the firmware has not given these registers up yet.
+        /// The port and the value that make the firmware hand these registers over, if it has not
+        /// done so yet.
         enable: Option<(u16, u8)>,
     },
     /// By the sleep control register of hardware-reduced machines, with this type of sleep
@@ -107,7 +108,7 @@ pub(crate) fn register(memory: &dyn PhysicalMemory, at: u64) -> Option<Register>
     }
 }
 
-/// Returns the two types of sleep that are off, from the DSDT that the FADT names.
+/// Returns the two sleep types that mean "off", from the DSDT named by the FADT.
 fn sleep_types(memory: &dyn PhysicalMemory, fadt: u64, length: u64) -> Option<[u8; 2]> {
     let has_wide = offset::WIDE_DSDT + 8 <= length;
     let wide = memory.u64(fadt + offset::WIDE_DSDT).filter(|_| has_wide);
@@ -119,6 +120,8 @@ fn sleep_types(memory: &dyn PhysicalMemory, fadt: u64, length: u64) -> Option<[u
     let code = memory
         .bytes(dsdt, bytes)
         .filter(|code| code.starts_with(b"DSDT"))?;
+    // A definition begins with the operator Name (8), with or without the root's `\`; any other
+    // occurrence of the bytes is a reference (20.2.5.1).
     let named = |at: &usize| code[..*at].ends_with(b"\x08") || code[..*at].ends_with(b"\x08\\");
     let places = code.windows(4).enumerate();
     let mut places = places.filter(|(_, name)| name == b"_S5_").map(|(at, _)| at);
@@ -131,7 +134,8 @@ fn package(code: &[u8]) -> Option<[u8; 2]> {
     const PACKAGE: u8 = 0x12;
     const BYTE: u8 = 0x0a;
     let (&kind, rest) = code.split_first()?;
-    // The length says in its first two bits how many bytes follow; then comes the number.
+    // The first two bits of the length state how many more of its bytes follow; then comes the
+    // number of elements.
     let lead = *rest.first().filter(|_| kind == PACKAGE)?;
     let mut elements = rest.get(2 + usize::from(lead >> 6)..)?.iter();
     let mut constant = || match *elements.next()? {

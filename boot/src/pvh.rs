@@ -18,7 +18,8 @@ mod offset {
     pub(super) const MEMORY_MAP_LENGTH: u64 = 48;
 }
 
-/// Adds what the start info at `address` tells to `info`, and reports whether there is one.
+/// Adds the contents of the start info at `address` to `info`, and reports whether there is a start
+/// info.
 pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) -> bool {
     if memory.u32(address) != Some(MAGIC) {
         return false;
@@ -38,7 +39,7 @@ pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) -> 
     true
 }
 
-/// Notes where modules lie; nothing is read of the modules themselves.
+/// Notes the places of modules; nothing is read of the modules themselves.
 fn read_modules(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) {
     const ENTRY_SIZE: u64 = 32;
     let (Some(count), Some(list)) = (
@@ -53,7 +54,7 @@ fn read_modules(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo)
         let (Some(start), Some(size)) = (read(0), read(8)) else {
             return;
         };
-        // One beyond the last address is none.
+        // A module beyond the last address does not count.
         let end = start.checked_add(size).unwrap_or(0);
         if info.add_module(start, end).is_err() {
             return;

@@ -1,4 +1,4 @@
-//! Definitions that belong into an image alone: its entry, its allocator, its panic handler and the
+//! Definitions that belong in an image alone: its entry, its allocator, its panic handler and the
 //! few functions that compiled code calls implicitly ([`mod@boot::memory_functions`]).
 //!
 //! The [`entry!`](crate::entry) macro defines them in the app's binary, not in this library. Host

@@ -1,4 +1,4 @@
-//! Where the image's parts lie in memory, from the linker script's symbols.
+//! The places of the image's parts in memory, from the linker script's symbols.
 //!
 //! Addresses are virtual and physical at once: the image is identity-mapped.
 

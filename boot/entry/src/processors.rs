@@ -1,12 +1,12 @@
-//! Starting the application processors.
+//! Starts the application processors.
 //!
-//! Each starts at the trampoline, finds its stack by its APIC id and calls the
-//! entry function that the kernel named. All of them may start at once: they
-//! share nothing but read-only data.
+//! Each processor starts at the trampoline, finds its stack by its APIC id and calls the entry
+//! function named by the kernel. All of them may start at once: they share nothing but read-only
+//! data.
 //!
-//! The order of a start is the kernel's, because the interrupts are sent with
-//! its local APIC: [`prepare`], then the INIT and startup interrupts (Intel SDM
-//! volume 3, 9.4.4), whose vector is the trampoline's page.
+//! The kernel carries out a start, because the interrupts are sent with its local APIC: first
+//! [`prepare`], then the INIT and startup interrupts (Intel SDM volume 3, 9.4.4), whose vector is
+//! the trampoline's page.
 
 use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
@@ -36,8 +36,8 @@ unsafe extern "C" {
 ///
 /// # Safety
 ///
-/// 1. `root_table` is the physical address of a page table that identity-maps
-///    the image and maps all stacks.
+/// 1. `root_table` is the physical address of a page table that identity-maps the image and maps
+///    all stacks.
 /// 2. The page is mapped writable and holds nothing of use.
 pub unsafe fn prepare(root_table: u64, page: u8, entry: Entry) {
     ENTRY.store(entry as usize, Ordering::Release);
@@ -46,8 +46,8 @@ pub unsafe fn prepare(root_table: u64, page: u8, entry: Entry) {
     let length = core::ptr::from_ref(&trampoline_end) as usize - start as usize;
     let field = core::ptr::from_ref(&trampoline_root_table) as usize - start as usize;
     let page = (usize::from(page) << 12) as *mut u8;
-    // SAFETY: the source is the trampoline's bytes between two symbols of one
-    // section, the destination is the page of condition 2.
+    // SAFETY: the source is the trampoline's bytes between two symbols of one section, the
+    // destination is the page of condition 2.
     unsafe { page.copy_from_nonoverlapping(start, length) };
     // SAFETY: the field lies within the copied bytes, on the page of condition 2.
     unsafe {
@@ -57,8 +57,8 @@ pub unsafe fn prepare(root_table: u64, page: u8, entry: Entry) {
     };
 }
 
-/// Gives processor `apic_id` its stack, which grows down from `top`. Each processor has a
-/// place, and places are taken from 0 on.
+/// Gives processor `apic_id` its stack, which grows down from `top`. Each processor has a place,
+/// and places are taken from 0 on.
 ///
 /// # Panics
 ///
@@ -72,8 +72,7 @@ pub fn set_stack(place: usize, apic_id: u32, top: u64) {
 /// Continues `entry.s` on an application processor's own stack.
 pub(crate) extern "C" fn rust_entry(apic_id: u32) -> ! {
     let entry = ENTRY.load(Ordering::Acquire);
-    // SAFETY: `prepare` stored a function of this type, and ran before any
-    // processor was started.
+    // SAFETY: `prepare` stored a function of this type, and ran before any processor was started.
     let entry = unsafe { core::mem::transmute::<usize, Entry>(entry) };
     entry(apic_id)
 }

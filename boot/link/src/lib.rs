@@ -1,17 +1,16 @@
 //! Linker arguments that make an app's binary a bootable image.
 //!
-//! An app's build script calls [`link_image`] (that of all apps here is `boot/link/image.rs`). The
+//! An app's build script calls [`link_image`] (all apps here use `boot/link/image.rs`). The
 //! arguments apply to the package's binaries alone, so the host tests, examples and docs of the
-//! same package link as any other Rust program does.
+//! same package link like any other Rust program.
 
 #![forbid(unsafe_code)]
 
-/// The arguments for the C compiler that drives the link, besides the script.
+/// The arguments for the C compiler that drives the link, in addition to the script.
 ///
 /// No start files and no libraries: the program brings its own entry point. Not
-/// position-independent: the loader places the image where the script says. Pages of
-/// 4 KiB, so that each section can have its own access rights without padding
-/// the file to 2 MiB.
+/// position-independent: the loader places the image at the script's addresses. Pages of 4 KiB, so
+/// that each section can have its own access rights without padding the file to 2 MiB.
 const ARGUMENTS: [&str; 6] = [
     "-nostartfiles",
     "-nostdlib",
@@ -21,14 +20,15 @@ const ARGUMENTS: [&str; 6] = [
     "-no-pie",
 ];
 
-/// Functions of the same instructions are kept once. Not where a debugger wants each by its name.
+/// Keeps functions with the same instructions only once. Not in builds for a debugger, which wants
+/// each by its name.
 const FOLDED: &str = "-Wl,--icf=all";
 
 /// Tells cargo to link the binaries of the package being built as images.
 ///
-/// To be called from `build.rs`. `kernel::entry!` makes sure that it was, and that `Cargo.toml` is
-/// right for an image; what `src/main.rs` lacks at its top is found here, where the compiler would
-/// give a reason that says nothing.
+/// Call from `build.rs`. `kernel::entry!` makes sure of this call, and checks `Cargo.toml` for the
+/// settings of an image. Attributes missing at the top of `src/main.rs` are reported here, because
+/// the compiler's own message would not explain the reason.
 ///
 /// # Panics
 ///
@@ -41,7 +41,7 @@ pub fn link_image() {
     }
     println!("cargo::rustc-check-cfg=cfg(linked_as_image)");
     println!("cargo::rustc-cfg=linked_as_image");
-    // So that the kernel can say it where calls take longer than they may.
+    // The kernel names missing optimization as a cause when calls take longer than they may.
     println!("cargo::rustc-check-cfg=cfg(unoptimized)");
     if std::env::var("OPT_LEVEL").is_ok_and(|level| level == "0") {
         println!("cargo::rustc-cfg=unoptimized");
@@ -57,8 +57,8 @@ pub fn link_image() {
     }
 }
 
-/// Tells cargo to link with this linker script. Each package gets a copy of
-/// the script in cargo's folder for it, whose place cargo keeps right if the workspace is moved.
+/// Tells cargo to link with this linker script. Each package gets a copy of the script in cargo's
+/// folder for the package; cargo keeps the folder's path right if the workspace is moved.
 fn link(script: &str) {
     let folder = std::env::var("OUT_DIR").expect("cargo names its folder to a build script");
     let copy = std::path::Path::new(&folder).join("script.ld");
@@ -66,11 +66,11 @@ fn link(script: &str) {
     for argument in arguments(&copy.display().to_string()) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
-    // Nothing else of the package counts, and this one is there.
+    // No other file of the package counts, and this file always exists.
     println!("cargo::rerun-if-changed=Cargo.toml");
 }
 
-/// Returns the attributes that an image's file must have and this one has not.
+/// Returns the attributes required in an image's file but missing in this file.
 fn missing_attributes(main: &str) -> impl Iterator<Item = &'static str> {
     let has = |attribute: &str| {
         let mut lines = main.lines().map(str::trim_start);
@@ -80,8 +80,8 @@ fn missing_attributes(main: &str) -> impl Iterator<Item = &'static str> {
     needed.into_iter().filter(move |attribute| !has(attribute))
 }
 
-/// Returns all arguments, with the linker script at this place. It is an argument by
-/// itself, for in one with others a comma would end it.
+/// Returns all arguments, with the linker script at this place. The script is an argument by
+/// itself, because inside a combined argument a comma in its path would end it.
 fn arguments(script: &str) -> impl Iterator<Item = &str> {
     let with_script = ["-Xlinker", "-T", "-Xlinker", script];
     ARGUMENTS.into_iter().chain(with_script)

@@ -1,45 +1,47 @@
-//! The few ACPI tables that name the processors, a known clock, and the machine's end.
+//! The few ACPI tables that name the processors, a known clock, and the registers to end the
+//! machine.
 //!
-//! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors, I/O APICs) and
-//! FADT (power management timer, [`power`]), HPET. Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every
-//! table's checksum is verified; one with a wrong checksum is not used, and named.
+//! Root pointer (RSDP) -> RSDT or XSDT -> MADT (processors, I/O APICs) and FADT (power management
+//! timer, [`power`]), HPET. Layouts: ACPI specification 6.5, 5.2.5 to 5.2.12. Every table's
+//! checksum is verified; a table with a wrong checksum is not used, and named.
 
 use crate::physical::PhysicalMemory;
 use crate::power::{self, Power, Register};
 use crate::{List, MAX_PROCESSORS};
 
-/// The most I/O APICs that are noted.
+/// The most I/O APICs noted.
 pub const MAX_IO_APICS: usize = 8;
 
-/// The facts that the tables tell.
+/// The facts told by the tables.
 #[derive(Clone, Copy, Debug)]
 pub struct Platform {
     /// The local APIC ids of the enabled processors, in the table's order, as far as they fit.
     pub apic_ids: List<u32, MAX_PROCESSORS>,
-    /// How many of these there are.
+    /// The number of enabled processors, whether their ids fit or not.
     pub processors: usize,
     /// The physical address of the local APICs' registers.
     pub local_apic: u64,
     /// The power management timer, if the machine has one.
     pub pm_timer: Option<PmTimer>,
-    /// The physical address of the registers of the high precision event timer, if it has one.
+    /// The physical address of the registers of the high precision event timer, if the machine has
+    /// one.
     pub hpet: Option<u64>,
     /// The physical addresses of the I/O APICs' registers.
     pub io_apics: List<u64, MAX_IO_APICS>,
-    /// The physical address of PCI's configuration space, that of bus 0, if it is in memory.
+    /// The physical address of PCI's configuration space, starting at bus 0, if it is in memory.
     pub ecam: Option<u64>,
-    /// How it is powered off and reset.
+    /// The way to power off and reset the machine.
     pub power: Power,
-    /// The fault of a table that could be done without, if there is any.
+    /// The fault of a dispensable table, if there is any.
     pub warning: Option<AcpiError>,
 }
 
 impl Platform {
-    /// Adds a processor, unless the table has named it already, in its other form of an entry.
+    /// Adds a processor, unless the table has named it already, in the other form of an entry.
     fn add_processor(&mut self, apic_id: u32) {
         if !self.apic_ids.as_slice().contains(&apic_id) {
             self.processors += 1;
-            // One more than there is room for can be counted only.
+            // A processor without room is only counted.
             let _ = self.apic_ids.push(apic_id);
         }
     }
@@ -48,28 +50,28 @@ impl Platform {
 /// The 3.579545 MHz counter of ACPI 4.8.2.1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PmTimer {
-    /// The I/O port to read it from.
+    /// The I/O port to read the counter from.
     pub port: u16,
     /// The number of bits that count: 24 or 32.
     pub bits: u32,
 }
 
-/// Why the processors, or a table, could not be found.
+/// The reason why the processors, or a table, could not be found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AcpiError {
-    /// No root pointer where the loader said, nor in the BIOS area.
+    /// No root pointer at the loader's address, nor in the BIOS area.
     NoRootPointer,
     /// The root pointer leads to no valid table of tables.
     NoRootTable,
     /// No table has this signature.
     Absent(Signature),
-    /// The one with this signature has a wrong length or checksum.
+    /// The table with this signature has a wrong length or checksum.
     Damaged(Signature),
     /// The table of interrupt controllers (MADT) is malformed, or names no processor.
     NoProcessors,
 }
 
-/// How a table begins.
+/// The first bytes of a table.
 type Signature = [u8; 4];
 
 impl core::fmt::Display for AcpiError {
@@ -92,14 +94,14 @@ impl core::fmt::Display for AcpiError {
 
 const HEADER: u64 = 36;
 
-/// Reads the tables, starting from the root pointer that the loader named or,
-/// if it named none, from the one in the BIOS area (ACPI 5.2.5.1).
+/// Reads the tables, starting from the root pointer named by the loader or, by default, from the
+/// root pointer in the BIOS area (ACPI 5.2.5.1).
 ///
 /// # Errors
 ///
-/// [`AcpiError`] says which link of the chain is missing. Without a MADT there is no
-/// telling which processors exist, so that is an error, not an empty list.
-// It is compiled for size where it is, and an image has little room.
+/// [`AcpiError`] says which link of the chain is missing. Without a MADT the existing processors
+/// are unknown, so a missing MADT is an error, not an empty list.
+// Not inlined: this code is compiled for size here, and an image has little room.
 #[inline(never)]
 pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, AcpiError> {
     let root = rsdp
@@ -122,7 +124,7 @@ pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, 
     };
     let fadt = find(*b"FACP");
     let hpet = find(*b"HPET").and_then(|hpet| hpet_registers(memory, hpet));
-    // Behind the header and 8 bytes of nothing: the base of the first segment, its number, and its
+    // After the header and 8 reserved bytes: the base of the first segment, its number, and its
     // first bus (PCI Firmware Specification 3.2, 4.1.2).
     let ecam = find(*b"MCFG").and_then(|mcfg| {
         let first = memory.u32(mcfg + HEADER + 16)? & 0xff_ffff;
@@ -153,7 +155,7 @@ fn sums_to_0(bytes: &[u8]) -> bool {
     bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
 }
 
-/// Returns the table's length if it is whole and starts with `signature`.
+/// Returns the table's length if the table is whole and starts with `signature`.
 fn table_length(memory: &dyn PhysicalMemory, table: u64, signature: Signature) -> Option<u64> {
     let length = memory.u32(table + 4)?;
     let bytes = memory.bytes(table, usize::try_from(length).ok()?)?;
@@ -221,6 +223,7 @@ fn read_madt(memory: &dyn PhysicalMemory, madt: u64, platform: &mut Platform) ->
     let mut offset = HEADER + 8;
     while offset + 2 <= length {
         let entry = madt + offset;
+        // A shorter entry would keep the loop from advancing.
         let size = memory.u8(entry + 1).filter(|size| *size >= 2)?;
         match memory.u8(entry)? {
             LOCAL_APIC if memory.u32(entry + 4)? & ENABLED != 0 => {
@@ -230,7 +233,7 @@ fn read_madt(memory: &dyn PhysicalMemory, madt: u64, platform: &mut Platform) ->
                 platform.add_processor(memory.u32(entry + 4)?);
             }
             IO_APIC => {
-                // One more than there is room for stays as the firmware left it.
+                // An I/O APIC without room stays as the firmware left it.
                 let _ = platform.io_apics.push(u64::from(memory.u32(entry + 4)?));
             }
             LOCAL_APIC_ADDRESS_OVERRIDE => platform.local_apic = memory.u64(entry + 4)?,
@@ -241,7 +244,7 @@ fn read_madt(memory: &dyn PhysicalMemory, madt: u64, platform: &mut Platform) ->
     (!platform.apic_ids.as_slice().is_empty()).then_some(())
 }
 
-/// Reads where the event timer's registers are (IA-PC HPET specification 1.0a, 3.2.4).
+/// Reads the address of the event timer's registers (IA-PC HPET specification 1.0a, 3.2.4).
 fn hpet_registers(memory: &dyn PhysicalMemory, hpet: u64) -> Option<u64> {
     const BASE_ADDRESS: u64 = 40;
     match power::register(memory, hpet + BASE_ADDRESS)? {
@@ -250,7 +253,7 @@ fn hpet_registers(memory: &dyn PhysicalMemory, hpet: u64) -> Option<u64> {
     }
 }
 
-/// Reads where the power management timer is (ACPI 5.2.9).
+/// Reads the port of the power management timer (ACPI 5.2.9).
 fn pm_timer(memory: &dyn PhysicalMemory, fadt: u64) -> Option<PmTimer> {
     const PM_TIMER_BLOCK: u64 = 76;
     const FLAGS: u64 = 112;

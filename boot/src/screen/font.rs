@@ -1,5 +1,5 @@
-//! The letters of the screen, drawn for it: the 95 visible characters of ASCII, from the blank
-//! to the tilde, 5 pixels wide and 8 high, of which the lowest is for what goes below the line.
+//! The letters of the screen, drawn for this project: the 95 visible characters of ASCII, from the
+//! blank to the tilde, 5 pixels wide and 8 high. The lowest row is for parts below the line.
 
 /// The columns of a letter.
 pub const WIDTH: usize = 5;
@@ -8,14 +8,14 @@ pub const HEIGHT: usize = 8;
 
 const FIRST: u8 = b' ';
 const COUNT: usize = 95;
-/// How many letters stand next to each other in [`DRAWING`], with a column between them.
+/// The number of letters next to each other in [`DRAWING`], with a column between them.
 const ABREAST: usize = 12;
 
 /// Each letter by its columns from the left, the uppermost pixel in the lowest bit.
 static LETTERS: [[u8; WIDTH]; COUNT] = letters();
 
-/// Reports whether the pixel in this column and row of a letter is lit; of what is no
-/// visible character, all are.
+/// Reports whether the pixel in this column and row of a letter is lit. For any byte but a visible
+/// character, all pixels are lit.
 pub fn is_lit(letter: u8, column: usize, row: usize) -> bool {
     let index = letter.wrapping_sub(FIRST);
     let columns = LETTERS.get(usize::from(index));

@@ -1,25 +1,25 @@
-//! The grid of the screen's cells, with those that are yet to be drawn.
+//! The grid of the screen's cells, and the cells still to be drawn.
 //!
-//! Bytes are put into cells; a cell that has another letter than what is drawn there is
-//! *open*. Putting a byte draws nothing. It is not for two cores at once; a core that does it
-//! nevertheless, since the other one was stopped in mid-step, spoils a few cells and no more.
+//! Bytes are put into cells; a cell whose letter differs from the letter drawn there is *open*.
+//! Putting a byte draws nothing. The grid is not for two cores at once. A core may still put bytes
+//! after stopping another core in mid-step; this spoils a few cells and no more.
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering::Relaxed};
 
-/// The most columns and rows that are used.
+/// The most columns and rows used.
 pub(super) const MOST_COLUMNS: usize = 200;
 pub(super) const MOST_ROWS: usize = 64;
 const CELLS: usize = MOST_COLUMNS * MOST_ROWS;
 
-/// Cells with letters; 0 is a blank one. (So an empty grid takes no place in the image.)
+/// Cells with letters; 0 is a blank cell, so an empty grid takes no place in the image.
 pub struct Grid {
     wanted: [AtomicU8; CELLS],
     drawn: [AtomicU8; CELLS],
     row: AtomicUsize,
     column: AtomicUsize,
-    /// Whether the line is a machine line, which has one row: its end is left out.
+    /// Whether the line is a machine line, which gets a single row: its end is left out.
     is_cut: AtomicBool,
-    /// No cell before `first`, none from `end` on is open.
+    /// No cell before `first`, and none from `end` on, is open.
     first: AtomicUsize,
     end: AtomicUsize,
 }
@@ -44,8 +44,8 @@ impl Grid {
         }
     }
 
-    /// Puts a byte of text into a grid of so many columns and rows. Of a character that is not
-    /// ASCII, the first byte stands for all.
+    /// Puts a byte of text into a grid of this many columns and rows. For a character outside of
+    /// ASCII, the first byte stands for all its bytes.
     pub fn put(&self, byte: u8, columns: usize, rows: usize) {
         let column = self.column.load(Relaxed);
         match byte {
@@ -67,7 +67,7 @@ impl Grid {
         }
     }
 
-    /// Goes to the next row. Where there is none, the upper half goes.
+    /// Goes to the next row. On the last row, discards the upper half of the grid.
     fn begin_line(&self, columns: usize, rows: usize) {
         self.column.store(0, Relaxed);
         let row = self.row.load(Relaxed) + 1;
@@ -101,7 +101,7 @@ impl Grid {
         self.first.load(Relaxed) < self.end.load(Relaxed)
     }
 
-    /// Takes the next open cell, which the caller draws: its number, and its letter.
+    /// Takes the next open cell, for the caller to draw: its number, and its letter.
     pub fn take_open(&self) -> Option<(usize, u8)> {
         let end = self.end.load(Relaxed).min(CELLS);
         let mut open = self.first.load(Relaxed)..end;
@@ -111,7 +111,7 @@ impl Grid {
         });
         self.first.store(open.start, Relaxed);
         if open.is_empty() {
-            // The next cell that differs is the first one, and the last.
+            // No cell is open; the next cell that differs becomes both the first and the last.
             self.first.store(CELLS, Relaxed);
             self.end.store(0, Relaxed);
         }

@@ -1,11 +1,10 @@
-//! Text on the screen that a loader has left: letters (`font`), where they stand (`grid`), and
-//! how they are drawn.
+//! Text on the screen left by a loader: letters (`font`), their places (`grid`), and the drawing.
 //!
-//! A screen's memory is slow to write, and the less so the fewer and the longer the stores are,
-//! since a processor may gather them: the kernel maps it so. After a letter it sends what it has.
+//! A screen's memory is slow to write. Few and long stores cost less, since a processor may gather
+//! stores: the kernel maps the screen accordingly. After each letter, the gathered stores are sent.
 //!
-//! Letters are white on black, so that the order of the colours does not matter, and as large
-//! as a hundred fit into a row.
+//! Letters are white on black, so that the order of the colours does not matter. They are as large
+//! as possible with a hundred in a row.
 
 pub mod font;
 mod grid;
@@ -15,30 +14,30 @@ use crate::Framebuffer;
 pub use grid::Grid;
 use grid::{MOST_COLUMNS, MOST_ROWS};
 
-/// A screen, and how letters fill it.
+/// A screen, and the way letters fill it.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
     buffer: Framebuffer,
     /// Whether each pixel is a word of 32 bits.
     has_words: bool,
-    /// How many pixels, across and down, a pixel of a letter has.
+    /// The number of screen pixels, across and down, for a pixel of a letter.
     scale: usize,
-    /// How many letters a row has.
+    /// The number of letters in a row.
     pub columns: usize,
-    /// How many rows there are.
+    /// The number of rows.
     pub rows: usize,
 }
 
-/// A letter's place with the gaps around it, in its own pixels.
+/// A letter's cell with the gaps around the letter, in the letter's pixels.
 const CELL_WIDTH: usize = font::WIDTH + 1;
 const CELL_HEIGHT: usize = font::HEIGHT + 2;
 
 impl Screen {
-    /// Returns how letters fill a screen.
+    /// Returns a screen divided into cells for letters.
     ///
     /// # Safety
     ///
-    /// 1. Later drawing goes to memory that is mapped, and nobody else's.
+    /// 1. Later drawing goes to memory that is mapped, and belongs to nobody else.
     /// 2. A row's pixels fit into the pitch.
     pub unsafe fn new(buffer: Framebuffer) -> Self {
         const WANTED_COLUMNS: usize = 100;
@@ -56,7 +55,7 @@ impl Screen {
         }
     }
 
-    /// Blanks all of it.
+    /// Blanks the whole screen.
     pub fn blank(&self) {
         let all = self.buffer.range();
         for at in (all.start..all.end / 8 * 8).step_by(8) {
@@ -72,7 +71,7 @@ impl Screen {
             self.buffer.start + (column * CELL_WIDTH * self.scale * self.pixel_bytes()) as u64;
         let first = row * CELL_HEIGHT * self.scale;
         for y in 0..CELL_HEIGHT * self.scale {
-            // The upper gap is one pixel of the letter's.
+            // The upper gap is as high as a single pixel of the letter.
             let down = (y / self.scale).wrapping_sub(1);
             let mut at = left + (first + y) as u64 * u64::from(self.buffer.pitch);
             for across in 0..CELL_WIDTH {
@@ -92,11 +91,12 @@ impl Screen {
         self.buffer.pixel_bytes as usize
     }
 
-    /// Sets the pixel at an address, by one store if it has a word.
+    /// Sets the pixel at an address, by a single store if the pixel is a word.
     fn set(&self, at: u64, is_lit: bool) {
         if self.has_words {
             let colour = if is_lit { u32::MAX } else { 0 };
-            // SAFETY: the pixel lies on the screen (conditions 1 and 2 of `new`), at a word.
+            // SAFETY: the pixel lies on the screen (conditions 1 and 2 of `new`), at a word's
+            // address.
             return unsafe { (at as *mut u32).write_volatile(colour) };
         }
         for byte in at..at + self.pixel_bytes() as u64 {

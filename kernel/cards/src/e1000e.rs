@@ -146,6 +146,7 @@ impl Ring for LegacyRing {
             return;
         }
         let tail = self.given.wrapping_sub(is_filled.into()) % RING;
+        // The card may read the descriptors as soon as it sees the new tail.
         fence(Ordering::Release);
         self.registers.write32(self.first + RING_TAIL, tail.into());
     }
@@ -155,6 +156,7 @@ impl Ring for LegacyRing {
     }
 
     fn take(&mut self) -> Option<(u16, usize)> {
+        // Read the descriptor only after its state has shown that the card is done with it.
         fence(Ordering::Acquire);
         let (id, place) = (self.taken % RING, self.next());
         let is_frame = self.memory.read32(place + STATE) & (WHOLE | ERRORS) == WHOLE;

@@ -200,11 +200,14 @@ impl Ring for SplitRing {
         self.memory.write16(self.place(GIVEN, 2, self.given), id);
         self.out |= 1 << id;
         self.given = self.given.wrapping_add(1);
+        // The card may read the descriptor as soon as it sees the new index: publish that last.
         fence(Ordering::Release);
         self.memory.write16(GIVEN + 2, self.given);
     }
 
     fn ring(&mut self) {
+        // The index must be visible before the flag is read: otherwise the card could go to sleep
+        // without a call.
         fence(Ordering::SeqCst);
         // The card may not want to be called.
         if self.memory.read16(DONE) & 1 == 0 {
@@ -217,6 +220,7 @@ impl Ring for SplitRing {
     }
 
     fn take(&mut self) -> Option<(u16, usize)> {
+        // Read the element only after the index that covers it.
         fence(Ordering::Acquire);
         let element = self.memory.read64(self.place(DONE, 8, self.taken));
         let (id, end) = (element & 0xffff_ffff, element >> 32);

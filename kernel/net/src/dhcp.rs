@@ -105,6 +105,7 @@ impl Client {
         {
             self.begin(now_ns);
         }
+        // The server has ignored four requests, after 1, 2, 4 and 8 s: look for another one.
         let is_last_request = self.patience_ns > 8 * NS_PER_S;
         if matches!(self.state, State::Requesting(_)) && is_last_request {
             self.begin(now_ns);

@@ -195,6 +195,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
         let packet = arp::ArpPacket::read(&frame[ipv4::START..])?;
         self.counts.arps += 1;
         let (mac, ip) = packet.from;
+        // A neighbour with a group's address would draw our frames to the whole group.
         if mac.is_group() || !is_host(ip) {
             return Some(Heard::Nothing);
         }

@@ -37,6 +37,7 @@ pub(crate) fn write(datagram: &mut [u8], ports: (u16, u16), addresses: (Ipv4Addr
     put(datagram, 4, &length.to_be_bytes());
     put(datagram, 6, &[0; 2]);
     let check = match check_sum(sum(datagram, pseudo_header(addresses, length))) {
+        // On the wire 0 would mean "no check sum"; all ones is the same sum (RFC 768).
         0 => 0xffff,
         check => check,
     };

@@ -58,7 +58,7 @@ pub(crate) struct WireEnds {
 
 #[derive(Clone, Copy, Debug)]
 enum Ends {
-    /// Whether bytes come from standard input, and the file they are sent to.
+    /// Whether bytes come from standard input, and the output file.
     Bytes(bool, Option<&'static str>),
     /// Datagrams to an own port, from a single peer if one is given.
     Udp(u16, Option<SocketAddrV4>),
@@ -286,7 +286,7 @@ pub(crate) fn memory_kib() -> u64 {
     number.unwrap_or(0)
 }
 
-/// Bytes of standard input; the reading thread lasts as long as the program.
+/// Bytes of standard input; the reading thread lasts as long as the program itself.
 static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
 
 /// The run of this program.
