@@ -23,7 +23,7 @@
 //!   run needs, or as fit into a quarter of the free memory.
 //! - `bounds=judge|observe`: whether exceeding a proven bound makes a run fail. Default: `judge`.
 //! - `log=off|error|warn|info|debug`: the last level of the log that is printed. Default: `info`.
-//! - `idle=halt|poll`: whether idle cores halt, or poll for work, which wakes them sooner. Default:
+//! - `idle=halt|poll`: whether idle cores halt, or poll for work, and so begin it sooner. Default:
 //!   `halt`.
 //! - `measure=nothing|interrupts|stacks`: whether to measure sections without interrupts, or each
 //!   subtask's use of its stack. Default: `nothing`.

@@ -214,7 +214,7 @@ impl<S: System> Machine<S> {
     }
 
     /// Leaves the verdict on faults to the app. Without this call, a fault ending a DAG in any run
-    /// makes the app fail. The app may call at any time before its function returns.
+    /// makes the app fail. The app may make the call at any time before its function returns.
     ///
     /// ```no_run
     /// fn may_lose_a_camera(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
@@ -233,8 +233,8 @@ impl<S: System> Machine<S> {
 
     /// Leaves the verdict on response times beyond their proven bounds to the app. Without this
     /// call, such a response time in any run makes the app fail, except in the tool's mode
-    /// `threads` and on Linux. The app may call at any time before its function returns. Exceeded
-    /// bounds are printed in any case.
+    /// `threads` and on Linux. The app may make the call at any time before its function returns.
+    /// Exceeded bounds are printed in any case.
     pub fn accept_exceeded_bounds(&self) {
         self.verdict.accept_exceeded_bounds();
     }
