@@ -24,8 +24,8 @@ const OF_EIGHTHS: [Long; 9] = [
     (FRAC_PI_4, 3.061_616_997_868_383e-17),
 ];
 
-const HALF_TURN: Long = (PI, 1.224_646_799_147_353_2e-16);
-const QUARTER_TURN: Long = (FRAC_PI_2, 6.123_233_995_736_766e-17);
+const STRAIGHT_ANGLE: Long = (PI, 1.224_646_799_147_353_2e-16);
+const RIGHT_ANGLE: Long = (FRAC_PI_2, 6.123_233_995_736_766e-17);
 
 /// Returns the angle whose tangent is `x`, in radians, from -pi/2 to pi/2.
 pub fn atan(x: f64) -> f64 {
@@ -64,12 +64,12 @@ pub fn atan2(y: f64, x: f64) -> f64 {
         of_ratio(less / more)
     };
     let angle = if is_steep {
-        minus(QUARTER_TURN, angle)
+        minus(RIGHT_ANGLE, angle)
     } else {
         angle
     };
     let angle = if x.is_sign_negative() {
-        minus(HALF_TURN, angle)
+        minus(STRAIGHT_ANGLE, angle)
     } else {
         angle
     };

@@ -28,11 +28,11 @@
 #![no_std]
 
 mod arcs;
-mod turns;
+mod trigonometry;
 
 pub use arcs::{acos, asin, atan, atan2};
 pub use root::sqrt;
-pub use turns::{LARGEST_ANGLE, cos, sin, sin_cos, tan};
+pub use trigonometry::{LARGEST_ANGLE, cos, sin, sin_cos, tan};
 
 /// Added to a number below 2^51 it makes the last bit count 1: the sum is rounded, and
 /// its low bits are an integer.

@@ -28,7 +28,7 @@
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use executive::machine::timer::{self, Alarm};
-use executive::machine::{clock, interrupt_flag, this_core, turns};
+use executive::machine::{clock, interrupt_flag, this_core, time_slice};
 use executive::text::console;
 
 /// An event that cores can wait for.
@@ -107,8 +107,8 @@ impl Event {
             if self.version() != seen || clock::now_ns() >= until_ns {
                 // The bit stays set, but without the note it has no effect.
                 core.context().note_awaited(0);
-                turns::end_hold(core);
-                turns::enter();
+                time_slice::end_hold(core);
+                time_slice::enter();
                 interrupt_flag::enable();
                 return;
             }
@@ -117,7 +117,7 @@ impl Event {
                 console::send_pending_byte();
                 continue;
             }
-            turns::leave(core);
+            time_slice::leave(core);
             timer::set(Alarm::Hold, until_ns);
             interrupt_flag::enable_and_halt();
         }

@@ -19,7 +19,7 @@ use executive::machine::power::{self, PowerAction};
 use executive::machine::this_core::{self, Core, CoreStacks};
 use executive::machine::{
     agreement, avx, clock, counted_time, cpu, interrupt, interrupt_flag, legacy, local_apic,
-    processors, screen, serial, turns,
+    processors, screen, serial, time_slice,
 };
 use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, heartbeat, record, worker};
@@ -216,7 +216,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     // The host chooses the meaning of time.
     if info.value("mode") == Some("deterministic") {
         counted_time::enable();
-        turns::enable();
+        time_slice::enable();
     }
     if cores > 1 {
         start_others(info, layout, cores);

@@ -16,18 +16,19 @@
 //! flight. An overrun skipping releases breaks the sequence: with J = 2, jobs 1 and 3 can be in
 //! flight together.)
 //!
-//! A slot holds a value and an atomic word, the *turn*: 0 while the slot is empty, `2k + 1` (modulo
-//! 2^64) while the slot holds the value of job k, and 2 while it holds a value given up. (Job k +
-//! 2^63 has the turn of job k, but no run gets there in 292 years.) One soundness argument, cited
-//! below by name, covers the ring:
+//! A slot holds a value and an atomic word, the *stamp*: 0 while the slot is empty, `2k + 1`
+//! (modulo 2^64) while the slot holds the value of job k, and 2 while it holds a value given up.
+//! (Job k + 2^63 has the stamp of job k, but no run gets there in 292 years.) One soundness
+//! argument, cited below by name, covers the ring:
 //!
-//! > **Turn invariant.** While a slot's turn is even, only the ring's writer may touch the slot's
-//! > value; while the turn is odd, only the ring's reader. The value is uninitialised if the turn
-//! > is 0, and initialised otherwise. Only the side in possession of the slot changes the turn. The
-//! > writer changes 0 to `2k + 1` once the value is written. The reader changes it back to 0 once
-//! > the value is moved out, or to 2 to leave the value to the writer, which sets it to 0 before
-//! > dropping the value. A change of sides is a `Release` store, and the other side looks at it by
-//! > an `Acquire` load. So all accesses of one side to the value happen before all of the other.
+//! > **Stamp invariant.** While a slot's stamp is even, only the ring's writer may touch the slot's
+//! > value; while the stamp is odd, only the ring's reader. The value is uninitialised if the stamp
+//! > is 0, and initialised otherwise. Only the side in possession of the slot changes the stamp.
+//! > The writer changes 0 to `2k + 1` once the value is written. The reader changes it back to 0
+//! > once the value is moved out, or to 2 to leave the value to the writer, which sets it to 0
+//! > before dropping the value. A change of sides is a `Release` store, and the other side looks at
+//! > it by an `Acquire` load. So all accesses of one side to the value happen before all of the
+//! > other.
 //!
 //! The reader *gives up* the value of a cancelled job in a few instructions, and the writer drops
 //! the value in place when the slot is next needed. Dropping is the app's code and may panic, take
@@ -63,15 +64,15 @@ use core::ops::{Deref, DerefMut};
 use core::ptr;
 use core::sync::atomic::{AtomicPtr, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
-/// The turn of an empty slot.
+/// The stamp of an empty slot.
 const EMPTY_SLOT: u64 = 0;
 
-/// The turn of a slot whose value was given up.
+/// The stamp of a slot whose value was given up.
 const GIVEN_UP: u64 = 2;
 
-/// Returns the turn of a slot holding the value of `job`.
+/// Returns the stamp of a slot holding the value of `job`.
 #[inline]
-const fn turn_of(job: u64) -> u64 {
+const fn stamp_of(job: u64) -> u64 {
     job << 1 | 1
 }
 
@@ -126,24 +127,24 @@ impl<T> Writer<T> {
             },
         };
         let place = slot.value.get().cast::<T>();
-        // SAFETY: by the turn invariant an empty slot is the writer's alone,
+        // SAFETY: by the stamp invariant an empty slot is the writer's alone,
         // and `&mut self` makes us the only thread that acts as the writer.
         unsafe { place.write(value) };
-        slot.turn.store(turn_of(job), Ordering::Release);
+        slot.stamp.store(stamp_of(job), Ordering::Release);
         Ok(())
     }
 
     /// Finds an empty slot, or empties a slot whose value was given up.
     #[cold]
     fn make_room(&mut self) -> Option<&Slot<T>> {
-        let slot = (self.ring).search(&mut self.next, |turn| turn & 1 == 0)?;
-        if slot.turn.load(Ordering::Relaxed) == GIVEN_UP {
+        let slot = (self.ring).search(&mut self.next, |stamp| stamp & 1 == 0)?;
+        if slot.stamp.load(Ordering::Relaxed) == GIVEN_UP {
             // The store comes first: should `drop` panic, the value is not dropped again.
-            slot.turn.store(EMPTY_SLOT, Ordering::Relaxed);
+            slot.stamp.store(EMPTY_SLOT, Ordering::Relaxed);
             let place = slot.value.get().cast::<T>();
-            // SAFETY: by the turn invariant the value of a slot that was given up is initialised
+            // SAFETY: by the stamp invariant the value of a slot that was given up is initialised
             // and the writer's alone, and `&mut self` makes us the only thread that acts as the
-            // writer. The turn is 0 already, so nobody drops the value a second time.
+            // writer. The stamp is 0 already, so nobody drops the value a second time.
             unsafe { place.drop_in_place() };
         }
         Some(slot)
@@ -157,11 +158,11 @@ impl<T> Reader<T> {
     pub(crate) fn take(&mut self, job: u64) -> Option<T> {
         let slot = self.slot_of(job)?;
         let place = slot.value.get().cast::<T>();
-        // SAFETY: by the turn invariant the value of a slot with an odd turn is initialised and the
-        // reader's alone, and `&mut self` makes us the only thread that acts as the reader. The
-        // store below ends our turn, so the value is not read twice.
+        // SAFETY: by the stamp invariant the value of a slot with an odd stamp is initialised and
+        // the reader's alone, and `&mut self` makes us the only thread that acts as the reader. The
+        // store below gives the slot away, so the value is not read twice.
         let value = unsafe { place.read() };
-        slot.turn.store(EMPTY_SLOT, Ordering::Release);
+        slot.stamp.store(EMPTY_SLOT, Ordering::Release);
         Some(value)
     }
 
@@ -170,16 +171,16 @@ impl<T> Reader<T> {
         if let Some(slot) = self.slot_of(job) {
             // Relaxed suffices: this end has not touched the value, so the writer's drop needs no
             // order with a read here.
-            slot.turn.store(GIVEN_UP, Ordering::Relaxed);
+            slot.stamp.store(GIVEN_UP, Ordering::Relaxed);
         }
     }
 
     #[inline]
     fn slot_of(&mut self, job: u64) -> Option<&Slot<T>> {
-        let turn = turn_of(job);
-        match self.ring.near(turn) {
+        let stamp = stamp_of(job);
+        match self.ring.near(stamp) {
             Some(slot) => Some(slot),
-            None => (self.ring).search(&mut self.next, |other| other == turn),
+            None => (self.ring).search(&mut self.next, |other| other == stamp),
         }
     }
 }
@@ -192,43 +193,43 @@ struct Ring<T> {
 
 /// A place for a single value.
 struct Slot<T> {
-    turn: AtomicU64,
+    stamp: AtomicU64,
     value: UnsafeCell<MaybeUninit<T>>,
 }
 
-// SAFETY: the value is reached through the two ends only, and both follow the turn invariant. A
+// SAFETY: the value is reached through the two ends only, and both follow the stamp invariant. A
 // value is thereby handed from one thread to another but never shared, so `T: Send` is enough.
 unsafe impl<T: Send> Sync for Slot<T> {}
 
 impl<T> Ring<T> {
-    /// Returns the near slot if the slot has the given turn, as is nearly always the case. Loads
-    /// the turn by `Acquire`.
+    /// Returns the near slot if the slot has the given stamp, as is nearly always the case. Loads
+    /// the stamp by `Acquire`.
     #[inline]
-    fn near(&self, turn: u64) -> Option<&Slot<T>> {
-        (self.near.turn.load(Ordering::Acquire) == turn).then_some(&self.near)
+    fn near(&self, stamp: u64) -> Option<&Slot<T>> {
+        (self.near.stamp.load(Ordering::Acquire) == stamp).then_some(&self.near)
     }
 
-    /// Finds a slot whose turn satisfies `is_meant`, from other slot `next` on, and moves `next`
-    /// past it. Loads each turn by `Acquire`.
+    /// Finds a slot whose stamp satisfies `is_meant`, from other slot `next` on, and moves `next`
+    /// past it. Loads each stamp by `Acquire`.
     #[cold]
     fn search(&self, next: &mut usize, is_meant: impl Fn(u64) -> bool) -> Option<&Slot<T>> {
         for _ in 0..self.others.len() {
             let slot = (self.others).get(*next & (self.others.len() - 1))?;
             *next = next.wrapping_add(1);
-            if is_meant(slot.turn.load(Ordering::Acquire)) {
+            if is_meant(slot.stamp.load(Ordering::Acquire)) {
                 return Some(slot);
             }
         }
         // The near slot again: in `make_room` its value may have been given up, so `near` did not
         // match.
-        is_meant(self.near.turn.load(Ordering::Acquire)).then_some(&self.near)
+        is_meant(self.near.stamp.load(Ordering::Acquire)).then_some(&self.near)
     }
 }
 
 impl<T> Slot<T> {
     const fn empty() -> Self {
         Self {
-            turn: AtomicU64::new(EMPTY_SLOT),
+            stamp: AtomicU64::new(EMPTY_SLOT),
             value: UnsafeCell::new(MaybeUninit::uninit()),
         }
     }
@@ -236,8 +237,8 @@ impl<T> Slot<T> {
 
 impl<T> Drop for Slot<T> {
     fn drop(&mut self) {
-        if *self.turn.get_mut() != EMPTY_SLOT {
-            // SAFETY: by the turn invariant the value of a slot with a turn other than 0 is
+        if *self.stamp.get_mut() != EMPTY_SLOT {
+            // SAFETY: by the stamp invariant the value of a slot with a stamp other than 0 is
             // initialised; `&mut self` shows that both ends are gone.
             unsafe { self.value.get_mut().assume_init_drop() };
         }

@@ -12,8 +12,8 @@ use super::context::{Parked, SavedRegisters, VECTOR_BYTES};
 use super::fault::{self, CpuException};
 use super::this_core::Core;
 use super::{
-    cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
-    turns, vector,
+    cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core,
+    time_slice, timer, vector,
 };
 use fass::platform::SetOnce;
 
@@ -109,7 +109,7 @@ pub fn load_table() {
 /// Handles one interrupt and returns the registers to resume.
 extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegisters {
     interrupts_off::note_disabled(Location::caller());
-    turns::begin_urgent();
+    time_slice::begin_urgent();
     // SAFETY: `interrupt.s` passes the registers of the context that this core
     // was running, which are this core's (context invariant).
     let vector = unsafe { (*registers).vector };
@@ -136,7 +136,7 @@ extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegi
         _ => local_apic::acknowledge(),
     }
     interrupts_off::note_enabled();
-    turns::end_interrupt();
+    time_slice::end_interrupt();
     this_core::get().context().registers()
 }
 

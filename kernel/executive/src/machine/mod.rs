@@ -35,7 +35,7 @@ pub mod section;
 pub mod serial;
 pub mod spinlock;
 pub mod this_core;
+pub mod time_slice;
 pub mod timer;
-pub mod turns;
 pub mod vector;
 mod wake;

@@ -47,7 +47,7 @@ impl CoreMeter {
     }
 }
 
-/// A core's part in the time slices of computing cores ([`turns`](super::turns)).
+/// A core's part in the time slices of computing cores ([`time_slice`](super::time_slice)).
 ///
 /// ```text
 ///                 1             2               4                 5
@@ -59,18 +59,19 @@ impl CoreMeter {
 ///           +--------------------------------------------+---------------------+
 /// ```
 ///
-/// 1. `turns::come`: an interrupt handler has chosen a new worker for the core.
-/// 2. `turns::join`, called by `turns::enter` before a function begins.
-/// 3. `turns::join`: as 2, where no interrupt came before, or to continue a suspended instance.
-/// 4. `turns::wait`, the first turn, once no core has the turn and none is urgent: a short turn if
-///    other cores are fresh, too.
-/// 5. `turns::pass`, at the end of an interrupt after the turn's alarm has fired.
-/// 6. `turns::wait`, likewise, once no core is fresh and no other waiting core is next.
-/// 7. `turns::leave` as the instance halts, watches the clock or is preempted; `turns::rest` as the
-///    core has nothing to compute.
+/// 1. `time_slice::come`: an interrupt handler has chosen a new worker for the core.
+/// 2. `time_slice::join`, called by `time_slice::enter` before a function begins.
+/// 3. `time_slice::join`: as 2, where no interrupt came before, or to continue a suspended
+///    instance.
+/// 4. `time_slice::wait`, the first slice, once no core has the slice and none is urgent: a short
+///    slice if other cores are fresh, too.
+/// 5. `time_slice::pass`, at the end of an interrupt after the slice's alarm has fired.
+/// 6. `time_slice::wait`, likewise, once no core is fresh and no other waiting core is next.
+/// 7. `time_slice::leave` as the instance halts, watches the clock or is preempted;
+///    `time_slice::rest` as the core has nothing to compute.
 ///
 /// A core keeps its part from one instance to the next, also after a fault. No part returns to
-/// Fresh but through None. If a core takes over the turn of a silent core, both parts are Computes
+/// Fresh but through None. If a core takes over the slice of a silent core, both parts are Computes
 /// for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -79,11 +80,11 @@ pub(super) enum TimeSlicePart {
     None,
     /// The core has got an instance in an interrupt, and is about to start the instance.
     Comes,
-    /// The core waits for its first turn.
+    /// The core waits for its first slice.
     Fresh,
-    /// The core has the turn.
+    /// The core has the slice.
     Computes,
-    /// The core waits for its next turn.
+    /// The core waits for its next slice.
     Waits,
 }
 
@@ -111,7 +112,7 @@ pub struct Core {
     pub(super) watches: AtomicBool,
     /// Decisions are followed at the end of the current interrupt.
     pub follows: AtomicBool,
-    /// The core's [`TimeSlicePart`] in the turns.
+    /// The core's [`TimeSlicePart`] in the time slices.
     part: AtomicU8,
     /// The times for this core's timer to fire, in nanoseconds on the clock, each `u64::MAX` if
     /// never.
@@ -299,7 +300,7 @@ pub fn take_spare_context() -> Option<Parked> {
 }
 
 impl Core {
-    /// Returns the core's part in the turns.
+    /// Returns the core's part in the time slices.
     pub(super) fn part(&self) -> TimeSlicePart {
         const COMES: u8 = TimeSlicePart::Comes as u8;
         const FRESH: u8 = TimeSlicePart::Fresh as u8;
@@ -314,7 +315,7 @@ impl Core {
         }
     }
 
-    /// Sets the core's part in the turns.
+    /// Sets the core's part in the time slices.
     pub(super) fn set_part(&self, part: TimeSlicePart) {
         self.part.store(part as u8, Ordering::Relaxed);
     }

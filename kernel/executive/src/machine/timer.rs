@@ -14,7 +14,8 @@ use super::{clock, counted_time, interrupt_flag, local_apic};
 pub enum Alarm {
     /// The scheduler's next event.
     Schedule = 0,
-    /// The end of a subtask's hold of its core, or of the core's turn ([`turns`](super::turns)).
+    /// The end of a subtask's hold of its core, or of the core's time slice
+    /// ([`time_slice`](super::time_slice)).
     Hold = 1,
     /// The end of the running instance's budget.
     Budget = 3,

@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use super::this_core::{self, Core};
-use super::{local_apic, turns, vector};
+use super::{local_apic, time_slice, vector};
 
 impl Core {
     /// Makes this core look for work, by an interrupt unless the core watches `wake` or is the
@@ -13,9 +13,9 @@ impl Core {
         // up, or the caller sees here that the core does not watch yet.
         self.wake.store(true, Ordering::SeqCst);
         if self.index != this_core::get().index && !self.watches.load(Ordering::SeqCst) {
-            turns::begin_urgent();
+            time_slice::begin_urgent();
             local_apic::send(self.apic_id(), vector::WAKE);
-            turns::end_urgent();
+            time_slice::end_urgent();
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::machine::context::Context;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, cpu, interrupt_flag, this_core, turns};
+use crate::machine::{clock, cpu, interrupt_flag, this_core, time_slice};
 
 /// Occupies the calling instance's core for `ns` nanoseconds of execution, halting in between.
 pub(crate) fn hold(ns: u64) {
@@ -13,11 +13,11 @@ pub(crate) fn hold(ns: u64) {
         let core = this_core::get();
         if left_ns == 0 {
             timer::set(Alarm::Hold, u64::MAX);
-            turns::enter();
+            time_slice::enter();
             interrupt_flag::enable();
             return;
         }
-        turns::leave(core);
+        time_slice::leave(core);
         timer::set(Alarm::Hold, clock::now_ns().saturating_add(left_ns));
         // A preemption happens here: the loop then goes round again on the core where the instance
         // continues, and sets that core's alarm.
@@ -29,10 +29,10 @@ pub(crate) fn hold(ns: u64) {
 pub(crate) fn spin(ns: u64) {
     let executed = ExecutionTimer::from_now();
     while executed.ns() < ns {
-        turns::stand_back();
+        time_slice::stand_back();
         cpu::relax();
     }
-    turns::come_back();
+    time_slice::come_back();
 }
 
 /// A stopwatch that stands still while its context is suspended.

@@ -43,7 +43,7 @@ use super::execution::{self, CoreWork, RunnerLoan};
 use super::heartbeat;
 use crate::machine::context::Parked;
 use crate::machine::this_core::{self, Core};
-use crate::machine::{clock, cpu, interrupt_flag, turns};
+use crate::machine::{clock, cpu, interrupt_flag, time_slice};
 use crate::text::console;
 
 /// Runs the instances assigned to the current core, one after another. Interrupts may preempt the
@@ -56,7 +56,7 @@ pub fn work() -> Parked {
         work = match work {
             CoreWork::Run(runner) => run(runner),
             CoreWork::Continue(context) => {
-                turns::enter_by_interrupt(this_core::get());
+                time_slice::enter_by_interrupt(this_core::get());
                 return context;
             }
             CoreWork::Rest => {
@@ -71,7 +71,7 @@ pub fn work() -> Parked {
 fn find_work() -> CoreWork {
     let work = execution::find_work();
     if let CoreWork::Run(_) = &work {
-        turns::enter();
+        time_slice::enter();
     }
     work
 }
@@ -135,12 +135,12 @@ fn watch(core: &Core) {
 /// there is work for the core. `when_idle` reports whether more remains to be done at once.
 pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
     while !execution::is_finished() {
-        turns::begin_background();
+        time_slice::begin_background();
         let has_more = when_idle();
         if console::send_pending_byte() || has_more {
             continue;
         }
-        turns::end_background();
+        time_slice::end_background();
         interrupt_flag::disable();
         // Asked again with interrupts disabled, to lose no wake-up between question and halt.
         if execution::is_finished() {
@@ -149,5 +149,5 @@ pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
             interrupt_flag::enable_and_halt();
         }
     }
-    turns::end_background();
+    time_slice::end_background();
 }

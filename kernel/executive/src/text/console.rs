@@ -35,7 +35,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use front::console::{OutputKind, TextPieces};
 
 use crate::machine::spinlock::SpinLock;
-use crate::machine::{screen, serial, turns};
+use crate::machine::{screen, serial, time_slice};
 
 static BUFFER: SpinLock<OutputRing<{ 16 * 1024 }>> = SpinLock::new(OutputRing::new());
 
@@ -64,7 +64,7 @@ pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
 /// Puts a piece into the buffer, or counts the piece as dropped if it does not fit or is not
 /// `wanted`. Reports whether the piece is in the buffer.
 fn hand_over(piece: &[u8], kind: OutputKind, begins: bool, wanted: bool) -> bool {
-    turns::look_up();
+    time_slice::look_up();
     loop {
         let mut buffer = BUFFER.lock();
         if wanted && buffer.append(piece, kind, begins) {
@@ -92,7 +92,7 @@ pub fn send_pending_byte() -> bool {
     if !has_pending() {
         return false;
     }
-    turns::look_up();
+    time_slice::look_up();
     let was_ready = serial::FIRST.wait_until_ready();
     let mut buffer = BUFFER.lock();
     if was_ready && !serial::FIRST.is_ready() {

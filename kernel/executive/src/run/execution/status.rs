@@ -22,7 +22,7 @@ use super::{ClusterRun, RunnerLoan, divided};
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, turns};
+use crate::machine::{clock, time_slice};
 use crate::memory::heap;
 
 const _: () = {
@@ -98,7 +98,7 @@ pub fn has_bound() -> bool {
 
 /// Looks briefly at a cluster's scheduler, if there is a run.
 pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
-    turns::look_up();
+    time_slice::look_up();
     let mut place = cluster::nth(cluster).execution.lock();
     (place.as_mut()).map(|execution| look(&mut execution.engine.scheduler))
 }

@@ -32,7 +32,7 @@ use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, interrupt_flag, section, turns};
+use crate::machine::{clock, interrupt_flag, section, time_slice};
 use crate::run::contexts;
 
 impl ClusterRun {
@@ -200,8 +200,8 @@ impl ClusterRun {
                 time_ns,
                 EventSubject::of(instance),
             );
-            // The hold, or the turn, was the instance's.
-            turns::leave(core);
+            // The hold, or the time slice, was the instance's.
+            time_slice::leave(core);
             section::stop_waiting(core.context());
             timer::set(Alarm::Hold, u64::MAX);
         }
@@ -211,7 +211,7 @@ impl ClusterRun {
                 context
             }
             None => {
-                turns::come(core);
+                time_slice::come(core);
                 contexts::new_worker()
             }
         };
@@ -235,7 +235,7 @@ impl ClusterRun {
     fn note_resumed(&mut self, core: &Core, context: &Parked, now_ns: u64) {
         context.note_resumed(now_ns);
         timer::set_no_later(core, Alarm::Budget, context.budget_end_ns());
-        turns::join(core);
+        time_slice::join(core);
         let here = seat(core);
         if let Some(instance) = self.current(here.index()) {
             let time_ns = since_epoch(clock::now_ns());
@@ -259,15 +259,15 @@ pub fn find_work() -> CoreWork {
         None => CoreWork::Rest,
     };
     drop(place);
-    take_turns(core, work)
+    keep_slice(core, work)
 }
 
-/// Gives up this core's turn if the core does not compute.
-fn take_turns(core: &Core, work: CoreWork) -> CoreWork {
+/// Gives up this core's time slice if the core does not compute.
+fn keep_slice(core: &Core, work: CoreWork) -> CoreWork {
     match &work {
         CoreWork::Run(_) => {}
         CoreWork::Continue(context) if !context.is_background() => {}
-        CoreWork::Continue(_) | CoreWork::Rest => turns::rest(core),
+        CoreWork::Continue(_) | CoreWork::Rest => time_slice::rest(core),
     }
     work
 }
@@ -301,7 +301,7 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     let work = execution.find_work(core);
     drop(place);
     woken.wake();
-    take_turns(core, work)
+    keep_slice(core, work)
 }
 
 /// Ends this core's instance because of a fault, and with the instance its DAG or its job. Returns

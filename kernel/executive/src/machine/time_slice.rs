@@ -1,4 +1,4 @@
-//! Turns of computing cores, for machines where instructions are counted.
+//! Time slices of computing cores, for machines where instructions are counted.
 //!
 //! With `-icount` QEMU executes one core at a time. A core's *visit* lasts until the next timer of
 //! any core ends, or until the core halts, executes a `pause`, interrupts another core or arms the
@@ -7,34 +7,34 @@
 //! timer's end cuts a visit short, QEMU 7.2 may skip the core behind
 //! ([`counted_time`](super::counted_time)), so timers alone give nobody a fair share.
 //!
-//! The computing cores therefore take *turns*, by a rule of the kernel's own:
+//! The computing cores therefore take *time slices*, by a rule of the kernel's own:
 //!
-//! - At most one core has the turn. The turn ends after [`TURN_NS`], by the core's own timer.
-//! - A core without the turn waits, in the interrupt's handler or before calling a function: the
+//! - At most one core has the slice. The slice ends after [`SLICE_NS`], by the core's own timer.
+//! - A core without the slice waits, in the interrupt's handler or before calling a function: the
 //!   core executes a `pause` at every visit. An interrupt does not wait: the core handles the
 //!   interrupt at once, and resumes waiting.
 //! - A core with a new instance to compute is *fresh*, and goes before cores that have already had
-//!   a turn. If other cores are fresh, too, the first turn is a short one ([`FIRST_TURN_NS`]):
+//!   a slice. If other cores are fresh, too, the first slice is a short one ([`FIRST_SLICE_NS`]):
 //!   short functions need not wait for long functions.
-//! - No turn begins while any core handles an interrupt or wakes others.
-//! - A core with the turn that takes no interrupts keeps the turn for some milliseconds only.
+//! - No slice begins while any core handles an interrupt or wakes others.
+//! - A core with the slice that takes no interrupts keeps the slice for some milliseconds only.
 //!
 //! It follows that at any time all cores but one soon finish a visit, and the remaining core does
-//! so after [`TURN_NS`] at the latest. Then all are visited before the next turn begins. An
-//! interrupt, and the start of an instance, therefore wait for little more than a turn, or two,
+//! so after [`SLICE_NS`] at the latest. Then all are visited before the next slice begins. An
+//! interrupt, and the start of an instance, therefore wait for little more than a slice, or two,
 //! however many cores compute; and each of n computing cores gets an n-th of the clock.
 //!
-//! The time an instance waits for its turn does not count as execution and uses up no budget. The
+//! The time an instance waits for its slice does not count as execution and uses up no budget. The
 //! clock advances meanwhile, for all.
 //!
-//! Core 0's background computes, too, and has no turn: the background gives way. Every
-//! [`FIRST_TURN_NS`] a timer ends the background's visit, whatever the background does, and the
+//! Core 0's background computes, too, and has no slice: the background gives way. Every
+//! [`FIRST_SLICE_NS`] a timer ends the background's visit, whatever the background does, and the
 //! background continues once no core is fresh ([`begin_background`]). With interrupts disabled the
 //! background gives way once for each piece of text and each look at the scheduler ([`look_up`]).
 //!
 //! A core halting for an instance or watching the clock (`occupation`, `Event::wait`) takes no
 //! part. The parts of a core, and the changes between them, are in `this_core::TimeSlicePart`. All
-//! turns are off unless [`enable`] is called: real cores compute at the same time, and a lone core
+//! slices are off unless [`enable`] is called: real cores compute at the same time, and a lone core
 //! need not share. The statics here need no order among each other: only one core at a time
 //! executes instructions.
 
@@ -45,14 +45,14 @@ use super::this_core::{self, Core, TimeSlicePart};
 use super::timer::{self, Alarm};
 use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
 
-/// The length of a turn, in nanoseconds. The end of a turn costs some 250 instructions.
-const TURN_NS: u64 = 8_000;
+/// The length of a slice, in nanoseconds. The end of a slice costs some 250 instructions.
+const SLICE_NS: u64 = 8_000;
 
-/// The length of a fresh core's first turn, in nanoseconds, if other cores are fresh, too.
-const FIRST_TURN_NS: u64 = 2_000;
+/// The length of a fresh core's first slice, in nanoseconds, if other cores are fresh, too.
+const FIRST_SLICE_NS: u64 = 2_000;
 
-/// How often a waiting core looks for the turn before taking over the turn of a core that does not
-/// pass the turn because it takes no interrupts. Some milliseconds.
+/// How often a waiting core looks for the slice before taking over the slice of a core that does
+/// not pass the slice because it takes no interrupts. Some milliseconds.
 const MOST_LOOKS: u32 = 100_000;
 
 static IS_ENABLED: AtomicBool = AtomicBool::new(false);
@@ -60,10 +60,10 @@ static IS_ENABLED: AtomicBool = AtomicBool::new(false);
 /// No core.
 const NONE: u32 = u32::MAX;
 
-/// The core with the turn.
-static HAS_TURN: AtomicU32 = AtomicU32::new(NONE);
+/// The core with the slice.
+static SLICE_HOLDER: AtomicU32 = AtomicU32::new(NONE);
 
-/// The core with the next turn, if still waiting and no core is fresh.
+/// The core with the next slice, if still waiting and no core is fresh.
 static NEXT: AtomicU32 = AtomicU32::new(NONE);
 
 /// The number of cores fresh, or about to be.
@@ -72,7 +72,7 @@ static FRESH: AtomicU32 = AtomicU32::new(0);
 /// The number of cores handling an interrupt, or waking others.
 static URGENT: AtomicU32 = AtomicU32::new(0);
 
-/// Makes cores take turns from now on, if there are several cores. To be called before the other
+/// Makes cores take slices from now on, if there are several cores. To be called before the other
 /// cores start: a core handling an interrupt during the call would end an urgent section without
 /// having begun one, and the count of urgent cores would never be 0 again.
 pub fn enable() {
@@ -83,7 +83,7 @@ fn is_enabled() -> bool {
     IS_ENABLED.load(Ordering::Relaxed)
 }
 
-/// Begins an urgent section: no turn may begin before its end.
+/// Begins an urgent section: no slice may begin before its end.
 #[inline]
 pub fn begin_urgent() {
     if is_enabled() {
@@ -99,8 +99,8 @@ pub fn end_urgent() {
     }
 }
 
-/// Notes in an interrupt that this core continues with an instance afterwards. Until then no turn
-/// of another core begins, so the instance need not wait for such a turn.
+/// Notes in an interrupt that this core continues with an instance afterwards. Until then no slice
+/// of another core begins, so the instance need not wait for such a slice.
 #[inline]
 pub fn come(core: &Core) {
     if is_enabled() && core.part() == TimeSlicePart::None {
@@ -134,7 +134,7 @@ pub fn end_background() {
 /// after a short while. Interrupts are disabled.
 fn give_way(core: &Core) {
     // One visit for all others, during which a woken core becomes fresh. And one more at the end: a
-    // core that begins its turn arms its timer, and arming ends its visit.
+    // core that begins its slice arms its timer, and arming ends its visit.
     cpu::relax();
     while FRESH.load(Ordering::Relaxed) != 0 && !local_apic::is_interrupt_pending() {
         cpu::relax();
@@ -146,7 +146,7 @@ fn give_way(core: &Core) {
 /// Sets the timer that makes the background give way.
 fn keep_giving_way(core: &Core) {
     if core.index == 0 && BACKGROUND.load(Ordering::Relaxed) {
-        timer::set(Alarm::Hold, clock::now_ns().saturating_add(FIRST_TURN_NS));
+        timer::set(Alarm::Hold, clock::now_ns().saturating_add(FIRST_SLICE_NS));
     }
 }
 
@@ -175,16 +175,16 @@ pub fn leave(core: &Core) {
     }
 }
 
-/// Ends the alarm of an instance's hold. An alarm of the core's turn stays, or the turn would have
-/// no end. Interrupts are disabled.
+/// Ends the alarm of an instance's hold. An alarm of the core's slice stays, or the slice would
+/// have no end. Interrupts are disabled.
 pub fn end_hold(core: &Core) {
     if core.part() != TimeSlicePart::Computes {
         timer::set(Alarm::Hold, u64::MAX);
     }
 }
 
-/// Ends this core's part like [`leave`], and prevents an interrupt for a turn's end. Core 0 returns
-/// to its background.
+/// Ends this core's part like [`leave`], and prevents an interrupt for a slice's end. Core 0
+/// returns to its background.
 #[inline]
 pub fn rest(core: &Core) {
     if is_enabled() {
@@ -196,17 +196,17 @@ pub fn rest(core: &Core) {
     }
 }
 
-/// Returns when the instance may compute, on any core: waits for a turn, and handles interrupts
+/// Returns when the instance may compute, on any core: waits for a slice, and handles interrupts
 /// while waiting. Interrupts are disabled before and after.
 #[inline]
 pub fn enter() {
     if is_enabled() && !this_core::get().context().is_background() {
-        enter_in_turn();
+        enter_slice();
     }
 }
 
 #[cold]
-fn enter_in_turn() {
+fn enter_slice() {
     loop {
         let core = this_core::get();
         join(core);
@@ -216,9 +216,9 @@ fn enter_in_turn() {
         // Not measured as a section without interrupts: the wait ends as soon as an interrupt is
         // pending.
         interrupts_off::note_enabled();
-        let has_turn = wait(core);
+        let has_slice = wait(core);
         interrupts_off::note_disabled(Location::caller());
-        if has_turn {
+        if has_slice {
             return;
         }
         interrupt_flag::enable();
@@ -228,7 +228,7 @@ fn enter_in_turn() {
 }
 
 /// Waits like [`enter`], for an instance continued outside any interrupt: once interrupts are
-/// enabled, the core waits for its turn as after an interrupt.
+/// enabled, the core waits for its slice as after an interrupt.
 #[inline]
 pub fn enter_by_interrupt(core: &Core) {
     if is_enabled() && core.part() == TimeSlicePart::Fresh {
@@ -246,7 +246,7 @@ pub fn stand_back() {
     }
 }
 
-/// Waits for a turn like [`enter`], for the same instance afterwards.
+/// Waits for a slice like [`enter`], for the same instance afterwards.
 pub fn come_back() {
     if is_enabled() {
         interrupt_flag::disable();
@@ -255,16 +255,16 @@ pub fn come_back() {
     }
 }
 
-/// Ends an interrupt: if this core has to wait, waits for its turn or for another interrupt.
+/// Ends an interrupt: if this core has to wait, waits for its slice or for another interrupt.
 #[inline]
 pub(super) fn end_interrupt() {
     if is_enabled() {
-        end_interrupt_in_turn();
+        end_interrupt_in_slice();
     }
 }
 
 #[cold]
-fn end_interrupt_in_turn() {
+fn end_interrupt_in_slice() {
     URGENT.fetch_sub(1, Ordering::Relaxed);
     let core = this_core::get();
     match core.part() {
@@ -275,7 +275,7 @@ fn end_interrupt_in_turn() {
             return;
         }
         TimeSlicePart::None | TimeSlicePart::Comes => return,
-        // With the alarm still set, the turn has not ended: another interrupt came.
+        // With the alarm still set, the slice has not ended: another interrupt came.
         TimeSlicePart::Computes if timer::is_set(Alarm::Hold) => return,
         TimeSlicePart::Computes => pass(core),
         TimeSlicePart::Fresh | TimeSlicePart::Waits => {}
@@ -283,7 +283,7 @@ fn end_interrupt_in_turn() {
     wait(core);
 }
 
-/// Ends this core's turn.
+/// Ends this core's slice.
 // In a circle, from the next core on, so that each computing core gets the same share.
 fn pass(core: &Core) {
     let (before, from_here) = this_core::all().split_at(core.index as usize);
@@ -293,12 +293,12 @@ fn pass(core: &Core) {
     set_part(core, TimeSlicePart::Waits);
 }
 
-/// Waits until this core has the turn, or until an interrupt is pending. Reports whether this core
-/// has the turn.
+/// Waits until this core has the slice, or until an interrupt is pending. Reports whether this core
+/// has the slice.
 fn wait(core: &Core) -> bool {
     let since_ns = clock::now_ns();
     let mut looks = 0;
-    let has_turn = loop {
+    let has_slice = loop {
         // One visit for all others, before anything begins.
         cpu::relax();
         looks += 1;
@@ -312,32 +312,32 @@ fn wait(core: &Core) -> bool {
         }
     };
     core.context().note_waited(clock::now_ns() - since_ns);
-    has_turn
+    has_slice
 }
 
-/// Begins this core's turn, if allowed, or if this core `takes_over` another core's turn. Returns
-/// the length of the turn in nanoseconds.
+/// Begins this core's slice, if allowed, or if this core `takes_over` another core's slice. Returns
+/// the length of the slice in nanoseconds.
 fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
-    let holder = HAS_TURN.load(Ordering::Relaxed);
+    let holder = SLICE_HOLDER.load(Ordering::Relaxed);
     if (holder != NONE && !takes_over) || URGENT.load(Ordering::Relaxed) != 0 {
         return None;
     }
-    let length_ns = length_of_turn(core)?;
+    let length_ns = length_of_slice(core)?;
     let (mine, order) = (core.index, Ordering::Relaxed);
-    let begun = HAS_TURN.compare_exchange(holder, mine, order, order);
+    let begun = SLICE_HOLDER.compare_exchange(holder, mine, order, order);
     begun.is_ok().then_some(length_ns)
 }
 
-/// Returns the length of this core's turn in nanoseconds, if this core has the next turn.
-fn length_of_turn(core: &Core) -> Option<u64> {
+/// Returns the length of this core's slice in nanoseconds, if this core has the next slice.
+fn length_of_slice(core: &Core) -> Option<u64> {
     let fresh = FRESH.load(Ordering::Relaxed);
     let next = this_core::all().get(NEXT.load(Ordering::Relaxed) as usize);
     let is_next =
         next.is_none_or(|next| next.index == core.index || next.part() != TimeSlicePart::Waits);
     match core.part() {
-        TimeSlicePart::Fresh if fresh > 1 => Some(FIRST_TURN_NS),
-        TimeSlicePart::Fresh => Some(TURN_NS),
-        _ => (fresh == 0 && is_next).then_some(TURN_NS),
+        TimeSlicePart::Fresh if fresh > 1 => Some(FIRST_SLICE_NS),
+        TimeSlicePart::Fresh => Some(SLICE_NS),
+        _ => (fresh == 0 && is_next).then_some(SLICE_NS),
     }
 }
 
@@ -345,9 +345,9 @@ fn length_of_turn(core: &Core) -> Option<u64> {
 fn set_part(core: &Core, part: TimeSlicePart) {
     let before = core.part();
     if before == TimeSlicePart::Computes && part != TimeSlicePart::Computes {
-        // Unless another core has taken over the turn.
+        // Unless another core has taken over the slice.
         let (mine, order) = (core.index, Ordering::Relaxed);
-        let _ = HAS_TURN.compare_exchange(mine, NONE, order, order);
+        let _ = SLICE_HOLDER.compare_exchange(mine, NONE, order, order);
     }
     let is_fresh = |part| matches!(part, TimeSlicePart::Comes | TimeSlicePart::Fresh);
     match (is_fresh(before), is_fresh(part)) {

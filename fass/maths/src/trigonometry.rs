@@ -1,20 +1,20 @@
 //! Sine, cosine and tangent.
 //!
-//! The argument is reduced by multiples of a quarter turn. The quarter is held in three parts; the
-//! first two have zeros at their ends, so their multiples are exact (W. J. Cody and W. Waite,
-//! Software Manual for the Elementary Functions, 1980). The remainder, at most an eighth of a turn,
-//! comes with its rounding error. There nine terms of the Taylor series are enough.
+//! The argument is reduced by multiples of a right angle. The right angle is held in three parts;
+//! the first two have zeros at their ends, so their multiples are exact (W. J. Cody and W. Waite,
+//! Software Manual for the Elementary Functions, 1980). The remainder, at most half of a right
+//! angle, comes with its rounding error. There nine terms of the Taylor series are enough.
 
 use core::f64::consts::FRAC_2_PI;
 
 use super::{nearest_integer, polynomial};
 
-/// The largest angle, in radians, with known sine and cosine: 2^20 quarter turns are exact, and
+/// The largest angle, in radians, with known sine and cosine: 2^20 right angles are exact, and
 /// this is less.
 pub const LARGEST_ANGLE: f64 = 1e6;
 
-/// A quarter turn, in three parts.
-const QUARTER: [f64; 3] = [
+/// A right angle, in three parts.
+const RIGHT_ANGLE: [f64; 3] = [
     1.570_796_326_734_125_6,
     6.077_100_506_303_966e-11,
     2.022_266_248_795_950_6e-21,
@@ -45,7 +45,7 @@ pub fn sin_cos(angle: f64) -> (f64, f64) {
         return (angle, 1.0); // with its sign
     }
     let (quarters, quadrant) = nearest_integer(angle * FRAC_2_PI);
-    let [first, second, third] = QUARTER;
+    let [first, second, third] = RIGHT_ANGLE;
     let left = angle - quarters * first;
     let (high, low) = difference(left, quarters * second);
     let (high, low) = difference(high, quarters * third - low);
@@ -67,7 +67,7 @@ fn difference(a: f64, b: f64) -> (f64, f64) {
     (high, (a - of_a) + (of_b - b))
 }
 
-/// The sine of `x + rest`, at most an eighth of a turn: x - x^3/3! + ...
+/// The sine of `x + rest`, at most half of a right angle: x - x^3/3! + ...
 fn sin_of_part(x: f64, rest: f64) -> f64 {
     const TERMS: [f64; 8] = [
         -1.0 / 6.0,
@@ -84,7 +84,7 @@ fn sin_of_part(x: f64, rest: f64) -> f64 {
     x + (x * tail + rest * (1.0 - square / 2.0))
 }
 
-/// The cosine of `x + rest`, at most an eighth of a turn: 1 - x^2/2! + ...
+/// The cosine of `x + rest`, at most half of a right angle: 1 - x^2/2! + ...
 fn cos_of_part(x: f64, rest: f64) -> f64 {
     const TERMS: [f64; 8] = [
         1.0 / 24.0,
