@@ -1,74 +1,75 @@
-//! Requests of functions to a run as a whole, and how it comes about.
+//! Requests of functions to the run as a whole, and how the run carries them out.
 //!
-//! A function may ask for more than values: that a sporadic DAG gets a signal, that a DAG rests
-//! or goes on, that another set of DAGs runs (M1 to M7, below), that the run ends. As all that a
-//! function does, a *request* takes effect with the completion of its instance (R3), never before.
-//! The rules, whose scenarios in `tests/scenarios/lifecycle.txt` bear their numbers:
+//! Besides passing values, a function may ask for other effects: that a sporadic DAG gets a signal,
+//! that a DAG pauses or resumes, that another set of DAGs runs (M1 to M7, below), or that the run
+//! ends. Like every effect of a function, a *request* takes effect with the completion of its
+//! instance (R3), never before. The scenarios of the rules, in `tests/scenarios/lifecycle.txt`,
+//! bear their numbers:
 //!
 //! - **L1, when.** A request takes effect at the instant of the completion, after all completions
-//!   and faults of that instant and before its releases. An instance that fails has asked for
-//!   nothing.
-//! - **L2, in which order.** Requests of one instant are served in the order of their
-//!   completions, those of one instance in the order in which its subtask states what it uses, each
-//!   once.
-//! - **L3, pausing.** A DAG that is paused or resumed follows P1 to P5: what is in flight goes
-//!   on, due jobs are skipped, the grid stays. A DAG may pause itself: the job in hand goes on.
+//!   and faults of that instant and before its releases. A failing instance makes no requests.
+//! - **L2, in which order.** Requests of one instant are served in the order of their completions.
+//!   Requests of one instance are served in the order in which its subtask states what it uses,
+//!   each once.
+//! - **L3, pausing.** Pausing or resuming a DAG follows P1 to P5: jobs in flight go on, due jobs
+//!   are skipped, the grid stays. A DAG may pause itself: the job in hand goes on.
 //! - **L4, the beginning.** A DAG may be paused from time 0 on, before its first release.
 //! - **L5, the end.** A shutdown closes every DAG (C1 to C5) at one instant, so the run is over
-//!   when nothing is in flight any more. Of what is asked for later nothing comes.
-//! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the
-//!   recording: the jobs that were skipped. In a replay requests do not touch such a DAG.
+//!   when nothing is in flight any more. Later requests have no effect.
+//! - **L6, replays.** The effect of a request on a DAG with recorded inputs is in the recording:
+//!   the jobs that were skipped. In a replay requests do not touch such a DAG.
 //!
 //! Where clusters have no instant in common, requests cross them as [`Mailboxes`].
 //!
-//! A driver has [`PendingRequests`], which keeps them from a completion to the scheduler's step, and
-//! the plan's [`Lifecycle`], which serves all but signals. It is behind a trait so that an
-//! image none of whose functions asks for such a thing has no code for it.
+//! A driver has [`PendingRequests`], which keeps requests from a completion to the scheduler's
+//! step, and the plan's [`Lifecycle`], which serves all requests but signals. The lifecycle is
+//! behind a trait, so an image without such requests contains no code for them.
 //!
-//! # Modes: sets of DAGs, one of which runs
+//! # Modes: sets of DAGs, of which a single set runs
 //!
-//! A *mode* is a set of DAGs that run together, such as those of a flight, or of a landing. A
-//! DAG that is in some mode is *on* in its modes and off, that is paused, in the others; a
-//! DAG that is in none runs in all. The rules, whose scenarios in `tests/scenarios/modes.txt` bear
+//! A *mode* is a set of DAGs that run together, such as the DAGs of a flight, or of a landing. A
+//! DAG that belongs to some mode is *on* in its modes and off, meaning paused, in the others. A DAG
+//! without a mode runs in all. The scenarios of the rules, in `tests/scenarios/modes.txt`, bear
 //! their numbers (M7 has its test in `tests/it/modes.rs`):
 //!
 //! - **M1, what is on.** A run begins in mode 0. When a mode is entered, its DAGs are resumed, and
-//!   the others that are in some mode are paused (P1 to P5). DAGs that are on in the old
-//!   mode and in the new one notice nothing.
-//! - **M2, at once.** The mode is entered at the instant of the request. Jobs in flight of the
-//!   DAGs that leave go on to their ends, next to the jobs of those that join.
-//! - **M3, when idle.** The DAGs that leave are paused at the request. The mode is entered at the
-//!   first instant at which no job of them is in flight: after the completions of that
-//!   instant, before its releases; at the request itself, if none is then. Until then the DAGs that
-//!   join stay paused.
-//! - **M4, the last one counts.** A request takes the place of one that has not come about, in
-//!   whichever way it asks to be entered. The mode that is there may be asked for, too.
+//!   all DAGs that are only in other modes are paused (P1 to P5). DAGs that are on in both the old
+//!   and the new mode notice nothing.
+//! - **M2, at once.** The mode is entered at the instant of the request. Jobs in flight of leaving
+//!   DAGs go on to their ends, next to the jobs of joining DAGs.
+//! - **M3, when idle.** The leaving DAGs are paused at the request. The mode is entered at the
+//!   first instant at which none of their jobs is in flight: after the completions of that instant,
+//!   before its releases, or at the request itself if no such job is in flight then. Until then the
+//!   joining DAGs stay paused.
+//! - **M4, the last one counts.** A new request replaces a request still waiting for its mode to be
+//!   entered, whichever entry either asks for. A request for the present mode is allowed, too.
 //! - **M5, what a person does.** A DAG that was paused or resumed at the console stays so until a
 //!   mode is entered.
-//! - **M6, those that are gone.** An ended DAG stays so; it keeps no mode waiting but by what is in
-//!   flight. After a shutdown no mode is entered.
-//! - **M7, replays.** A DAG whose inputs are recorded is neither paused nor resumed, and none waits
-//!   for it (L6).
+//! - **M6, those that are gone.** An ended DAG stays ended; only its instances in flight keep a
+//!   mode waiting. After a shutdown no mode is entered.
+//! - **M7, replays.** A DAG with recorded inputs is neither paused nor resumed, and no mode waits
+//!   for the DAG (L6).
 //!
-//! A change costs a pause or a resumption of each DAG that is in some mode, in one step of the
-//! scheduler; one that waits costs a look at the DAGs that leave in each step until then.
+//! A change of mode costs a pause or a resumption of each DAG that is in some mode, in one step of
+//! the scheduler. While a change waits, each step looks at the leaving DAGs.
 //!
-//! # Requests to other clusters, and from outside of all, on their way
+//! # Requests to other clusters, and from outside of all clusters
 //!
-//! Each cluster serves the requests that concern its DAGs, with its own part of what the app has
-//! stated. A request of a completion goes where it concerns something: a signal, a pause and a
-//! resumption to the cluster of the DAG, a mode to that of the modes' DAGs, which are all in one,
-//! and
-//! a shutdown to all. To another cluster it is a *letter*, which counts in the step in which that
-//! takes it, before its releases. Leaving one never waits, and the room is taken at commit:
+//! Each cluster serves the requests about its DAGs, with its own part of the app's lifecycle. A
+//! completed instance's request goes to the cluster concerned: a signal, a pause and a resumption
+//! to the cluster of the DAG; a mode to the cluster of the modes' DAGs, which are all in the same
+//! cluster; and a shutdown to all clusters. A request to another cluster is a *letter*, effective
+//! in the step in which the receiver takes the letter, before the releases of that step. Sending a
+//! letter never waits, because the room for letters is allocated at commit:
 //!
-//! - Signals are counted, so each is one.
-//! - Of a pause and a resumption of one DAG that wait, the later one counts, and so it is of modes;
-//!   an end counts more than a closing.
-//! - Of two answers to waits of one subtask the one to the later wait counts.
-//! - What is taken in one step is served in this order: the mode; DAG by DAG its pause or
-//!   resumption, its signals, its end; the end of the run. One sender's letters that it leaves in
-//!   this order are served in it, also if they are taken in two steps. Of others the order is open.
+//! - Signals are counted, so none is lost.
+//! - Of a pause and a resumption of one DAG waiting together, the later counts. The same holds for
+//!   modes. An end counts more than a closing.
+//! - Of two answers to waits of one subtask, the answer to the later wait counts.
+//! - All letters taken in one step are served in this order: the mode; DAG by DAG its pause or
+//!   resumption, its signals, its end; the end of the run. Letters that one sender leaves in this
+//!   order are served in this order, even if they are taken in two steps. Between different
+//!   senders, the order is open.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -82,7 +83,7 @@ use crate::task_set::{Dag, TaskSet};
 
 pub use crate::request::{ModeEntry, Request, WaitId, WaitLimit};
 
-/// The change that a request makes in a scheduler.
+/// A change in a scheduler, made by a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LifecycleChange {
     /// A DAG is paused (P1 to P5).
@@ -91,16 +92,16 @@ pub enum LifecycleChange {
     Resume(DagId),
     /// A DAG is closed (C1 to C5).
     Close(DagId),
-    /// If the DAG has a job in flight, the changes that follow do not come about: in the next step
-    /// the driver asks for [`Request::GoOn`].
+    /// If the DAG has a job in flight, the following changes wait: in the next step the driver asks
+    /// for [`Request::GoOn`].
     Await(DagId),
-    /// A mode is entered, and nothing waits any more.
+    /// A mode is entered, and nothing waits for a mode any more.
     Enter(ModeId),
 }
 
-/// Serves requests other than signals.
+/// Serves all requests except signals.
 pub trait Lifecycle: fmt::Debug + Send {
-    /// Says what a request comes to. There is [`room`](Self::room) for the changes.
+    /// Turns a request into changes. There is [`room`](Self::room) for the changes.
     fn serve(&mut self, request: Request, changes: &mut Vec<LifecycleChange>);
 
     /// Leaves a DAG alone from now on (L6).
@@ -109,35 +110,35 @@ pub trait Lifecycle: fmt::Debug + Send {
     /// Returns the DAGs that are in some mode.
     fn dags_of_modes(&self) -> Vec<DagId>;
 
-    /// Returns the lifecycle of one cluster, which serves requests about its DAGs, before the run;
-    /// the
-    /// modes are left to one cluster.
+    /// Returns the lifecycle of one cluster, before the run. The part serves requests about the
+    /// cluster's DAGs; only one cluster keeps the modes.
     fn part(&self, is_here: &dyn Fn(DagId) -> bool, has_modes: bool) -> Box<dyn Lifecycle>;
 
     /// Reports whether a function may ask for the end of the run.
     fn may_shut_down(&self) -> bool;
 
-    /// Returns how many different requests there can be, signals not counted, and how many changes
-    /// one comes to at most.
+    /// Returns the number of different requests possible, without signals, and the largest number
+    /// of changes from one request.
     fn room(&self) -> (usize, usize);
 }
 
-/// The requests of a run that are on their way to its scheduler.
+/// The requests of a run on their way to the scheduler.
 #[derive(Debug)]
 pub struct PendingRequests {
-    /// Each once; there is room for all.
+    /// Each request once; there is room for all.
     kept: Vec<Request>,
     lifecycle: Option<Box<dyn Lifecycle>>,
     changes: Vec<LifecycleChange>,
 }
 
 impl PendingRequests {
-    /// Takes room for the requests of a plan of so many DAGs.
+    /// Allocates room for the requests of a plan of so many DAGs.
     pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
         let room = lifecycle.as_ref().map(|lifecycle| lifecycle.room());
         let (others, changes) = room.unwrap_or_default();
         let mut kept = Vec::with_capacity(dags.saturating_add(others).saturating_add(1));
-        // So that what is paused at first is paused in the very first step, before any release.
+        // The first request: DAGs stated as paused are paused in the very first step, before any
+        // release.
         kept.extend(lifecycle.as_ref().map(|_| Request::Begin));
         Self {
             kept,
@@ -146,28 +147,29 @@ impl PendingRequests {
         }
     }
 
-    /// Keeps a request until the next step: that of a function, which answers no wait but by a
-    /// letter.
+    /// Keeps a request of a function until the next step. A function's request never answers a
+    /// wait: answers come only as letters.
     pub fn keep(&mut self, request: Request) {
-        // Once is enough, and so the room is bounded: one place for each different request.
+        // Keeping a request once is enough. This bounds the room: one place for each different
+        // request.
         if !self.kept.contains(&request) {
             self.kept.push(request);
         }
     }
 
-    /// Reports whether none is on its way: then a completion may be all of a step.
+    /// Reports whether no request is on its way: then a completion may be the whole step.
     #[inline]
     pub const fn are_none(&self) -> bool {
         self.kept.is_empty()
     }
 
-    /// Gives away the requests that `take` takes, which concern other schedulers only.
+    /// Gives away the requests accepted by `take`, namely those concerning other schedulers only.
     pub fn give_away(&mut self, mut take: impl FnMut(Request) -> bool) {
         self.kept.retain(|&request| !take(request));
     }
 
-    /// Takes what has come from other clusters and from outside. A letter that concerns one DAG
-    /// only, and no [`Lifecycle`], is passed on at once.
+    /// Takes the letters from other clusters and from outside. A letter about a single DAG, without
+    /// effect on the [`Lifecycle`], is passed on at once.
     #[inline(always)]
     pub fn take_letters(
         &mut self,
@@ -176,8 +178,8 @@ impl PendingRequests {
         moment: &mut Moment<'_>,
     ) {
         letters.take_all(cluster, |request| {
-            // Of a person's pause, say, the lifecycle has to know; a signal is the scheduler's
-            // alone. It finds the DAG as the letters before it have left it.
+            // The lifecycle has to know of a person's pause, for example; a signal concerns the
+            // scheduler alone. Each letter finds the DAG as the letters before have left the DAG.
             if self.lifecycle.is_some() && request.is_of_lifecycle() {
                 self.keep(request);
                 self.serve(moment);
@@ -187,7 +189,7 @@ impl PendingRequests {
         });
     }
 
-    /// Passes the requests on, after the completions of the instant.
+    /// Passes the requests on to the scheduler, after the completions of the instant.
     pub fn serve(&mut self, moment: &mut Moment<'_>) {
         let mut waits = false;
         for request in self.kept.drain(..) {
@@ -204,7 +206,7 @@ impl PendingRequests {
                     LifecycleChange::Close(dag) => moment.serve(Request::Close(dag)),
                     LifecycleChange::Await(dag) if moment.in_flight(dag) == 0 => {}
                     LifecycleChange::Await(_) => {
-                        // What stands behind it in the list may not happen before the DAG has
+                        // The changes behind it in the list must not happen before the DAG has
                         // ended its jobs.
                         waits = true;
                         break;
@@ -216,7 +218,7 @@ impl PendingRequests {
                 }
             }
         }
-        // Asked again in each step, until what it waits for has come.
+        // Asked again in each step, until the DAGs waited for are idle.
         if waits {
             self.kept.push(Request::GoOn);
         }
@@ -227,15 +229,15 @@ impl PendingRequests {
 #[derive(Clone, Debug, Default)]
 struct ModeTable {
     modes: Vec<ModeMembers>,
-    /// The one that was asked for last. As long as it waits, it may be asked to go on.
+    /// The mode requested last. While the mode waits to be entered, it may be asked to go on.
     last: ModeId,
 }
 
 #[derive(Clone, Debug)]
 struct ModeMembers {
-    /// The DAGs that are in it.
+    /// The DAGs in the mode.
     joining: Vec<DagId>,
-    /// Those that are only in others.
+    /// The DAGs that are only in other modes.
     leaving: Vec<DagId>,
 }
 
@@ -261,7 +263,7 @@ impl ModeTable {
 
     /// Returns the DAGs that are in some mode.
     fn dags(&self) -> impl Iterator<Item = DagId> {
-        // Each is in the first one, or leaves when that is entered.
+        // Each DAG of a mode is in the first mode, or leaves when the first mode is entered.
         let first = self.modes.first().into_iter();
         first.flat_map(|mode| mode.joining.iter().chain(&mode.leaving).copied())
     }
@@ -271,20 +273,20 @@ impl ModeTable {
         if let Some(asked) = self.modes.get(mode.index()) {
             let leaving = || asked.leaving.iter().copied();
             changes.extend(leaving().map(LifecycleChange::Pause));
-            // Between pausing and resuming: the mode is entered when what leaves it has ended its
-            // jobs.
+            // Between pausing and resuming: the mode is entered when the leaving DAGs have ended
+            // their jobs.
             if entry == ModeEntry::WhenIdle {
                 changes.extend(leaving().map(LifecycleChange::Await));
             }
             changes.extend(asked.joining.iter().copied().map(LifecycleChange::Resume));
-            // Last, so that a journal shows the mode after all that led to it.
+            // Last, so that a journal shows the mode after everything that led to it.
             changes.push(LifecycleChange::Enter(mode));
             self.last = mode;
         }
     }
 
-    /// Asks once more for the mode that waits, and leaves paused DAGs to a person until it is
-    /// there.
+    /// Asks once more for the waiting mode. Until the mode is entered, paused DAGs are left to a
+    /// person.
     fn go_on(&mut self, changes: &mut Vec<LifecycleChange>) {
         if let Some(asked) = self.modes.get(self.last.index()) {
             changes.extend(asked.leaving.iter().copied().map(LifecycleChange::Await));
@@ -300,21 +302,21 @@ impl ModeTable {
     }
 }
 
-/// The lifecycle that an app states for its run, and how far the run has come in it.
+/// The lifecycle that an app states for its run, and the progress of the run in it.
 #[derive(Clone, Debug, Default)]
 pub struct LifecyclePlan {
-    /// The DAGs of the plan that requests may touch.
+    /// The DAGs of the plan open to requests.
     dags: Vec<DagId>,
-    /// Those that are paused from the beginning on.
+    /// The DAGs paused from the beginning on.
     paused: Vec<DagId>,
     modes: ModeTable,
     may_shut_down: bool,
-    /// How many DAGs the plan has.
+    /// The number of DAGs in the plan.
     count: usize,
 }
 
 impl LifecyclePlan {
-    /// Makes it for a plan of so many DAGs.
+    /// Makes the lifecycle for a plan of so many DAGs.
     pub fn new(dags: u32, may_shut_down: bool) -> Self {
         Self {
             dags: (0..dags).map(DagId).collect(),
@@ -356,12 +358,13 @@ impl Lifecycle for LifecyclePlan {
             Request::Pause(dag) if self.touches(dag) => changes.push(LifecycleChange::Pause(dag)),
             Request::Resume(dag) if self.touches(dag) => changes.push(LifecycleChange::Resume(dag)),
             Request::ShutDown => {
-                // From now on no mode resumes what is closed.
+                // From now on no mode resumes a closed DAG.
                 self.modes = ModeTable::default();
                 // Drained: later requests touch none of them.
                 changes.extend(self.dags.drain(..).map(LifecycleChange::Close));
             }
-            // Of one DAG, and touching none of its own.
+            // Requests about one DAG without effect on the plan: `touches` was false, or the
+            // scheduler serves them.
             Request::Pause(_)
             | Request::Resume(_)
             | Request::Signal(_)
@@ -400,25 +403,25 @@ impl Lifecycle for LifecyclePlan {
     }
 
     fn room(&self) -> (usize, usize) {
-        // A pause and a resumption of each DAG, both ways into each mode, and those that there are
-        // one of: the beginning, going on, the end.
+        // A pause and a resumption of each DAG, both ways into each mode, and three single
+        // requests: the beginning, going on, the end.
         let kinds = 2 * self.count + 2 * self.modes.count() + 3;
-        // At the beginning: what is paused, what the first mode changes, and that it is entered. A
-        // mode pauses DAGs, awaits them, resumes others, and is entered.
+        // At the beginning: the paused DAGs, the changes of the first mode, and its entry. A mode
+        // pauses DAGs, awaits them, resumes others, and is entered.
         (kinds, 2 * self.count + 1)
     }
 }
 
-/// Messages on their way to each cluster.
+/// Letters on their way to each cluster.
 #[derive(Debug)]
 pub struct Mailboxes {
     dags: Box<[DagMailbox]>,
     clusters: Box<[ClusterMailbox]>,
-    /// The cluster that serves modes.
+    /// The cluster serving modes.
     of_modes: ClusterId,
 }
 
-/// Messages to one DAG's cluster about that DAG.
+/// Letters to one DAG's cluster about that DAG.
 #[derive(Debug)]
 struct DagMailbox {
     cluster: ClusterId,
@@ -427,14 +430,14 @@ struct DagMailbox {
     change: AtomicU32,
     /// [`NOTHING`], [`CLOSE`] or [`END`].
     end: AtomicU32,
-    /// By subtask that waits, the latest wait that has its answer, as [`wait_word`]; 0 for none.
+    /// For each waiting subtask, the latest wait with an answer, as [`wait_word`]; 0 for none.
     answers: Box<[(SubtaskId, AtomicU64)]>,
 }
 
-/// Messages to a cluster about all of its DAGs.
+/// Letters to a cluster about all of its DAGs.
 #[derive(Debug, Default)]
 struct ClusterMailbox {
-    /// [`NOTHING`], or a mode and how to enter it, as [`packed`].
+    /// [`NOTHING`], or a mode with its way of entry, as [`packed`].
     mode: AtomicU32,
     ends: AtomicBool,
 }
@@ -445,14 +448,14 @@ const RESUME: u32 = 2;
 const CLOSE: u32 = 1;
 const END: u32 = 2;
 
-/// The lifecycle of each cluster, which serves its requests.
+/// The lifecycle of each cluster, serving the requests to the cluster.
 pub type Parts = Vec<Option<Box<dyn Lifecycle>>>;
 
-/// Makes room for the letters of a run, and divides what serves its requests among its clusters.
+/// Makes room for the letters of a run, and divides the lifecycle among the run's clusters.
 ///
 /// # Errors
 ///
-/// Why it cannot be divided: fact and remedy.
+/// The reason why the lifecycle cannot be divided: fact and remedy.
 pub fn divide(
     task_set: &TaskSet,
     lifecycle: Option<&dyn Lifecycle>,
@@ -460,7 +463,7 @@ pub fn divide(
     let cluster_of = |dag: DagId| task_set.dag(dag).cluster();
     let in_modes = lifecycle.map_or_else(Vec::new, Lifecycle::dags_of_modes);
     let mut of_modes = in_modes.into_iter().map(cluster_of);
-    // A change of modes pauses and resumes in one step, which is one cluster's.
+    // A change of modes pauses and resumes in one step, and a step belongs to one cluster.
     let first = of_modes.next().unwrap_or_default();
     if of_modes.any(|other| other != first) {
         return Err(
@@ -477,7 +480,7 @@ pub fn divide(
 }
 
 impl Mailboxes {
-    /// Makes room for the letters of a run, of which one cluster serves modes.
+    /// Makes room for the letters of a run; cluster `of_modes` serves modes.
     pub(crate) fn new(task_set: &TaskSet, of_modes: ClusterId) -> Self {
         let mailbox = |dag: &Dag| DagMailbox {
             cluster: dag.cluster(),
@@ -494,8 +497,8 @@ impl Mailboxes {
         }
     }
 
-    /// Leaves a request for the clusters that it concerns, other than the one that it comes `from`,
-    /// if any; calls `sent` for each of them, and reports whether it does not concern that one.
+    /// Leaves a request for the clusters concerned, except the sender's own cluster `from`, if any,
+    /// and calls `sent` for each receiver. Reports whether the request does not concern `from`.
     pub fn send(
         &self,
         from: Option<ClusterId>,
@@ -525,7 +528,7 @@ impl Mailboxes {
             return false;
         }
         let of = |dag: DagId| &self.dags[dag.index()];
-        // Release: for the latest values that were shown before.
+        // Release: so that the receiver sees the latest values shown before the letter.
         match request {
             Request::Signal(dag) => _ = of(dag).signals.fetch_add(1, Ordering::Release),
             Request::Pause(dag) => of(dag).change.store(PAUSE, Ordering::Release),
@@ -539,7 +542,8 @@ impl Mailboxes {
             Request::Answer(wait) => {
                 let answers = &of(wait.instance.dag).answers;
                 let place = answers.iter().find(|of| of.0 == wait.instance.subtask);
-                // Of two, the older one comes too late: its instance waits for the other by now.
+                // Of two answers, the older comes too late: its instance waits for the other by
+                // now.
                 place.map(|of| of.1.fetch_max(wait_word(wait), Ordering::Release));
             }
             Request::ShutDown | Request::Begin | Request::GoOn | Request::Step => {}
@@ -548,15 +552,15 @@ impl Mailboxes {
         true
     }
 
-    /// Takes all that waits for a cluster.
+    /// Takes all letters to a cluster.
     pub fn take_all(&self, cluster: ClusterId, mut take: impl FnMut(Request)) {
         let of_all = &self.clusters[cluster.index()];
-        // Each word is taken and emptied in one access: what comes afterwards is of the next step.
-        // What is taken last is emptied first. Else one sender's letters, left between two of these
-        // accesses, could be taken in the wrong order, in two steps.
+        // Each word is taken and emptied in one access: later letters belong to the next step. The
+        // letters served last are emptied first. Otherwise one sender's letters, left between two
+        // of these accesses, could be taken in the wrong order, in two steps.
         let ends = of_all.ends.swap(false, Ordering::Acquire);
         let mode = || {
-            // Reading suffices in nearly all rounds.
+            // A plain load suffices in nearly all rounds.
             let is_there = of_all.mode.load(Ordering::Relaxed) != NOTHING;
             let word = is_there.then(|| of_all.mode.swap(NOTHING, Ordering::Acquire));
             let asked = word.and_then(unpacked);
@@ -595,14 +599,14 @@ impl Mailboxes {
     }
 }
 
-/// Returns room for answers to the subtasks that wait.
+/// Returns room for answers to the waiting subtasks.
 fn answers(dag: &Dag) -> Box<[(SubtaskId, AtomicU64)]> {
     let numbered = (0..).map(SubtaskId).zip(dag.subtasks());
     let waiting = numbered.filter(|(_, subtask)| !subtask.waits().is_empty());
     waiting.map(|(id, _)| (id, AtomicU64::new(0))).collect()
 }
 
-/// Returns a word for a wait of a subtask, the larger the later, never 0.
+/// Returns a word for a wait of a subtask: larger for a later wait, never 0.
 const fn wait_word(wait: WaitId) -> u64 {
     (wait.instance.job << 8) | (wait.number as u64 + 1)
 }
@@ -614,7 +618,7 @@ fn wait_of(dag: DagId, subtask: SubtaskId, word: u64) -> Option<WaitId> {
     Some(WaitId { instance, number })
 }
 
-/// Returns a word for a mode and how to enter it, which is not [`NOTHING`].
+/// Returns a word for a mode with its way of entry, never [`NOTHING`].
 const fn packed(mode: ModeId, entry: ModeEntry) -> u32 {
     let entry = match entry {
         ModeEntry::AtOnce => 1,

@@ -1,9 +1,8 @@
 //! The life of an instance: ready, started, ended.
 //!
-//! An instance ends by finishing, by a fault or, in a job that is cut (aborted, at fault,
-//! or of a DAG that is ended), by being cancelled. In all cases all its outgoing edges
-//! are released at that instant (R3), so such a job ends by the same rules as
-//! any other, only without running.
+//! An instance ends by finishing, by a fault, or by being cancelled in a cut job (aborted, at
+//! fault, or of an ended DAG). In all cases all its outgoing edges are released at that instant
+//! (R3), so a cut job ends by the same rules as any other job, only without running.
 
 use super::groups::ReadyLines;
 use super::jobs::Job;
@@ -25,16 +24,16 @@ impl Scheduler {
         }
     }
 
-    /// Takes a started instance from its core, or out of line if it has none,
-    /// and returns its vertex. `event` says what the driver claims, if the
-    /// instance has not started.
+    /// Takes a started instance from its core, or out of line if it has no core, and returns its
+    /// vertex. If the instance has not started, `event` names the driver's claim in the panic
+    /// message.
     #[inline]
     pub(super) fn take_off(&mut self, instance: Instance, event: &str) -> u32 {
         let number = self.vertex(instance).0;
         let vertex = self.vertices.get(number);
         let jobs = &self.dags[instance.dag.index()].jobs;
-        // A driver may name an instance of another job of the vertex, or one that has ended: that
-        // is its mistake, and must not end the wrong one.
+        // A driver may name an instance of another job of the vertex, or an instance that has
+        // ended. The driver's mistake must not end the wrong instance.
         let in_flight = vertex.dag == instance.dag
             && vertex.progress < jobs.next
             && jobs.job(vertex.progress).number == instance.job;
@@ -45,11 +44,11 @@ impl Scheduler {
                 // The core is idle until a dispatch; the short way must not be taken before.
                 self.fresh |= OWED;
             }
-            // It lost its core in the scheduler's eyes, but finished before the machine took the
-            // core away.
+            // The scheduler had decided to preempt the instance, but it finished before the machine
+            // took the core away.
             InstancePhase::Preempted if in_flight => {
-                // No vertex keeps its key: it is absolute, so it comes out as when it was put in
-                // line.
+                // No vertex keeps its key. Keys are absolute, so computing the key again gives the
+                // key used for putting the instance in line.
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
                 self.ready.remove(vertex, key);
             }
@@ -75,7 +74,8 @@ impl Scheduler {
         let first_vertex = task_set.first_vertex(dag);
         for source in task_set.dag(dag).sources() {
             let number = first_vertex + source.0;
-            // A source may still do the job before (R2); then the end of that lines this one up.
+            // A source may still do the job before (R2); then the end of that instance puts this
+            // one in line.
             if let Some(vertex) = vertices.arrive(number, sequence) {
                 line_up(number, vertex, job, ready, log);
                 *fresh += 1;
@@ -83,20 +83,19 @@ impl Scheduler {
         }
     }
 
-    /// Cancels all instances of a DAG that are ready, have not started, and do
-    /// the job with a sequence number (all jobs if that is `u64::MAX`), and all
-    /// that thereby would become ready.
+    /// Cancels the ready instances of a DAG, not yet started, in the job with a sequence number (in
+    /// all jobs if `u64::MAX`), and all instances that would become ready as a consequence.
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
         self.cancel_waits(dag, sequence);
         self.touch_lists();
         let state = &self.dags[dag.index()];
-        // In topological order each vertex is looked at after its predecessors, so none becomes
-        // ready behind the loop's back.
+        // In topological order each vertex comes after its predecessors, so none becomes ready
+        // behind the loop's back.
         for &subtask in self.task_set.dag(dag).topological_order() {
             let number = self.task_set.first_vertex(dag) + subtask.0;
             let vertex = self.vertices.get_mut(number);
-            // From now on an end has to ask whether its job is cut, which the short way does not.
+            // From now on an end has to check whether its job is cut; the short way does not.
             vertex.ends = EndKind::Any;
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == InstancePhase::Ready && is_meant {
@@ -106,21 +105,21 @@ impl Scheduler {
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = InstancePhase::Absent;
-                // Ended below, not here: an end makes further instances ready, which the loop must
-                // not meet half-way.
+                // Ended below, not here: an end makes further instances ready, and the loop must
+                // not meet them half-way.
                 self.ending.push(number);
             }
         }
         self.end_all();
     }
 
-    /// Ends the instance that a vertex is doing, and all that are cancelled by
-    /// that.
+    /// Ends a vertex's present instance, and all instances cancelled as a consequence.
     #[inline]
     pub(super) fn end_instance(&mut self, vertex: u32) {
         self.end_one(vertex);
         if !self.ending.is_empty() {
-            // Its next instance may be among them, and then hide that this one was late.
+            // The vertex's next instance may be among the cancelled, and would then hide how late
+            // this one was.
             if self.log.now_ns >= self.quiet_until_ns {
                 self.judge_ended(vertex);
             }
@@ -130,19 +129,18 @@ impl Scheduler {
 
     /// Ends all instances in `ending`.
     ///
-    /// A vertex is in it at most once at a time: its next instance can only be
-    /// ready when this one has been taken out. So each round of the loop ends
-    /// another instance in flight.
+    /// A vertex is in `ending` at most once at a time, because its next instance can only be ready
+    /// after the present instance has been taken out. So each round of the loop ends another
+    /// instance in flight.
     #[inline]
     pub(super) fn end_all(&mut self) {
-        // A stack in memory of its own, not recursion: a chain may be 100,000 subtasks long.
+        // An explicit stack, not recursion: a chain may be 100,000 subtasks long.
         while let Some(vertex) = self.ending.pop() {
             self.end_one(vertex);
         }
     }
 
-    /// Tells the successors that the instance has ended, and ends its job if no
-    /// instance of that is left.
+    /// Tells the successors of the instance's end, and ends its job with the job's last instance.
     #[inline(always)]
     fn end_one(&mut self, number: u32) {
         let Self {
@@ -157,8 +155,8 @@ impl Scheduler {
         let ended = vertices.end_instance(number);
         let (dag, sequence) = (ended.dag, ended.progress);
         let jobs = &mut dags[dag.index()].jobs;
-        // Read before `job_mut` borrows the jobs: whether a younger job is in flight, in which the
-        // vertex may already be awaited.
+        // Read before `job_mut` borrows the jobs: in a younger job in flight, the vertex may
+        // already be awaited.
         let overlaps = sequence + 1 < jobs.next;
         let job = jobs.job_mut(sequence);
         let is_cut = job.cut.is_some();
@@ -170,7 +168,7 @@ impl Scheduler {
             let next = vertices.successor(place);
             if let Some(successor) = vertices.arrive(next, sequence) {
                 // R3 holds in a cut job, too: edges are released, but the successors are cancelled
-                // instead of lined up.
+                // instead of put in line.
                 if is_cut {
                     log.of_instance(EventKind::Cancelled, successor.instance(job));
                     ending.push(next);
@@ -190,15 +188,15 @@ impl Scheduler {
         }
     }
 
-    /// Lets a vertex whose instance has ended go on with the next job, which is in
-    /// flight, if that waits for nothing else.
+    /// Lets a vertex whose instance has ended go on with the next job in flight, if the next
+    /// instance waits for nothing else.
     #[inline]
     fn go_on_to_next_job(&mut self, number: u32) {
         if let Some(vertex) = self.vertices.next_is_ready(number) {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
-            // The job was cut while this instance still waited for its turn: it is cancelled now
-            // that it would be ready.
+            // The job was cut while this instance still waited for its turn: now that the instance
+            // would become ready, it is cancelled.
             if job.cut.is_some() {
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
@@ -210,18 +208,19 @@ impl Scheduler {
         }
     }
 
-    /// Ends the oldest job of a DAG, all of whose instances have ended, that of the vertex
-    /// `last` at this instant (R4).
+    /// Ends the oldest job of a DAG: all its instances have ended, that of vertex `last` at this
+    /// instant (R4).
     #[inline]
     fn end_job(&mut self, dag: DagId, sequence: u64, last: u32) {
-        // Before then no deadline has passed.
+        // Before `quiet_until_ns` no deadline has passed.
         if self.log.now_ns >= self.quiet_until_ns {
             self.judge(dag, Some(last));
         }
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
-        // Its end makes the short way possible again, unless the DAG is ended for good.
+        // The end of a cut job makes the short way possible again, unless the DAG is ended for
+        // good.
         if job.cut.is_some() {
             if state.jobs.phase != DagPhase::Ended {
                 let first = self.task_set.first_vertex(dag) as usize;
@@ -243,7 +242,7 @@ impl Scheduler {
         self.set_timer(dag);
     }
 
-    /// Notes when something happens next to a DAG without a completion.
+    /// Sets the timer of a DAG to its next event that needs no completion.
     #[inline]
     pub(super) fn set_timer(&mut self, dag: DagId) {
         let model = self.task_set.dag(dag);
@@ -251,7 +250,7 @@ impl Scheduler {
         self.set_timer_to(dag, jobs.next_event(model, self.log.now_ns));
     }
 
-    /// Notes the next event of a DAG without a completion.
+    /// Sets the timer of a DAG to this event.
     #[inline(always)]
     pub(super) fn set_timer_to(&mut self, dag: DagId, event: Option<(u64, TimerKind)>) {
         self.timers.set_dag(dag.index(), event);
@@ -259,7 +258,7 @@ impl Scheduler {
     }
 }
 
-/// Puts the next instance of a vertex, which is ready and of a job, in line.
+/// Puts a vertex's next instance, ready and part of the given job, in line.
 #[inline(always)]
 pub(super) fn line_up(
     number: u32,
@@ -272,7 +271,8 @@ pub(super) fn line_up(
     make_ready(number, vertex, || job, ready, log);
 }
 
-/// Puts the instance that a vertex is to do next in line. It is of the job that `job` finds.
+/// Makes a vertex's next instance ready and puts it in line. The closure `job` finds the instance's
+/// job.
 #[inline(always)]
 pub(super) fn make_ready<'j>(
     number: u32,
@@ -283,6 +283,6 @@ pub(super) fn make_ready<'j>(
 ) {
     vertex.phase = InstancePhase::Ready;
     ready.insert(vertex, ready.key(number, vertex, job));
-    // No driver hears of it: the short way leaves it to the driver to write it down.
+    // No driver hears of this event: the short way leaves writing it to the driver.
     log.on_this(EventKind::Ready, log.now_ns, vertex.present_instance());
 }

@@ -1,31 +1,31 @@
-//! One instant, in the order that its types force.
+//! One instant, in the order forced by its types.
 
 use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
 use crate::journal::EventKind;
 use crate::request::Request;
 
-/// One instant, in which completions are still taken.
+/// One instant, still open for completions.
 #[derive(Debug)]
 #[must_use = "an instant without `dispatch` leaves cores idle"]
 pub struct Moment<'s> {
     scheduler: &'s mut Scheduler,
-    /// When the driver says that it is, which another core may have been later than.
+    /// The driver's time of the instant. Another core may have reported a later time before.
     told_ns: u64,
 }
 
-/// The end of a *turn*: of what an instance executes from its start, or the end of a wait, to
-/// its finish, or the next wait.
+/// The end of a *turn*: the execution of an instance from its start, or the end of a wait, to its
+/// finish, or the next wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TurnEnd {
     /// The instance.
     pub instance: Instance,
-    /// If it waits, for how long at most, in nanoseconds; `None`: it has finished.
+    /// The limit of the following wait, in nanoseconds; `None`: the instance has finished.
     pub limit_ns: Option<u64>,
 }
 
 impl Scheduler {
-    /// Does what is asked of one DAG. Compiled once, as it is rare.
+    /// Serves a request about one DAG. Compiled once, because requests are rare.
     #[cold]
     #[inline]
     fn serve_request(&mut self, request: Request) {
@@ -36,7 +36,7 @@ impl Scheduler {
             Request::Close(dag) => self.close(dag),
             Request::End(dag) => self.end_dag(dag),
             Request::Answer(wait) => self.answer(wait),
-            // These concern the run, not one DAG; the engine serves them.
+            // Requests about the run, not about one DAG; the engine serves them.
             Request::Enter(..)
             | Request::ShutDown
             | Request::Begin
@@ -54,29 +54,30 @@ impl<'s> Moment<'s> {
 
     /// Takes note that an instance has finished.
     ///
-    /// It need not run any more in the scheduler's eyes: on a machine an
-    /// instance may finish while the decision to preempt it is under way. Then
-    /// it only leaves the line, and the core goes on with what it was given.
+    /// The instance may already be preempted in the scheduler's eyes: on a machine an instance may
+    /// finish while the decision to preempt it is under way. Then the instance only leaves the
+    /// line, and the core goes on with its new instance.
     ///
     /// # Panics
     ///
     /// If the instance has not started or has ended before.
     #[inline]
     pub fn complete(&mut self, instance: Instance) {
-        // At the driver's own time: another core may have told a later one since, but this instance
-        // finished then.
+        // With the driver's own time: another core may have reported a later time since, but this
+        // instance finished at this one.
         self.scheduler
             .log
             .on_this(EventKind::Finish, self.told_ns, instance);
         self.scheduler.finish(instance);
     }
 
-    /// Takes note that a turn of an instance has ended: it finishes, or waits (W1). As with
-    /// [`complete`](Self::complete), it need not run any more in the scheduler's eyes.
+    /// Takes note that a turn of an instance has ended: the instance finishes, or waits (W1). As
+    /// with [`complete`](Self::complete), the instance may already be preempted in the scheduler's
+    /// eyes.
     ///
     /// # Panics
     ///
-    /// As [`complete`](Self::complete), or if it waits and its subtask states no waits.
+    /// As [`complete`](Self::complete), or if the instance waits and its subtask states no waits.
     #[inline]
     pub fn end_turn(&mut self, turn: TurnEnd) {
         match turn.limit_ns {
@@ -92,13 +93,12 @@ impl<'s> Moment<'s> {
 
     /// Takes note that an instance has ended by a fault, and ends its DAG.
     ///
-    /// The instance's core is free. From now on the DAG releases no job and
-    /// starts no instance; its instances that have started on other cores, or
-    /// were preempted, are to be completed as ever (the module `phase` states
-    /// the rules). A further instance of an ended DAG may fail, too. As with
-    /// [`complete`](Self::complete), the instance need not run any more in the
-    /// scheduler's eyes. Completions of the same instant should come first, as
-    /// far as they are known: what finished together with the fault counts.
+    /// The instance's core is free. From now on the DAG releases no job and starts no instance.
+    /// Instances started on other cores, or preempted, are to be completed as ever (the module
+    /// `phase` states the rules). A further instance of an ended DAG may fail, too. As with
+    /// [`complete`](Self::complete), the instance may already be preempted in the scheduler's eyes.
+    /// Drivers should report known completions of the same instant first: an instance that finished
+    /// together with the fault counts.
     ///
     /// # Panics
     ///
@@ -108,15 +108,14 @@ impl<'s> Moment<'s> {
         self.scheduler
             .log
             .on_this(EventKind::Ended, self.told_ns, instance);
-        // After the event: a journal shows a cause before what follows from it.
+        // After the event: a journal shows a cause before its consequences.
         self.scheduler.fail(instance);
     }
 
-    /// Takes note that an instance has ended by a fault, and that the driver has another
-    /// function for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only
-    /// the instance's job is cut, and the subtask is
-    /// [restarted](EventKind::Restarted); else the DAG is ended, as by
-    /// [`fail`](Self::fail). (The module `phase` states the rules.)
+    /// Takes note that an instance has ended by a fault, and that the driver has another function
+    /// for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only the instance's job
+    /// is cut, and the subtask is [restarted](EventKind::Restarted); otherwise the DAG is ended, as
+    /// by [`fail`](Self::fail). (The module `phase` states the rules.)
     ///
     /// # Panics
     ///
@@ -129,7 +128,7 @@ impl<'s> Moment<'s> {
         self.scheduler.fail_replaceable(instance);
     }
 
-    /// Returns the number of jobs of a DAG that are in flight.
+    /// Returns the number of a DAG's jobs in flight.
     ///
     /// # Panics
     ///
@@ -139,49 +138,49 @@ impl<'s> Moment<'s> {
         self.scheduler.in_flight(dag)
     }
 
-    /// Does what is asked of one DAG; nothing at other requests. A pause of a closed DAG, or
-    /// anything asked of an ended one, does nothing (the module `phase` states the rules).
+    /// Serves a request about one DAG; ignores other requests. A pause of a closed DAG, or any
+    /// request to an ended DAG, does nothing (the module `phase` states the rules).
     ///
-    /// With a signal to a sporadic DAG its next job is due now, or as soon after the job before
-    /// it as the minimum inter-arrival time allows; while that one is to come, or waits for room,
+    /// With a signal to a sporadic DAG, its next job is due now, or as soon after the job before as
+    /// the minimum inter-arrival time allows. While the next job is to come, or waits for room,
     /// further signals are dropped and counted (the module `signals` states the rules).
     ///
     /// # Panics
     ///
-    /// If there is no such DAG, or a signal is to one that is not sporadic.
+    /// If there is no such DAG, or if the request is a signal to a DAG that is not sporadic.
     #[inline(always)]
     pub fn serve(&mut self, request: Request) {
         self.scheduler.serve_request(request);
     }
 
-    /// Writes down that the run is in another mode.
+    /// Records that the run is in another mode.
     #[inline]
     pub fn entered(&mut self, mode: ModeId) {
         let job = u64::from(mode.0);
         (self.scheduler.log).of_job(EventKind::Entered, DagId(0), job, None);
     }
 
-    /// Makes a core, if it is idle, the first that is given an instance, instead of the one that
-    /// has become idle last: for drivers that know of one that is awake.
+    /// Makes a core, if it is idle, the first to be given an instance, instead of the core that
+    /// became idle last: for drivers that know of a core that is awake.
     pub fn prefer(&mut self, core: CoreId) {
         self.scheduler.cores.prefer(core);
     }
 
-    /// Releases the jobs that are due and takes note of deadlines that have passed. Then gives
-    /// the cores to the instances with the smallest keys (R5), and returns the changes. They are
-    /// in effect for the scheduler; the driver has to carry them out.
+    /// Releases the jobs that are due and takes note of passed deadlines. Then gives the cores to
+    /// the instances with the smallest keys (R5), and returns the changes. The changes are in
+    /// effect for the scheduler; the driver has to carry them out.
     #[must_use = "the decisions are for the driver to carry out"]
     #[inline]
     pub fn dispatch(mut self) -> &'s [Decision] {
-        // Releases come after completions and ends of the instant, so that a slot that has just
-        // become free is found free, and before the dispatch, which must see them.
+        // Releases come after the completions and ends of the instant, so that a slot just freed is
+        // found free, and before the dispatch, which must see the released jobs.
         while self.release_next() {}
         self.scheduler.decide();
         &self.scheduler.decisions
     }
 
-    /// Releases what is due as long as there is room for [notices](super::EventLog::has_notices), and reports whether
-    /// that is all. A driver that is late finds any number of releases due.
+    /// Releases due jobs as long as there is room for [notices](super::EventLog::has_notices), and
+    /// reports whether all are released. A late driver finds any number of releases due.
     #[inline]
     pub fn release_some(mut self) -> bool {
         // Notices have a fixed amount of memory: the driver takes them out between two calls.
@@ -193,7 +192,7 @@ impl<'s> Moment<'s> {
         false
     }
 
-    /// Releases the job that is due first, or notes the deadline; reports whether one is due.
+    /// Releases the job due first, or notes a passed deadline; reports whether anything was due.
     #[inline]
     fn release_next(&mut self) -> bool {
         let now_ns = self.scheduler.log.now_ns;

@@ -1,112 +1,104 @@
-//! The life of a DAG: how it is paused, closed and ended before its time, and how it does at an
-//! instant. The scenarios of the rules, in `tests/scenarios/lifecycle.txt` and `ending.txt`, bear
-//! their numbers.
+//! The life of a DAG: pausing, closing and ending it early, and its state at an instant. The
+//! scenarios of the rules, in `tests/scenarios/lifecycle.txt` and `ending.txt`, bear their numbers.
 //!
 //! # Pausing: no releases for a while, on the same grid afterwards
 //!
 //! A person, or a mode of the system, wants a DAG to rest and to go on later.
 //!
-//! - **P1, no release.** A paused DAG releases no job. Each job that becomes due
-//!   is skipped at that instant, whatever the overrun policy; at the instant of
-//!   the pause, too, since pauses come before releases. Numbers and the grid O +
-//!   kT go on. Of a sporadic DAG, the job that a signal asks for is skipped.
-//! - **P2, no backlog.** Releases that wait for an older job are skipped at the
-//!   pause, however many there are. They are told of from the oldest on: one at once, and
-//!   [`SKIPS_A_STEP`] more of all DAGs in that step and in each that follows, every
-//!   [`SKIPS_EVERY_NS`]. If the DAG is paused once more before that is over, the rest is counted
-//!   only.
-//! - **P3, in flight.** What was released goes on as ever, to its end.
-//! - **P4, resuming.** The first job that is due at the instant of the resumption
-//!   or later is released at its nominal release time.
-//! - **P5, the end.** Skipped jobs count towards the limit of jobs, so a paused
-//!   DAG with a limit comes to its end. A closed or ended DAG is neither paused nor
-//!   resumed.
+//! - **P1, no release.** A paused DAG releases no job. Each job that becomes due is skipped at that
+//!   instant, whatever the overrun policy. This includes the instant of the pause, since pauses
+//!   come before releases. Numbers and the grid O + kT go on. Of a sporadic DAG, the job requested
+//!   by a signal is skipped.
+//! - **P2, no backlog.** Releases waiting for an older job are skipped at the pause, however many
+//!   there are. They are reported from the oldest on: one at once, and [`SKIPS_A_STEP`] more of all
+//!   DAGs in that step and in each later step, every [`SKIPS_EVERY_NS`]. If the DAG is paused once
+//!   more before all are reported, the rest is counted only.
+//! - **P3, in flight.** Released jobs go on as ever, to their end.
+//! - **P4, resuming.** The first job due at the instant of the resumption or later is released at
+//!   its nominal release time.
+//! - **P5, the end.** Skipped jobs count towards the limit of jobs, so a paused DAG with a limit
+//!   comes to its end. A closed or ended DAG is neither paused nor resumed.
 //!
 //! To the other rules a pause is nothing new: a job is skipped as with
 //! [`OverrunPolicy::Skip`](crate::OverrunPolicy::Skip).
 //!
 //! # Closing: its last jobs come to their end
 //!
-//! This is how a machine is shut down in order: nothing more begins, and what has begun is
-//! finished.
+//! An orderly shutdown of a machine closes its DAGs: no further job begins, and the jobs already
+//! released are finished.
 //!
-//! - **C1, no release.** A closed DAG releases no job any more, at the very instant of the
-//!   closing neither, since closings come before releases. No further job is due, so none is
-//!   skipped either; a signal that is kept for one is forgotten.
-//! - **C2, no backlog.** Releases that wait for an older job are skipped at the closing, and told
-//!   of as at a pause.
-//! - **C3, in flight.** What was released goes on as ever, to its end, and may be late.
-//! - **C4, over.** The DAG is over when nothing of it is in flight. Signals to it are dropped,
+//! - **C1, no release.** A closed DAG releases no further job, not even at the instant of the
+//!   closing, since closings come before releases. No further job is due, so none is skipped
+//!   either; a signal kept for a job is forgotten.
+//! - **C2, no backlog.** Releases waiting for an older job are skipped at the closing, and reported
+//!   as at a pause.
+//! - **C3, in flight.** Released jobs go on as ever, to their end, and may be late.
+//! - **C4, over.** The DAG is over when nothing of it is in flight. Signals to the DAG are dropped,
 //!   and counted.
-//! - **C5, finality.** It is neither paused nor resumed any more. A fault, or a request, ends it
-//!   as any other (E1 to E8).
+//! - **C5, finality.** The DAG is neither paused nor resumed any more. A fault, or a request, ends
+//!   it like any other DAG (E1 to E8).
 //!
-//! To the other rules a closing is nothing new: it is a limit of jobs that is there already.
+//! To the other rules a closing is nothing new: it acts like a limit of jobs, reached at that
+//! instant.
 //!
 //! # Ending: by a fault of one of its instances, or a request
 //!
-//! An instance *fails* when a fault has ended it: its function will never
-//! return. A DAG is *ended* by the first instance of it that fails, unless
-//! that costs the job only (see below), or by a *request*, which needs no fault; it
-//! stays ended. It is *over* when nothing of it is in flight or to come.
+//! An instance *fails* when a fault has ended it: its function will never return. A DAG is *ended*
+//! by its first failing instance, unless the fault costs the job only (see below), or by a
+//! *request*, which needs no fault. The DAG stays ended. It is *over* when nothing of it is in
+//! flight or to come.
 //!
-//! - **E1, failure.** A failing instance has started. It ends at that instant:
-//!   its core is free for the dispatch of the same instant. It may have been
-//!   preempted in the scheduler's eyes, as when it finishes.
-//! - **E2, no release.** An ended DAG releases no job, at the very instant of
-//!   its end neither, since ends come before releases. Releases that wait are
-//!   dropped; they are counted and not reported one by one.
-//! - **E3, no start.** No instance of an ended DAG starts. Those that are ready
-//!   are cancelled at once, the others when they would become ready: each once,
-//!   and after all its predecessors have ended.
-//! - **E4, what has started.** Its other started instances go on, preempted ones
-//!   at their key, until they complete or fail, too. In an ended DAG nothing
-//!   depends on them any more, so a driver that can take an instance's context
-//!   away for good may complete it at once.
-//! - **E5, jobs.** Each job in flight ends when no instance of it is left, with
-//!   [`JobOutcome::DagEnded`], or as aborted if it
-//!   was that before.
-//! - **E6, deadlines.** A deadline that has passed before the instant of the end
-//!   is a miss. No later deadline of the DAG is, and the run of consecutive
-//!   misses stays as it is.
-//! - **E7, others.** Nothing changes for other DAGs, except that cores are free
-//!   for them: their releases, keys, joins and deadlines do not know of it. From
-//!   that instant on the schedule is that of a set in which the ended DAG has no
-//!   work left but its started instances.
-//! - **E8, finality.** The scheduler never begins an ended DAG again: a subtask
-//!   that failed may have left anything behind. A new scheduler may.
+//! - **E1, failure.** A failing instance has started. It ends at that instant: its core is free for
+//!   the dispatch of the same instant. The scheduler may already regard the instance as preempted,
+//!   as with a finish.
+//! - **E2, no release.** An ended DAG releases no job, not even at the instant of its end, since
+//!   ends come before releases. Waiting releases are dropped: counted, but not reported
+//!   individually.
+//! - **E3, no start.** No instance of an ended DAG starts. Ready instances are cancelled at once,
+//!   the others when they would become ready: each once, and after all its predecessors have ended.
+//! - **E4, started instances.** The DAG's other started instances go on, preempted ones at their
+//!   key, until they complete or fail, too. In an ended DAG nothing depends on them any more, so a
+//!   driver able to take an instance's context away for good may complete it at once.
+//! - **E5, jobs.** Each job in flight ends when no instance of the job is left, with
+//!   [`JobOutcome::DagEnded`], or as aborted if it was aborted before.
+//! - **E6, deadlines.** A deadline that has passed before the instant of the end is a miss. No
+//!   later deadline of the DAG is a miss, and the run of consecutive misses stays as it is.
+//! - **E7, others.** Nothing changes for other DAGs, except that cores are free for them: their
+//!   releases, keys, joins and deadlines are independent of the end. From that instant on the
+//!   schedule equals the schedule of a set in which the ended DAG has no work left but its started
+//!   instances.
+//! - **E8, finality.** The scheduler never begins an ended DAG again, because a failed subtask may
+//!   have left its data in any state. A new scheduler may.
 //!
-//! Not here: whether a fault did harm beyond its instance, and what becomes of
-//! its stack and values. That is the driver's.
+//! Not here: whether a fault did harm beyond its instance, and the fate of the instance's stack and
+//! values. The driver decides both.
 //!
-//! # Faults that cost a job: the DAG goes on with the next one
+//! # Faults that cost a job: the DAG goes on with the next job
 //!
-//! A robot cannot do without its DAG because one frame was broken. So a DAG may say that it
-//! *survives* faults ([`OnFault::DropJob`]): the job is *cut*, which is to say that it starts
-//! no further instance, and the subtask that failed goes on with another function, which
-//! the driver has. The rules, whose scenarios in `tests/scenarios/faults.txt` bear their numbers:
+//! A robot cannot do without its DAG because of one broken frame. So a DAG may state that it
+//! *survives* faults ([`OnFault::DropJob`]). The job is then *cut*: it starts no further instance,
+//! and the failed subtask goes on with another function, supplied by the driver. The scenarios of
+//! the rules, in `tests/scenarios/faults.txt`, bear their numbers:
 //!
-//! - **D1, which faults.** A fault in job k is survived if the DAG says so and is not ended,
-//!   the driver has another function for the subtask, fewer than A faults were survived
-//!   before, and the N-th survived one before this was in job k - W or earlier, or there was
-//!   none. (N faults in a window of W jobs, A in all.) Any other fault ends the DAG (E1 to
-//!   E8).
-//! - **D2, the instance.** It ends as E1 says. The subtask's next instance may start at that
-//!   instant.
-//! - **D3, its job.** Unless it is cut already, the job is cut: instances that are ready are
-//!   cancelled at once, the others when they would become ready; those that have started go
-//!   on, at their key, to their end. The job ends when no instance of it is left, with
-//!   [`JobOutcome::Failed`].
-//! - **D4, other jobs.** Nothing changes for them: those in flight go on, and the next ones
-//!   are released as ever, on the same grid.
-//! - **D5, deadlines.** A deadline that has passed before the instant of the fault is a miss.
-//!   No later one of the job is, and the run of consecutive misses stays as it is.
-//! - **D6, one instant.** Several faults of one instant count in the order in which the
-//!   driver tells them; the first one that is not survived ends the DAG.
+//! - **D1, which faults.** A fault in job k is survived if the DAG says so and is not ended, the
+//!   driver has another function for the subtask, fewer than A faults were survived before, and the
+//!   N-th survived fault before this fault was in job k - W or earlier, or does not exist. (N
+//!   faults in a window of W jobs, A in all.) Any other fault ends the DAG (E1 to E8).
+//! - **D2, the instance.** The failing instance ends as in E1. The subtask's next instance may
+//!   start at that instant.
+//! - **D3, its job.** Unless it is cut already, the job is cut: ready instances are cancelled at
+//!   once, the others when they would become ready; started instances go on, at their key, to their
+//!   end. The job ends when no instance of the job is left, with [`JobOutcome::Failed`].
+//! - **D4, other jobs.** Nothing changes for them: jobs in flight go on, and the next jobs are
+//!   released as ever, on the same grid.
+//! - **D5, deadlines.** A deadline that has passed before the instant of the fault is a miss. No
+//!   later deadline of the job is a miss, and the run of consecutive misses stays as it is.
+//! - **D6, one instant.** Several faults of one instant count in the order in which the driver
+//!   reports them; the first fault not survived ends the DAG.
 //! - **D7, others.** Nothing changes for other DAGs, except that cores are free for them.
 //!
-//! A job that was aborted before may have a fault, too, in what had started: that counts as
-//! a fault, and the job stays aborted.
+//! An aborted job may have a fault, too, in an instance started before: it counts as a fault, and
+//! the job stays aborted.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -116,36 +108,66 @@ use crate::ids::{DagId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{JobOutcome, OnFault};
 
-/// Of how many skips one step tells at most, besides one of each DAG whose backlog it skips: they
-/// take no longer than the releases of a few DAGs.
+/// The largest number of skips reported in one step, besides one for each DAG whose backlog the
+/// step skips. Reporting them takes no longer than the releases of a few DAGs.
 pub const SKIPS_A_STEP: usize = 32;
 
-/// The time until the next step does. All cores are left to the instances meanwhile.
+/// The time from one step reporting skips to the next, in nanoseconds. Meanwhile all cores are left
+/// to the instances.
 pub const SKIPS_EVERY_NS: u64 = 100_000;
 
-/// A phase of a DAG's life. A DAG is paused and goes on any number of times; it never comes back
-/// from a later phase to an earlier one of the other two.
+/// A phase of a DAG's life.
+///
+/// ```text
+///               1
+///   +---------+ ------> +---------+
+///   | Running |         | Paused  |
+///   +---------+ <------ +---------+
+///     |     |   2         |     |
+///     |   3 |             | 3   |
+///     |     |  +--------+ |     |
+///     |     +->| Closed |<+     |
+///   4 |        +--------+       | 4
+///     |             | 4         |
+///     |             v           |
+///     |         +-------+       |
+///     +-------->| Ended |<------+
+///               +-------+
+/// ```
+///
+/// 1. A pause, any number of times: [`Request::Pause`](crate::lifecycle::Request::Pause), or a
+///    request for a mode, if the DAG is only in others.
+/// 2. The end of the pause: [`Request::Resume`](crate::lifecycle::Request::Resume), or a mode is
+///    entered with the DAG in it.
+/// 3. A closing: [`Request::Close`](crate::lifecycle::Request::Close), also as part of a shutdown
+///    of the run.
+/// 4. An end: [`Request::End`](crate::lifecycle::Request::End), or a fault the DAG does not survive
+///    ([`Moment::fail`](super::Moment::fail),
+///    [`Moment::fail_replaceable`](super::Moment::fail_replaceable)).
+///
+/// A closed DAG is never paused or resumed, and no phase follows `Ended`. A survived fault changes
+/// no phase. Being over is not a phase: see [`DagSnapshot::is_over`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum DagPhase {
-    /// It releases its jobs.
+    /// Releases its jobs.
     #[default]
     Running,
-    /// It skips its due jobs until it is resumed (P1 to P5).
+    /// Skips its due jobs until it is resumed (P1 to P5).
     Paused,
-    /// It releases no further job, and what is in flight goes on to its end (C1 to C5).
+    /// Releases no further job; jobs in flight go on to their end (C1 to C5).
     Closed,
-    /// A fault or a request has ended it: nothing of it starts any more (E1 to E8).
+    /// A fault or a request has ended the DAG: nothing of it starts any more (E1 to E8).
     Ended,
 }
 
-/// A question that people have to a scheduler, or a wish. It is short.
+/// A short question or wish of a person to a scheduler.
 #[derive(Debug)]
 pub enum SchedulerQuery<'a> {
     /// The state of a DAG.
     Dag(DagId, &'a mut Option<DagSnapshot>),
-    /// The latest events before this one. The answer is the number of the oldest.
+    /// The latest events before the event with this number. The answer is the number of the oldest.
     Events(u64, &'a mut [Option<Event>]),
-    /// The number of events that were written.
+    /// The number of events written.
     Written,
     /// Room for events: 1 if there is some.
     HasRoom,
@@ -156,31 +178,31 @@ pub enum SchedulerQuery<'a> {
 /// A DAG at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct DagSnapshot {
-    /// Its phase.
+    /// The phase of the DAG.
     pub phase: DagPhase,
-    /// Whether it has a limit of jobs, and nothing of it is left to be done.
+    /// Whether the DAG has a limit of jobs, and nothing of it is left to be done.
     pub is_over: bool,
     /// The fates of its jobs.
     pub statistics: DagStatistics,
     /// Jobs in flight.
     pub in_flight: u64,
-    /// Due jobs that wait for an older one to end.
+    /// Due jobs waiting for an older job to end.
     pub waiting: u64,
 }
 
 impl DagSnapshot {
-    /// Returns the word for its state that people and programs read.
+    /// Returns the word for the DAG's state, for people and programs.
     pub const fn word(&self) -> &'static str {
         match self.phase {
             DagPhase::Closed | DagPhase::Ended => "ended",
-            // Before paused: of a DAG that is over and paused nothing is left to be resumed.
+            // Before `Paused`: a DAG that is over and paused has nothing left to resume.
             _ if self.is_over => "over",
             DagPhase::Paused => "paused",
             DagPhase::Running => "running",
         }
     }
 
-    /// Reports whether it will release no further job, whatever comes.
+    /// Reports whether the DAG will release no further job, whatever comes.
     pub fn is_final(&self) -> bool {
         self.is_over || self.phase >= DagPhase::Closed
     }
@@ -210,7 +232,7 @@ impl Scheduler {
         0
     }
 
-    /// Returns how a DAG does.
+    /// Returns the state of a DAG at this instant.
     ///
     /// # Panics
     ///
@@ -235,7 +257,7 @@ impl Scheduler {
         self.phase(dag) == DagPhase::Paused
     }
 
-    /// Returns the number of jobs of a DAG that are in flight.
+    /// Returns the number of a DAG's jobs in flight.
     ///
     /// # Panics
     ///
@@ -252,10 +274,10 @@ impl Scheduler {
         if self.is_closed(dag) {
             return;
         }
-        // What was late before the pause is a miss.
+        // A job late before the pause is a miss; skipped jobs can no longer become misses.
         self.judge(dag, None);
         let phase = &mut self.dags[dag.index()].jobs.phase;
-        // A second pause is no event, but still skips what has come to wait.
+        // A second pause is no event, but still skips the jobs waiting since the first.
         if core::mem::replace(phase, DagPhase::Paused) != DagPhase::Paused {
             self.log.of_dag(EventKind::Off, dag);
         }
@@ -268,8 +290,8 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         if state.jobs.phase == DagPhase::Paused {
             state.jobs.phase = DagPhase::Running;
-            // A driver that is late may learn of a job of the pause only now; it is skipped by
-            // this time.
+            // A late driver may learn only now of a job due during the pause; the scheduler skips
+            // the job by comparing its release with this time.
             state.resumed_ns = self.log.now_ns;
             self.log.of_dag(EventKind::On, dag);
         }
@@ -281,10 +303,11 @@ impl Scheduler {
         if self.is_closed(dag) {
             return;
         }
-        // A waiting job whose deadline has passed is a miss; once skipped it could not be one.
+        // A waiting job whose deadline has passed is a miss; once skipped, the job could not become
+        // a miss.
         self.judge(dag, None);
         self.dags[dag.index()].jobs.close(DagPhase::Closed);
-        // Before the skips, which follow from it.
+        // Before the skips, which are consequences of the closing.
         self.log.of_dag(EventKind::Closed, dag);
         self.skip_waiting(dag);
     }
@@ -295,29 +318,29 @@ impl Scheduler {
         let vertex = self.take_off(instance, "fails");
         let dag = instance.dag;
         self.dags[dag.index()].statistics.faults += 1;
-        // Before the instance ends, so that no successor of it starts.
+        // Before the instance ends, so that none of its successors starts.
         self.end_dag(dag);
         // Only now its job may end, so that the job counts as cut short.
         self.end_instance(vertex);
     }
 
-    /// Ends a DAG.
+    /// Ends a DAG, by a fault or a request (E2 to E6).
     #[inline]
     pub(super) fn end_dag(&mut self, dag: DagId) {
         if self.is_ended(dag) {
             return;
         }
-        // E6: what is late by now is a miss. Afterwards all jobs are cut, and a cut job is never
+        // E6: a job late by now is a miss. Afterwards all jobs are cut, and a cut job is never
         // late.
         self.judge(dag, None);
         let state = &mut self.dags[dag.index()];
-        // From here on no job is released, so what is in flight is all that can end.
+        // From here on no job is released, so only jobs in flight remain to end.
         let (cut_short, dropped) = state.jobs.end_all();
         state.statistics.cut_short += cut_short;
         state.statistics.dropped += dropped;
         self.set_timer(dag);
         self.log.of_dag(EventKind::DagEnded, dag);
-        // Last, when all jobs are cut: what is made ready by these ends is cancelled, too.
+        // Last, when all jobs are cut: instances made ready by these ends are cancelled, too.
         self.cancel_ready(dag, u64::MAX);
     }
 
@@ -335,7 +358,7 @@ impl Scheduler {
         self.set_timer(dag);
     }
 
-    /// Tells of skips as far as one step may, and leaves the others to the next ones.
+    /// Reports as many skips as one step may, and leaves the others to later steps.
     #[cold]
     #[inline(never)]
     pub(super) fn tell_skips(&mut self) {
@@ -358,7 +381,7 @@ impl Scheduler {
         self.quiet_until_ns = self.timers.earliest_ns();
     }
 
-    /// Tells of the oldest skip of a DAG that is not told of; reports whether there is one.
+    /// Reports the oldest unreported skip of a DAG. Returns whether there was such a skip.
     fn tell_skip(&mut self, dag: DagId) -> bool {
         let state = &mut self.dags[dag.index()];
         let job = state.untold.next();
@@ -369,7 +392,7 @@ impl Scheduler {
         job.is_some()
     }
 
-    /// Returns the number of the timer by which they are told of, behind all others.
+    /// Returns the number of the timer for reporting skips, behind all other timers.
     #[inline]
     pub(super) fn skips_timer(&self) -> usize {
         self.dags.len() + self.waits.len()
@@ -380,11 +403,11 @@ impl Scheduler {
 #[derive(Clone, Debug, Hash)]
 pub(super) struct SurvivedFaults {
     window: u64,
-    /// How many there may still be.
+    /// The number of faults that may still be survived.
     left: u32,
-    /// The jobs of the latest ones, as many as there may be in a window.
+    /// The jobs of the latest survived faults, as many as a window may hold.
     jobs: Box<[u64]>,
-    /// The place of the oldest of these, once there are so many.
+    /// The place of the oldest of these jobs, once the ring is full.
     oldest: usize,
     count: usize,
 }
@@ -393,7 +416,7 @@ impl SurvivedFaults {
     pub(super) fn new(on_fault: OnFault) -> Self {
         let (window, left, most) = match on_fault {
             OnFault::EndDag => (0, 0, 0),
-            // The ring need not be longer than all faults that may be survived.
+            // The ring need not be longer than the number of faults that may be survived in all.
             OnFault::DropJob(of) => (of.window, of.in_all, of.faults.min(of.in_all)),
         };
         Self {
@@ -407,7 +430,7 @@ impl SurvivedFaults {
 
     /// Reports whether a fault in a job would be survived (D1).
     fn would_take(&self, job: u64) -> bool {
-        // Fewer than N were survived so far, so no window can hold N.
+        // Fewer than N faults were survived so far, so no window can hold N.
         let has_room = self.count < self.jobs.len();
         // The N-th survived fault before this one; the ring holds N.
         let nth_before = self.jobs.get(self.oldest);
@@ -417,10 +440,10 @@ impl SurvivedFaults {
         self.left > 0 && (has_room || nth_before.is_some_and(|&before| is_outside(before)))
     }
 
-    /// Counts a fault in a job, if it is survived, and reports whether it is.
+    /// Counts a fault in a job if it is survived, and reports whether it is survived.
     fn count_fault(&mut self, job: u64) -> bool {
         let is_survived = self.would_take(job);
-        // Overwrites the N-th before: faults older than that decide nothing any more.
+        // Overwrites the N-th fault before: older faults decide nothing any more.
         if is_survived && let Some(place) = self.jobs.get_mut(self.oldest) {
             *place = job;
             self.oldest = (self.oldest + 1) % self.jobs.len();
@@ -459,7 +482,7 @@ impl Scheduler {
         state.statistics.faults += 1;
         state.statistics.restarts += 1;
         self.log.of_instance(EventKind::Restarted, instance);
-        // Not where the job was aborted before: its outcome stays, and its ready instances are
+        // Not for a job aborted before: the job keeps its outcome, and its ready instances are
         // cancelled already.
         if state.jobs.cut(sequence, JobOutcome::Failed) {
             state.statistics.failed += 1;

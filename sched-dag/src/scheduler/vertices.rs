@@ -1,24 +1,21 @@
-//! The subtasks of all DAGs as the scheduler walks them: joins and phases (R2).
+//! The subtasks of all DAGs in the scheduler's own form: joins and phases (R2).
 //!
-//! Subtasks are numbered over all DAGs, in the order of the commit; the number
-//! is a *vertex*. All that the way from a completion to its successors needs of a
-//! vertex lies together, in one cache line.
+//! Subtasks are numbered over all DAGs, in the order of the commit; the number is a *vertex*. All
+//! data of a vertex needed between a completion and its successors lies together, in a single cache
+//! line.
 //!
-//! Jobs in flight are known by *sequence number*: their position among the released jobs
-//! of their DAG, from 0. Skipped jobs have none, so the sequence has no gaps, and
-//! the job before the one with number s is the one with number s - 1. A job's
-//! *slot* is its sequence number modulo the number of slots of its DAG.
+//! Jobs in flight are known by *sequence number*: their position among the released jobs of their
+//! DAG, from 0. Skipped jobs have none, so the sequence has no gaps, and the job before number s is
+//! number s - 1. A job's *slot* is its sequence number modulo the number of slots of its DAG.
 //!
-//! Each vertex has a counter for each slot: the predecessors that have not
-//! finished yet, and for a source the release. The only one of a DAG of one slot is
-//! kept in the vertex itself. Each has its *progress*: the
-//! sequence number of the job that it has to do next. An instance (s, v) is
-//! ready when its counter is 0 and v's progress is s. Whichever of both comes
-//! last makes it ready, exactly once.
+//! Each vertex has a counter for each slot: the number of predecessors still to finish, and for a
+//! source the release. A DAG with one slot keeps the single counter in the vertex itself. Each
+//! vertex has its *progress*: the sequence number of its next job. An instance (s, v) is ready when
+//! its counter is 0 and v's progress is s. The later of the two events makes the instance ready,
+//! exactly once.
 //!
-//! A counter returns to its initial value when its instance ends, long before
-//! the slot's next job is released; so a release touches sources only, and an
-//! end touches successors only.
+//! A counter returns to its initial value when its instance ends, long before the slot's next job
+//! is released; so a release touches sources only, and an end touches successors only.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -32,22 +29,56 @@ use crate::table::Table;
 use crate::task_set::TaskSet;
 
 /// The phase of a subtask's next instance.
+///
+/// ```text
+///         +-------------- 2 ---------------+
+///         |                                v
+///    +--------+     +-------+         +---------+ --- 6 --> +---------+
+///    | Absent | -1> | Ready | -- 3 -> | Running |           | Waiting |
+///    +--------+     +-------+         +---------+           +---------+
+///     ^ ^ ^ ^           |               |  |  ^               |  ^  |
+///     | | | +---- 9 ----+               8  4  5               7  6  9
+///     | | |                             |  v  |               |  |  |
+///     | | +-----------------------------+  |  |               |  |  |
+///     | |                             +-----------+ <---------+  |  |
+///     | +-------------- 8 ----------- | Preempted | -------------+  |
+///     |                               +-----------+                 |
+///     +---------------- 9 ------------------------------------------+
+/// ```
+///
+/// 1. The job is released, and all predecessors and the subtask's instance in the job before have
+///    ended (R2). The instance goes into the ready queue.
+/// 2. Likewise, but the core that has just finished takes the instance at once, past the queue
+///    (`Scheduler::pass`, [`VertexTable::hand_over`]).
+/// 3. A dispatch starts the instance ([`Vertex::run`]).
+/// 4. A dispatch gives the core to another instance (`Scheduler::preempt`). Or the instance takes a
+///    wait of no time while another instance is first in line.
+/// 5. A dispatch resumes the instance ([`Vertex::run`]).
+/// 6. The instance begins a wait (W1). From `Preempted`: when a driver reports the end of a turn
+///    after the scheduler has decided to preempt.
+/// 7. The answer or the limit of the wait has come (W2).
+/// 8. The instance finishes or fails.
+/// 9. The job is cut: the instance is cancelled ([`EventKind::Cancelled`]).
+///
+/// A cut cancels no running or preempted instance. An instance that would become ready in a cut job
+/// stays `Absent`, and its end is passed on. A waiting instance runs again only by way of
+/// `Preempted`, and cannot finish or fail before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum InstancePhase {
-    /// It is not ready.
+    /// Not ready.
     Absent,
-    /// It is ready and has not started.
+    /// Ready, and not started.
     Ready,
-    /// It executes.
+    /// Executing on the core.
     Running(CoreId),
-    /// It has started, and is in line for a core: it lost its own, or its wait has ended.
+    /// Started, and in line for a core: the instance lost its core, or its wait has ended.
     Preempted,
-    /// It has started, and waits for something else than a core.
+    /// Started, and waiting for something else than a core.
     Waiting,
 }
 
-/// The line that a subtask's instances come into: its group's, which has the number of the group's
-/// first core, or the cluster's; or none, if a table has the DAG.
+/// The ready queue for a subtask's instances: the queue of its group, numbered by the group's first
+/// core, or the cluster's queue; or none, for a DAG in a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct LineId(pub(super) u16);
 
@@ -72,47 +103,48 @@ impl LineId {
     }
 }
 
-/// The work at the end of an instance.
+/// The work to do at the end of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum EndKind {
-    /// Anything.
+    /// Any work: no shortcut.
     Any,
-    /// The end is told to its successors and to nobody else: it has some, its job is the only one
-    /// in flight, and is not cut.
+    /// The end concerns the successors only: the vertex has some, and its job is not cut and the
+    /// only job in flight.
     PassesOn,
-    /// Likewise, in a table.
+    /// Likewise, for a vertex in a table.
     PassesOnInTable,
 }
 
-/// One subtask, in one cache line.
+/// A subtask, in one cache line.
 #[derive(Clone, Copy, Debug, Hash)]
 #[repr(align(64))]
 pub(super) struct Vertex {
     pub(super) phase: InstancePhase,
-    /// The sequence number of the job that it has to do next, or is doing.
+    /// The sequence number of the vertex's next or present job.
     pub(super) progress: u64,
-    /// The number of the job that it is doing.
+    /// The number of the present job.
     pub(super) job: u64,
-    /// The rank that the [`ReadyQueue`](super::ready_queue::ReadyQueue) gives it, if keys have one.
+    /// The rank from the [`ReadyQueue`](super::ready_queue::ReadyQueue), if keys have ranks.
     pub(super) rank: u32,
     pub(super) dag: DagId,
     pub(super) subtask: SubtaskId,
-    /// Whether a started instance may lose its core; a member does so also to a more urgent one.
+    /// Whether a started instance may lose its core. A member of a group loses its core also to a
+    /// more urgent member.
     pub(super) is_preemptible: bool,
     pub(super) ends: EndKind,
     pub(super) line: LineId,
-    /// The initial value of a counter.
+    /// The initial value of each counter.
     initial: u32,
-    /// Its counter, if it has one slot.
+    /// The counter of a vertex with one slot.
     counter: u32,
-    /// Where its counters begin if it has several, and the mask of the slots.
+    /// The first counter of a vertex with several slots, and the mask of the slots.
     counters: u32,
     slot_mask: u32,
-    /// Where its successors begin and end.
+    /// The range of its successors: begin and end.
     successors: [u32; 2],
 }
 
-/// The successors that an end in a job is still to be told to.
+/// The successors still to be told of an end in a job.
 #[derive(Clone, Debug)]
 pub(super) struct Successors {
     job: u64,
@@ -133,9 +165,9 @@ const _: () = assert!(size_of::<Vertex>() == 64, "one cache line");
 #[derive(Clone, Debug, Hash)]
 pub(super) struct VertexTable {
     vertices: Box<[Vertex]>,
-    /// The successors of all vertices, those of one together.
+    /// The successors of all vertices, grouped by vertex.
     successors: Box<[u32]>,
-    /// The counters of all vertices of several slots, those of one together.
+    /// The counters of all vertices with several slots, grouped by vertex.
     counters: Box<[u32]>,
 }
 
@@ -152,7 +184,7 @@ impl VertexTable {
         for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
             let first = task_set.first_vertex(id);
             for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
-                // A source counts 1, for the release, which arrives as a predecessor would.
+                // A source counts 1 for the release, which arrives like a predecessor.
                 let initial = to_u32(dag.predecessors(subtask).len().max(1));
                 let from = to_u32(successors.len());
                 successors.extend(dag.successors(subtask).iter().map(|next| first + next.0));
@@ -208,13 +240,13 @@ impl VertexTable {
         &mut self.vertices[vertex as usize]
     }
 
-    /// Takes note that no job of these vertices' DAG is cut any more.
+    /// Notes that the DAG of these vertices has no cut job any more.
     #[inline]
     pub(super) fn allow_passing_on(&mut self, vertices: Range<usize>) {
         for vertex in &mut self.vertices[vertices] {
             let [from, to] = vertex.successors;
-            // With one slot no next job can wait for this vertex, and only the end of a sink can be
-            // the end of the job: with successors, neither has to be looked at.
+            // With one slot no next job can wait for this vertex, and a job ends only with a sink.
+            // So the end of a vertex with successors needs neither check.
             vertex.ends = match vertex.slot_mask == 0 && from < to {
                 true if vertex.line.is_table() => EndKind::PassesOnInTable,
                 true => EndKind::PassesOn,
@@ -223,9 +255,9 @@ impl VertexTable {
         }
     }
 
-    /// Ends the instance that a vertex is doing. By that its [`successors`](Self::successors)
-    /// in the same job, which are to be told by [`arrive`](Self::arrive), and its own next
-    /// instance may be ready.
+    /// Ends the vertex's present instance. As a consequence, its [`successors`](Self::successors)
+    /// in the same job, to be told by [`arrive`](Self::arrive), and its own next instance may be
+    /// ready.
     #[inline]
     pub(super) fn end_instance(&mut self, vertex: u32) -> Vertex {
         let own = &mut self.vertices[vertex as usize];
@@ -237,8 +269,8 @@ impl VertexTable {
         ended
     }
 
-    /// Ends the instance of a vertex that [only passes on](EndKind::PassesOn), and tells its
-    /// successors up to the first that is ready by that. The others are still to be told.
+    /// Ends the instance of a vertex that [only passes on](EndKind::PassesOn), and tells the
+    /// successors up to the first one made ready. The other successors are still to be told.
     #[inline(always)]
     pub(super) fn pass_on(&mut self, vertex: u32) -> (Option<u32>, Successors) {
         let own = &mut self.vertices[vertex as usize];
@@ -250,39 +282,40 @@ impl VertexTable {
         (self.next_ready(&mut successors), successors)
     }
 
-    /// Ends the instance of a vertex that [passes on in a table](EndKind::PassesOnInTable), to one
-    /// that waits for it alone and takes its core, and returns that instance. `None`: there are no
-    /// such two vertices.
+    /// Ends the instance of a vertex that [passes on in a table](EndKind::PassesOnInTable), and
+    /// starts on the same core the successor `next`, which waits for this vertex alone. Returns the
+    /// started instance, or `None` if the two vertices are the same or do not exist.
     #[inline(always)]
     pub(super) fn hand_over(&mut self, vertex: u32, next: u32, core: CoreId) -> Option<Instance> {
         let pair = [vertex as usize, next as usize];
         let [own, next] = self.vertices.get_disjoint_mut(pair).ok()?;
         own.phase = InstancePhase::Absent;
         own.progress += 1;
-        // The counter of the one has been reset, that of the other would be counted down and reset.
+        // The ended vertex's counter was reset when its entry began; the successor's counter would
+        // be counted down and reset.
         (next.phase, next.job) = (InstancePhase::Running(core), own.job);
         Some(next.present_instance())
     }
 
-    /// Resets the counter of an entry that begins, which its end would do, too.
+    /// Resets the counter of an entry that begins, in advance of the reset at its end.
     #[inline]
     pub(super) fn begin_entry(&mut self, vertex: u32) {
         let own = &mut self.vertices[vertex as usize];
         own.counter = own.initial;
     }
 
-    /// Tells successors, of one slot each, up to the first that is ready by that.
+    /// Tells successors, of one slot each, up to the first one made ready.
     #[inline(always)]
     pub(super) fn next_ready(&mut self, successors: &mut Successors) -> Option<u32> {
         while successors.next < successors.end {
             let number = self.successors[successors.next as usize];
             successors.next += 1;
             let next = &mut self.vertices[number as usize];
-            // The successor's progress need not be asked: with one slot no older job is in flight
-            // that it could still have to do.
+            // No need to check the successor's progress: with one slot, no older job is in flight
+            // that the successor could still have to do.
             next.counter -= 1;
             if next.counter == 0 {
-                // The vertex now does this job; its key is made of it.
+                // The vertex now does this job; its key is made from the job's number.
                 next.job = successors.job;
                 return Some(number);
             }
@@ -290,7 +323,7 @@ impl VertexTable {
         None
     }
 
-    /// Returns where the successors of a vertex stand, for [`successor`](Self::successor).
+    /// Returns the places of a vertex's successors, for [`successor`](Self::successor).
     #[inline]
     pub(super) fn successors(vertex: &Vertex) -> Range<usize> {
         let [from, to] = vertex.successors;
@@ -303,20 +336,19 @@ impl VertexTable {
         self.successors[place]
     }
 
-    /// Counts one predecessor, or the release, of a vertex's instance in a job,
-    /// and returns the vertex if the instance is ready.
+    /// Counts one predecessor, or the release, of a vertex's instance in a job. Returns the vertex
+    /// if the instance is ready.
     #[inline]
     pub(super) fn arrive(&mut self, vertex: u32, sequence: u64) -> Option<&mut Vertex> {
         let vertex = &mut self.vertices[vertex as usize];
         let counter = vertex.counter(&mut self.counters, sequence);
         *counter -= 1;
-        // Both parts of R2: all predecessors in this job, and the subtask's own instance of the
-        // job before.
+        // Both parts of R2: all predecessors in this job, and the subtask's own instance of the job
+        // before.
         (*counter == 0 && vertex.progress == sequence).then_some(vertex)
     }
 
-    /// Returns a vertex if its next instance, of a job that is released, waits for
-    /// no predecessor.
+    /// Returns a vertex if no predecessor is missing for its next instance, whose job is released.
     #[inline]
     pub(super) fn next_is_ready(&mut self, vertex: u32) -> Option<&mut Vertex> {
         let vertex = &mut self.vertices[vertex as usize];
@@ -325,7 +357,7 @@ impl VertexTable {
 }
 
 impl Vertex {
-    /// Has a core begin or continue its instance, and returns which of both.
+    /// Starts or resumes the instance on a core. Returns the matching event kind.
     #[inline(always)]
     pub(super) fn run(&mut self, core: CoreId) -> EventKind {
         // The phase still tells whether the instance has started.
@@ -343,19 +375,19 @@ impl Vertex {
         Instance::new(self.dag, job.number, self.subtask)
     }
 
-    /// Returns the instance that it is doing, which is ready or has started.
+    /// Returns the present instance, which is ready or has started.
     #[inline]
     pub(super) const fn present_instance(&self) -> Instance {
         Instance::new(self.dag, self.job, self.subtask)
     }
 
-    /// Returns the counter of a job, which is its own or one of `counters`.
+    /// Returns the counter of a job: the vertex's own, or an element of `counters`.
     #[inline]
     fn counter<'a>(&'a mut self, counters: &'a mut [u32], sequence: u64) -> &'a mut u32 {
         if self.slot_mask == 0 {
             return &mut self.counter;
         }
-        // The number of slots is a power of two, so that a mask finds the counter.
+        // The number of slots is a power of two, so a mask finds the counter.
         let slot = sequence & u64::from(self.slot_mask);
         #[allow(clippy::cast_possible_truncation, reason = "a slot fits into a u32")]
         let place = self.counters as usize + slot as usize;

@@ -1,25 +1,25 @@
-//! Waits: instances that have started, hold no core and are not eligible until something has come.
+//! Waits: started instances that hold no core and are not eligible until an answer or a limit.
 //!
 //! A subtask may wait between segments of its function: for a time, for a device, for bytes. Each
-//! wait has a *limit*, so that it ends whatever a device does. The rules, whose scenarios in
-//! `tests/scenarios/waits.txt` bear their numbers:
+//! wait has a *limit*, so the wait ends even if a device never answers. The scenarios of the rules,
+//! in `tests/scenarios/waits.txt`, bear their numbers:
 //!
 //! - **W1, waiting.** From the end of a segment to the end of its wait the instance is not eligible
 //!   and holds no core. Waits do not queue: each instance has a timer and a limit of its own.
 //! - **W2, the end.** A wait ends with its answer, and at its limit at the latest; an answer at the
-//!   instant of the limit is one. At that instant the instance is eligible again, with the key that
-//!   it had, on any core of its cluster.
-//! - **W3, what a wait is not.** It is no finish: it releases no edge, completes no job, and the
-//!   subtask's next instance stays behind it (R2 to R4).
-//! - **W4, one instant.** Of one instant come first the segments that end, then the waits that end,
-//!   those of 0 that have just begun among them, then the releases, then one dispatch.
-//! - **W5, without preemption.** What keeps its core keeps it to the end of its segment. A wait,
-//!   also one of 0, gives it up.
-//! - **W6, cut jobs.** No instance of a job that is cut waits: it is cancelled when the job is cut,
-//!   or where it would begin to wait.
-//! - **W7, late answers.** An answer names the wait that it is for; to any other it is nothing.
+//!   instant of the limit still counts. At that instant the instance is eligible again, with its
+//!   old key, on any core of its cluster.
+//! - **W3, not a finish.** A wait releases no edge, completes no job, and the subtask's next
+//!   instance stays behind the waiting instance (R2 to R4).
+//! - **W4, one instant.** At one instant the ending segments come first, then the ending waits,
+//!   including waits of 0 that have just begun, then the releases, then one dispatch.
+//! - **W5, without preemption.** An instance that keeps its core keeps it to the end of its
+//!   segment. A wait, even a wait of 0, gives up the core.
+//! - **W6, cut jobs.** No instance of a cut job waits: the instance is cancelled when the job is
+//!   cut, or where the instance would begin to wait.
+//! - **W7, late answers.** An answer names its wait; any other wait ignores the answer.
 //!
-//! A wait that begins costs its DAG's timers a step of a heap, and so does its end.
+//! The begin of a wait costs the DAG's timers one step of a heap, and so does its end.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -41,7 +41,7 @@ pub(super) struct WaitTable {
 
 #[derive(Clone, Copy, Debug, Hash)]
 struct LatestWait {
-    /// The job that it is of; `u64::MAX` for none.
+    /// The job of the wait; `u64::MAX` for none.
     job: u64,
     /// Its number among the waits of its instance, from 0 on.
     number: u32,
@@ -69,7 +69,7 @@ impl WaitTable {
         }
     }
 
-    /// Returns the number of vertices that may wait, each of which has a timer.
+    /// Returns the number of vertices that may wait. Each has a timer.
     pub(super) const fn len(&self) -> usize {
         self.vertices.len()
     }
@@ -80,7 +80,7 @@ impl WaitTable {
         place.expect("the subtask states its waits")
     }
 
-    /// Gives a number to the wait that an instance begins, and returns where that of its vertex is.
+    /// Numbers the wait an instance begins. Returns the vertex's place in `latest`.
     #[inline]
     fn begin(&mut self, vertex: u32, job: u64) -> usize {
         let place = self.place(vertex);
@@ -95,7 +95,7 @@ impl WaitTable {
 }
 
 impl Scheduler {
-    /// Begins the wait of an instance that has started (W1), which ends at `limit_ns` at the latest.
+    /// Begins the wait of a started instance (W1). The wait ends at `limit_ns` at the latest.
     #[cold]
     #[inline(never)]
     pub(super) fn begin_wait(&mut self, instance: Instance, limit_ns: u64) {
@@ -105,7 +105,7 @@ impl Scheduler {
         let jobs = &self.dags[vertex.dag.index()].jobs;
         let is_cut = jobs.job(vertex.progress).cut.is_some();
         let place = self.waits.begin(number, instance.job);
-        // W6: nothing is left for which it could be worth waiting.
+        // W6: in a cut job, the wait's answer would serve no purpose.
         if is_cut {
             self.cancel_wait(number);
             self.end_all();
@@ -114,13 +114,14 @@ impl Scheduler {
         self.set_limit(place, limit_ns);
     }
 
-    /// Begins the wait of the instance which `core` has been given last, whose turn has ended at
-    /// `now_ns`, and gives the core the first in line. `None`, and nothing is changed, if more is to
-    /// be decided at this instant (the module `dispatch` says what may be): then the driver ends the
-    /// turn, and the instant, as ever. A time earlier than one before counts as that one.
+    /// Begins the wait of the instance `core` was given last, whose turn has ended at `now_ns`, and
+    /// gives the core the first instance in line. Returns `None`, with nothing changed, if more is
+    /// to be decided at this instant (the module `dispatch` explains the conditions): then the
+    /// driver ends the turn, and the instant, the usual way. A time earlier than a previous time
+    /// counts as the previous time.
     ///
-    /// If the core goes on with the instance, as its wait is of no time and it is the first in line,
-    /// neither the wait nor its end is written down. No answer may come at this instant.
+    /// If the wait is of no time and the instance is the first in line, the core goes on with the
+    /// instance, and neither the wait nor its end is recorded. No answer may come at this instant.
     ///
     /// # Panics
     ///
@@ -137,7 +138,7 @@ impl Scheduler {
         let waiting = self.vertices.get_mut(vertex.0);
         let job = self.dags[waiting.dag.index()].jobs.job(waiting.progress);
         let is_alone = self.fresh == 0 && instant_ns < self.quiet_until_ns && job.cut.is_none();
-        // What keeps its core keeps it from the entries of its list, until now.
+        // An instance that keeps its core has kept the core from its list's entries until now.
         let is_alone = is_alone && (waiting.is_preemptible || !self.ready.lists.has(core));
         if !is_alone || waiting.phase != InstancePhase::Running(core) {
             return None;
@@ -151,7 +152,7 @@ impl Scheduler {
             self.log.on_this(EventKind::Wait, now_ns, instance);
             self.set_limit(place, limit_ns);
         } else {
-            // W4: it ends where it begins, and then competes for its own core.
+            // W4: the wait ends at its begin, and the instance then competes for its own core.
             self.waits.latest[place].has_timed_out = true;
             let is_first = |first| key < first;
             let is_next = match waiting.line.is_cluster() {
@@ -174,21 +175,22 @@ impl Scheduler {
         Some(self.hand_off(core, first))
     }
 
-    /// Reports whether subtasks state waits, as those of most sets do not.
+    /// Reports whether any subtask states waits. In most sets none does.
     #[inline]
     pub const fn has_waits(&self) -> bool {
         self.waits.len() > 0
     }
 
-    /// Ends the wait whose limit comes first, if it has come by `now_ns`, and gives its instance an
-    /// idle core. `None` if that is not all of the instant, of which this may be a part: the step
-    /// is to be taken as ever. No request is to be served.
+    /// Ends the wait with the earliest limit, if the limit has come by `now_ns`, and gives its
+    /// instance an idle core. Returns `None` if more is to be decided at this instant, even if the
+    /// wait has been ended already: then the driver takes the step the usual way. No request may be
+    /// pending.
     #[inline]
     pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
         let (limit_ns, timer) = self.timers.peek()?;
         let place = timer.checked_sub(self.dags.len())?;
-        // Where a core is idle, nothing is in the cluster's line; any idle core may be of another's.
-        // The last timer is no wait's.
+        // While a core is idle, the cluster's line is empty; but the idle core may belong to
+        // another line. The last timer belongs to no wait.
         let line = self.vertices.get(*self.waits.vertices.get(place)?).line;
         let is_elsewhere = !line.is_cluster();
         if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() || is_elsewhere {
@@ -225,7 +227,7 @@ impl Scheduler {
         }
     }
 
-    /// Ends the wait whose limit has come, by the number of its timer behind those of the DAGs.
+    /// Ends the wait whose limit has come. `timer` is its number, behind the timers of the DAGs.
     #[cold]
     #[inline]
     pub(super) fn time_out(&mut self, timer: usize) {
@@ -250,7 +252,7 @@ impl Scheduler {
         self.timers.remove(self.dags.len() + place);
         self.quiet_until_ns = self.timers.earliest_ns();
         let vertex = self.vertices.get_mut(number);
-        // As one that was preempted, it has started and is in line for a core.
+        // Like a preempted instance, the instance has started and is in line for a core.
         vertex.phase = InstancePhase::Preempted;
         let job = self.dags[vertex.dag.index()].jobs.job(vertex.progress);
         let key = self.ready.key(number, vertex, || job);
@@ -259,8 +261,8 @@ impl Scheduler {
         self.fresh += 1;
     }
 
-    /// Cancels the instances of a DAG that wait, of the job with a sequence number (of all jobs if
-    /// that is `u64::MAX`); their successors are to be told by [`end_all`](Self::end_all).
+    /// Cancels the waiting instances of a DAG, in the job with a sequence number (in all jobs if
+    /// `u64::MAX`). The caller tells their successors by [`end_all`](Self::end_all).
     pub(super) fn cancel_waits(&mut self, dag: DagId, sequence: u64) {
         for place in 0..self.waits.len() {
             let number = self.waits.vertices[place];
@@ -272,7 +274,7 @@ impl Scheduler {
         }
     }
 
-    /// Cancels a waiting instance, whose job is cut.
+    /// Cancels a waiting instance of a cut job.
     fn cancel_wait(&mut self, number: u32) {
         let place = self.waits.place(number);
         self.timers.remove(self.dags.len() + place);
@@ -284,21 +286,21 @@ impl Scheduler {
         self.ending.push(number);
     }
 
-    /// Returns when the job was released whose instance a vertex has.
+    /// Returns the release time of the job of a vertex's instance, in nanoseconds.
     pub(crate) fn release_ns(&self, vertex: Vertex) -> u64 {
         let vertex = self.vertices.get(vertex.0);
         let jobs = &self.dags[vertex.dag.index()].jobs;
         jobs.job(vertex.progress).release_ns
     }
 
-    /// Returns the latest wait of a vertex, and whether it has ended by its limit.
+    /// Returns the latest wait of a vertex, and whether the wait has ended by its limit.
     ///
     /// # Panics
     ///
     /// If the subtask states no waits.
     pub fn latest_wait(&self, vertex: Vertex) -> (WaitId, bool) {
         let latest = self.waits.latest[self.waits.place(vertex.0)];
-        // Where a cut job does not wait (W6), the subtask may have the next job's instance by now.
+        // When a cut job does not wait (W6), the subtask may have the next job's instance by now.
         let instance = Instance {
             job: latest.job,
             ..self.instance_of(vertex)
