@@ -1,25 +1,25 @@
 //! Tables: an enforced order on each of some cores, for one DAG or several, over their hyperperiod.
 //!
-//! A core that a table has runs the *entries* of its list, in order and again from the first: each
-//! lap of the list is one hyperperiod of the table's DAGs. An entry is a subtask in one job. An
-//! entry of *depth* d starts on top of d entries of its core that have begun and not finished; the
-//! entries of greater depth that directly follow an entry are *nested* in that one.
+//! A core in a table runs the *entries* of its list, in order and again from the first: each lap of
+//! the list is one hyperperiod of the table's DAGs. An entry is a subtask in one job. An entry of
+//! *depth* d starts on top of d begun and unfinished entries of its core. The entries of greater
+//! depth directly following an entry are *nested* in it.
 //!
-//! The rules, whose scenarios in `tests/scenarios/tables.txt` bear their numbers:
+//! The scenarios of the rules, in `tests/scenarios/tables.txt`, bear their numbers:
 //!
-//! - **T1, in place.** An entry starts on its core only, when all before it on the list have started
-//!   or been passed, and when the innermost entry that has begun there has a smaller depth; then as
-//!   soon as it is ready (R2). Whatever the core runs gives way at once.
-//! - **T2, voids.** An entry is void if its job does not exist, was skipped, or was cut before
-//!   the entry started. A void entry is passed where it might start.
-//! - **T3, nested.** An entry that finishes leaves its core to the next entry, if that may start by
-//!   T1, else to the innermost entry that has begun and not finished.
-//! - **T4, members.** An instance of a DAG without a table executes on a core of its DAG's *group*
-//!   only: the cores of the DAG's affinity, or all of the cluster if no affinity is stated. The cores
-//!   of a group on which no entry has begun without having finished execute those of the group's
-//!   instances with the smallest keys. An instance that has to go for an entry takes the core of the
-//!   least urgent of its group, if its own key is smaller, or an idle core. A core that a group
-//!   leaves idle no other group takes. An instance that keeps its core keeps the core also from
+//! - **T1, in place.** An entry starts on its core only, when all entries before it on the list
+//!   have started or been passed, and when the innermost begun entry there has a smaller depth;
+//!   then as soon as the entry is ready (R2). Anything else running on the core gives way at once.
+//! - **T2, voids.** An entry is void if its job does not exist, was skipped, or was cut before the
+//!   entry started. A void entry is passed where it might start.
+//! - **T3, nested.** An entry that finishes leaves its core to the next entry, if the next entry
+//!   may start by T1, otherwise to the innermost entry begun and not finished.
+//! - **T4, members.** An instance of a DAG without a table executes only on a core of its DAG's
+//!   *group*: the cores of the DAG's affinity, or all cores of the cluster if no affinity is
+//!   stated. The group's cores without a begun and unfinished entry execute the group's instances
+//!   with the smallest keys. An instance that has to give way to an entry takes the core of the
+//!   least urgent of its group, if its own key is smaller, or an idle core. A core left idle by its
+//!   group is not taken by another group. An instance that keeps its core keeps the core also from
 //!   entries.
 //!
 //! If a table is *right*, no entry starts or finishes later than in the table, whatever ends early,
@@ -34,11 +34,12 @@ use crate::order::sorted;
 /// The most entries of a table.
 pub const ENTRY_LIMIT: usize = 1 << 12;
 
-/// The lists of some cores of one cluster, which run the same DAGs.
+/// The lists of some cores of one cluster, for the same DAGs.
 ///
-/// Every subtask of these DAGs has one entry for each job in a lap. No DAG is in two tables, and
-/// no core. Where there is only one DAG, the times count from the release of its job, and
-/// the DAG may be sporadic; of several, which are periodic, from the origin of their grids.
+/// Every subtask of the table's DAGs has one entry for each job in a lap. No DAG and no core is in
+/// two tables. In a table of a single DAG, which may be sporadic, times count from the release of
+/// its job. In a table of several DAGs, which are periodic, times count from the origin of their
+/// grids.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Table {
     /// The cluster of the cores.
@@ -65,15 +66,15 @@ pub struct TableEntry {
     pub dag: DagId,
     /// The subtask.
     pub subtask: SubtaskId,
-    /// The number of the job in lap 0, and in each later lap more by the jobs of one lap. A job
-    /// with a negative number does not exist.
+    /// The number of the job in lap 0; each later lap adds the jobs of one lap. A job with a
+    /// negative number does not exist.
     pub job: i64,
-    /// The number of begun entries on top of which the entry starts.
+    /// The number of begun entries below the entry when it starts.
     pub depth: u32,
     /// The latest start after the beginning of the lap, in nanoseconds, less than the lap.
     pub start_ns: u64,
     /// The time from there to the latest finish, in nanoseconds: the WCETs of the entry and of all
-    /// that are nested in it. 0 if they are not known.
+    /// entries nested in it. 0 if they are not known.
     pub length_ns: u64,
 }
 

@@ -1,10 +1,9 @@
-//! A set of small numbers whose least one is found at once.
+//! A set of small numbers with fast access to the least number.
 //!
-//! One bit a number, and above each level of words another one with a bit for
-//! each word that is not empty: for up to 4,096 numbers that makes two levels,
-//! for 262,144 three. (An array of such levels is van Emde Boas's idea with
-//! 64-way branching; Mehlhorn and Sanders, Algorithms and Data Structures,
-//! 2008, exercise 5.9.)
+//! Each number has a bit, and above each level of words is another level with a bit for each word
+//! that is not empty: for up to 4,096 numbers there are two levels, for 262,144 three. (An array of
+//! such levels is van Emde Boas's idea with 64-way branching; Mehlhorn and Sanders, Algorithms and
+//! Data Structures, 2008, exercise 5.9.)
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -13,7 +12,7 @@ use alloc::vec::Vec;
 /// A set of numbers below a limit.
 #[derive(Clone, Debug, Default, Hash)]
 pub(super) struct BitSet {
-    /// The one word of the highest level.
+    /// The single word of the highest level.
     top: u64,
     /// The numbers themselves.
     words: Box<[u64]>,
@@ -68,7 +67,7 @@ impl BitSet {
         let mut place = number / 64;
         let word = &mut self.words[place];
         *word &= !(1 << (number % 64));
-        // Others are left in the word, so the levels above keep its bit.
+        // Other numbers are left in the word, so the levels above keep its bit.
         if *word != 0 {
             return;
         }

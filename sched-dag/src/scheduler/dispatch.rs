@@ -1,57 +1,51 @@
-//! The dispatch (R5): which instances run from this instant on.
+//! The dispatch (R5): the choice of the instances running from this instant on.
 //!
-//! Idle cores first take ready instances in the order of their keys, so that no
-//! instance is preempted while a core is idle. Then, as long as the smallest
-//! ready key is smaller than the largest one that runs and may be preempted,
-//! both change places.
+//! Idle cores first take ready instances in the order of their keys, so no instance is preempted
+//! while a core is idle. Then, as long as the smallest ready key is smaller than the largest key
+//! that runs and may be preempted, both change places.
 //!
-//! Afterwards the running instances are those that R5 asks for: the ones that
-//! may not be preempted, and of all others those with the smallest keys. No
-//! core is named in more than one exchange, since each one brings in a larger
-//! key than the exchange before and a smaller one than it takes out.
+//! Afterwards the running instances satisfy R5: the non-preemptible ones, and of all others the
+//! instances with the smallest keys. No core is named in more than one exchange, since each
+//! exchange brings in a larger key than the exchange before and a smaller key than it takes out.
 //!
-//! It leaves a dispatch that is *settled*: no ready key is smaller than one that runs and
-//! may be preempted. Ends leave it so, since they only make cores idle; nothing
-//! but a newly ready instance can unsettle it. So without one the second step is
-//! not even looked at.
+//! A dispatch leaves the cores *settled*: no ready key is smaller than a key that runs and may be
+//! preempted. Ends keep them settled, since ends only make cores idle; only a newly ready instance
+//! can unsettle them. So without a newly ready instance the second step is skipped.
 //!
 //! # The short way from a completion to the next instance on the same core
 //!
-//! Mostly a completion concerns one core: the instance that has finished leaves
-//! it, and the first in line, often a successor that has become ready just then,
-//! takes it over. Then the whole instant (completion, no release, dispatch)
-//! comes to giving the core the first in line. [`Scheduler::pass_on`] does that
-//! without a list of decisions. Where more is to be decided it says so, and the
-//! driver ends the instant as ever.
+//! Most completions concern a single core: the finished instance leaves the core, and the first
+//! instance in line, often a successor that has become ready just then, takes it over. The whole
+//! instant (completion, no release, dispatch) then amounts to giving the core the first instance in
+//! line. [`Scheduler::pass_on`] does so without a list of decisions. When more is to be decided, it
+//! says so, and the driver ends the instant the usual way.
 //!
 //! # When only one core is concerned
 //!
-//! No release and no deadline is due, and at most one instance has become ready
-//! by the completion, or there is no other core. Before the instant no core was
-//! idle while an instance was in line, and no ready key was smaller than one that
-//! runs and may be preempted. If the new instance is the first in line, it takes
-//! the core, and that remains so. If it is not, its key is larger than one that
-//! was in line before, so it preempts nobody either, and no core is idle.
+//! No release and no deadline is due, and at most one instance has become ready by the completion,
+//! or there is no other core. Before the instant no core was idle while an instance was in line,
+//! and no ready key was smaller than a key that runs and may be preempted. If the new instance is
+//! the first in line, it takes the core, and the condition still holds. Otherwise its key is larger
+//! than a key that was in line before, so it preempts nobody either, and no core is idle.
 //!
-//! [`decide`](Scheduler::decide) would come to the same: the core that has become
-//! idle last is taken first. Virtual time goes either way, the short one where
-//! exactly one instance finishes; so its tests hold both to one law.
+//! [`decide`](Scheduler::decide) would give the same result, because it takes the core that became
+//! idle last first. Virtual time uses both ways, the short one where exactly one instance finishes;
+//! so its tests hold both to the same law.
 //!
-//! A wait ends a turn by the same short way ([`Scheduler::wait_shortly`]). One of no time makes its
-//! own instance ready, and no other. A limit that comes while a core is idle concerns that core
-//! ([`Scheduler::wake_shortly`]).
+//! A wait ends a turn by the same short way ([`Scheduler::wait_shortly`]). A wait of no time makes
+//! its own instance ready, and no other. A limit reached while a core is idle concerns that core
+//! only ([`Scheduler::wake_shortly`]).
 //!
 //! # The cores
 //!
-//! Idle cores form a stack: the core that has become idle last is taken first.
-//! The kernel asks for a dispatch on the core that has just completed, so the
-//! next instance in line starts there without an interrupt to another core. A driver
-//! that knows of a core that is awake says so ([`CoreTable::prefer`]).
+//! Idle cores form a stack: the core that became idle last is taken first. The kernel asks for a
+//! dispatch on the core that has just completed an instance, so the next instance in line starts
+//! there without an interrupt to another core. A driver that knows of an awake core says so
+//! ([`CoreTable::prefer`]).
 //!
-//! The core to be preempted first is looked for among all cores when there is
-//! need. That is rare: when no core is idle and something has become ready that
-//! is not the first in line. Keeping the cores in order instead would cost every
-//! start and every completion.
+//! The search for the core to preempt looks at all cores, but is rare: it happens only when no core
+//! is idle and the newly ready instance is not the first in line. Keeping the cores in order
+//! instead would cost every start and every completion.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -64,17 +58,16 @@ use super::{OWED, Scheduler};
 use crate::ids::{CoreId, Instance, Vertex};
 use crate::journal::EventKind;
 
-/// One change of what a core executes.
+/// A change of what a core executes.
 ///
-/// A dispatch lists only changes: a core that it does not name goes on with
-/// what it does.
+/// A dispatch lists only changes: a core not named in the list goes on with its instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use]
 pub struct Decision {
-    /// [`Start`](EventKind::Start) or [`Resume`](EventKind::Resume): the core, idle or just preempted,
-    /// begins or continues the instance, perhaps one that ran on another core before.
-    /// [`Suspend`](EventKind::Suspend): it gives up the instance, which keeps its progress; the next
-    /// decision of the dispatch gives it another one.
+    /// [`Start`](EventKind::Start) or [`Resume`](EventKind::Resume): the core, idle or just
+    /// preempted, begins or continues the instance, which may have run on another core before.
+    /// [`Suspend`](EventKind::Suspend): the core gives up the instance, which keeps its progress;
+    /// the next decision of the dispatch gives the core another instance.
     pub what: EventKind,
     /// The core.
     pub core: CoreId,
@@ -95,10 +88,10 @@ impl Decision {
 }
 
 impl Scheduler {
-    /// Fills `decisions`.
+    /// Fills `decisions` with the changes of this dispatch.
     #[inline]
     pub(super) fn decide(&mut self) {
-        // Decisions are those of one dispatch: a driver that missed the ones before has lost them.
+        // Decisions belong to one dispatch: a driver that missed the previous ones has lost them.
         self.decisions.clear();
         self.decide_apart();
         // First the idle cores: R5 preempts nobody while a core is idle.
@@ -109,13 +102,13 @@ impl Scheduler {
             let decision = self.give(core, key);
             self.decisions.push(decision);
         }
-        // Nothing has become ready, so the order is settled, whatever cores became idle: the scan
-        // of all cores below is saved in every step that only ends instances.
+        // Nothing has become ready, so the order is settled, whatever cores became idle. This saves
+        // the scan of all cores below in every step that only ends instances.
         if core::mem::take(&mut self.fresh) & !OWED == 0 {
             return;
         }
         // Each exchange brings in a larger key than the one before and takes out a smaller one, so
-        // this ends after as many rounds as there are cores.
+        // the loop ends after at most as many rounds as there are cores.
         while let Some(ready) = self.ready.peek()
             && let Some((core, running)) = self.cores.largest_preemptible()
             && ready < running
@@ -128,7 +121,7 @@ impl Scheduler {
         }
     }
 
-    /// Gives a core an instance that is ready.
+    /// Gives a core a ready instance.
     #[inline]
     pub(super) fn give(&mut self, core: CoreId, key: DispatchKey) -> Decision {
         let what = self.seat(core, key);
@@ -136,7 +129,7 @@ impl Scheduler {
         Decision::new(what, core, instance)
     }
 
-    /// Likewise, and returns whether that starts or goes on.
+    /// Likewise, and returns whether the instance starts or resumes.
     #[inline(always)]
     fn seat(&mut self, core: CoreId, key: DispatchKey) -> EventKind {
         let vertex = self.vertices.get_mut(key.vertex());
@@ -145,7 +138,7 @@ impl Scheduler {
         what
     }
 
-    /// Gives a core to the innermost entry that has begun there.
+    /// Gives a core to the innermost begun entry of its list.
     #[inline]
     pub(super) fn give_to_entry(&mut self, core: CoreId, entry: u32) -> Decision {
         self.cores.run(core, DispatchKey::ENTRY, false);
@@ -153,14 +146,14 @@ impl Scheduler {
         Decision::new(vertex.run(core), core, vertex.present_instance())
     }
 
-    /// Puts the instance that runs on a core back in line.
+    /// Puts the instance running on a core back in line.
     #[inline]
     pub(super) fn preempt(&mut self, core: CoreId, running: DispatchKey) {
         let vertex = self.vertices.get_mut(running.vertex());
         vertex.phase = InstancePhase::Preempted;
         let decision = Decision::new(EventKind::Suspend, core, vertex.present_instance());
         self.decisions.push(decision);
-        // With the key that it had: a preempted instance keeps its place in the order.
+        // With its old key: a preempted instance keeps its place in the order.
         self.ready.insert(vertex, running);
     }
 }
@@ -169,8 +162,8 @@ impl Scheduler {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use = "the core has to carry it out"]
 pub enum HandOff {
-    /// The core begins or continues an instance of this vertex, and nothing else
-    /// changes. The decision is never a preemption.
+    /// The core begins or continues an instance of this vertex, and nothing else changes. The
+    /// decision is never a preemption.
     To(Vertex, Decision),
     /// The core is idle, and nothing else changes.
     Idle,
@@ -179,34 +172,34 @@ pub enum HandOff {
     Open,
 }
 
-/// The events of an end which its driver still has to write down, before the start.
+/// The events of an end left for the driver to record, before the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unwritten {
     /// None.
     Nothing,
     /// The finish.
     Finish,
-    /// The finish, and that the instance which starts has become ready by that: with the start they
-    /// are one entry then.
+    /// The finish, and the next instance becoming ready by the finish: together with the start they
+    /// form a single entry.
     FinishAndReady,
 }
 
 impl Scheduler {
-    /// Takes note that the instance which `core` has been given last has
-    /// finished at `now_ns`, and gives the core the first in line if that is all
-    /// there is to decide. A time earlier than one before counts as that one. Returns besides
-    /// which events are left to the caller to write down, before the start.
+    /// Takes note that the instance last given to `core` has finished at `now_ns`, and gives the
+    /// core the first instance in line if nothing else is to be decided. A time earlier than a
+    /// previous time counts as the previous time. Also returns the events left for the caller to
+    /// record, before the start.
     ///
     /// # Panics
     ///
     /// If no instance of the vertex has started, or it has ended before.
     #[inline(always)]
     pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, Unwritten) {
-        // Cores may tell their times in another order than they read them: time never goes back.
+        // Cores may report their times in another order than they read them: time never goes back.
         self.log.now_ns = self.log.now_ns.max(now_ns);
         let ending = self.vertices.get(vertex.0);
         let is_here = ending.phase == InstancePhase::Running(core);
-        // A deadline or a release that is due has to come first, by the whole step.
+        // A due deadline or release has to come first, by the whole step.
         let is_quiet = self.log.now_ns < self.quiet_until_ns;
         if self.fresh != 0 || !is_here {
             return (self.end_later(now_ns, core, vertex), Unwritten::Nothing);
@@ -215,19 +208,19 @@ impl Scheduler {
         if ending.ends == EndKind::PassesOn && is_quiet {
             let (ready, others) = self.vertices.pass_on(vertex.0);
             match ready {
-                // The end made nothing ready, so only what was in line before can take the core.
+                // The end made nothing ready, so only instances already in line can take the core.
                 None => {
                     self.log.here = core;
                     unwritten = Unwritten::Finish;
                 }
-                // The most frequent case of a chain: the successor never enters the queue, and one
-                // entry of the journal tells finish, ready and start.
+                // The most frequent case in a chain: the successor never enters the queue, and a
+                // single journal entry records finish, ready and start.
                 Some(next) if others.is_empty() && self.ready.is_one_empty_line() => {
                     self.pass(next, core);
                     let done = self.hand_off(core, (next, EventKind::Start));
                     return (done, Unwritten::FinishAndReady);
                 }
-                // Several, or others in line: only their keys tell which is first.
+                // Several successors, or others in line: only their keys tell which is first.
                 Some(next) => self.line_up_all((core, vertex, now_ns), next, others),
             }
         } else if ending.ends == EndKind::PassesOnInTable
@@ -241,8 +234,8 @@ impl Scheduler {
             self.write_finish(core, vertex, now_ns);
             self.end_instance(vertex.0);
         }
-        // The core takes one of the new instances; a second one may concern another core. (The
-        // module says why one cannot.)
+        // The core takes one of the new instances; a second may concern another core. (The module
+        // doc explains why a single one cannot.)
         let concerns_others = self.cores.count() > 1
             && self.fresh > 0
             && (self.ready).concern_others(self.fresh, core, || {
@@ -252,7 +245,7 @@ impl Scheduler {
             debug_assert!(unwritten == Unwritten::Nothing, "a finish is all there is");
             return (self.leave_open(core, vertex), Unwritten::Nothing);
         }
-        // The dispatch is made here: what is in line preempts nobody.
+        // The dispatch is made here: nothing in line preempts anybody.
         self.fresh = 0;
         if let Some(first) = self.give_first(core, vertex.0) {
             return (self.hand_off(core, first), unwritten);
@@ -260,8 +253,8 @@ impl Scheduler {
         if unwritten == Unwritten::Finish {
             self.write_finish(core, vertex, now_ns);
         }
-        // Idle only now: where the core goes on with another instance, it never enters the
-        // stack of idle ones.
+        // Idle only now: a core that goes on with another instance never enters the stack of idle
+        // cores.
         self.cores.free(core);
         (HandOff::Idle, Unwritten::Nothing)
     }
@@ -273,7 +266,8 @@ impl Scheduler {
         HandOff::To(Vertex(next), Decision::new(what, core, instance))
     }
 
-    /// Ends an instance while a dispatch is owed from before, or that was to move.
+    /// Ends an instance while a dispatch is owed from before, or an instance already preempted in
+    /// the scheduler's eyes.
     #[cold]
     #[inline]
     fn end_later(&mut self, finish_ns: u64, core: CoreId, vertex: Vertex) -> HandOff {
@@ -282,7 +276,7 @@ impl Scheduler {
         HandOff::Open
     }
 
-    /// Writes down that a core has finished the instance of a vertex.
+    /// Records that a core has finished the instance of a vertex.
     #[inline]
     fn write_finish(&mut self, core: CoreId, vertex: Vertex, finish_ns: u64) {
         self.log.here = core;
@@ -291,24 +285,24 @@ impl Scheduler {
             .on_core(core, EventKind::Finish, finish_ns, instance);
     }
 
-    /// Leaves the instant to be begun again, and the core idle.
+    /// Leaves the instant open, to be begun again, and the core idle.
     #[cold]
     #[inline]
     fn leave_open(&mut self, core: CoreId, ended: Vertex) -> HandOff {
-        // The late sink has to be judged before another instance of its vertex hides how far it
-        // was.
+        // Judge the late sink now, before another instance of its vertex hides the progress of this
+        // one.
         if self.log.now_ns >= self.quiet_until_ns {
             self.judge_ended(ended.0);
         }
-        // The core that became idle last is taken first, so the dispatch that follows gives it the
-        // first in line.
+        // The core that became idle last is taken first, so the following dispatch gives it the
+        // first instance in line.
         self.cores.free(core);
         self.ready.lists.end(core, ended.0);
         self.fresh |= OWED;
         HandOff::Open
     }
 
-    /// Gives a core the one instance that has just become ready, without putting it in line.
+    /// Gives a core the single instance just made ready, without putting it in line.
     #[inline(always)]
     fn pass(&mut self, number: u32, core: CoreId) {
         let next = self.vertices.get_mut(number);
@@ -319,8 +313,8 @@ impl Scheduler {
         (self.cores).run(core, key, next.is_preemptible);
     }
 
-    /// Writes down that a core has finished the instance of a vertex, and puts an instance in line
-    /// that has become ready by that, and all that are ready of the successors which follow it.
+    /// Records that a core has finished the instance of a vertex. Puts in line the instance made
+    /// ready by the finish, and all ready successors after it.
     #[inline]
     fn line_up_all(
         &mut self,
@@ -349,14 +343,15 @@ impl Scheduler {
                 None => break,
             }
         }
-        // A sole one leaves no trace of the core, in line or not: so no record depends on the way.
+        // A sole instance leaves no trace of the core, in line or not, so no record depends on the
+        // way taken.
         if is_next && self.fresh == 1 {
             self.log.here = before;
         }
     }
 
-    /// Gives a core, where the instance of a vertex has ended, the first in line: a vertex, and
-    /// whether that starts or goes on.
+    /// Gives the core of an ended vertex the first instance in line. Returns its vertex, and
+    /// whether the instance starts or resumes.
     #[inline(always)]
     pub(super) fn give_first(&mut self, core: CoreId, ended: u32) -> Option<(u32, EventKind)> {
         if !self.ready.is_one_line() {
@@ -366,7 +361,7 @@ impl Scheduler {
         Some((key.vertex(), self.seat(core, key)))
     }
 
-    /// Not a part of its callers, as most sets have one line.
+    /// Not inlined, as most sets have a single line.
     #[inline(never)]
     fn give_first_apart(&mut self, core: CoreId, ended: u32) -> Option<(u32, EventKind)> {
         self.ready.lists.end(core, ended);
@@ -387,9 +382,9 @@ pub(super) struct CoreTable {
 
 #[derive(Clone, Copy, Debug, Hash)]
 struct CoreOccupancy {
-    /// The key of what runs, if anything does.
+    /// The key of the running instance, if any.
     key: DispatchKey,
-    /// For a member of the core's group.
+    /// Whether a more urgent member of the core's group may preempt the instance.
     may_be_preempted: bool,
 }
 
@@ -426,29 +421,29 @@ impl CoreTable {
         !self.idle.is_empty()
     }
 
-    /// Returns an idle core, which the caller gives an instance.
+    /// Returns an idle core, for the caller to give an instance.
     #[inline]
     pub(super) fn take_idle(&mut self) -> Option<CoreId> {
         self.idle.pop()
     }
 
-    /// Returns the one of these cores that has become idle last, which the caller gives an instance.
+    /// Returns the core among these that became idle last, for the caller to give an instance.
     #[inline]
     pub(super) fn take_idle_of(&mut self, cores: &[CoreId]) -> Option<CoreId> {
         let place = self.idle.iter().rposition(|idle| cores.contains(idle))?;
         Some(self.idle.remove(place))
     }
 
-    /// Makes a core, if it is idle, the next one that is taken.
+    /// Makes a core, if it is idle, the next to be taken.
     pub(super) fn prefer(&mut self, core: CoreId) {
-        // From the top of the stack, where the core that a driver prefers mostly is.
+        // From the top of the stack, where the preferred core usually is.
         if let Some(place) = self.idle.iter().rposition(|&idle| idle == core) {
-            // Rotated, not swapped: the others keep the order in which they became idle.
+            // Rotated, not swapped: the other cores keep the order in which they became idle.
             self.idle[place..].rotate_left(1);
         }
     }
 
-    /// Gives a core, which is not among the idle ones, an instance.
+    /// Gives an instance to a core that is not in the idle stack.
     #[inline]
     pub(super) fn run(&mut self, core: CoreId, key: DispatchKey, may_be_preempted: bool) {
         self.occupations[core.index()] = CoreOccupancy {
@@ -470,7 +465,7 @@ impl CoreTable {
         largest_preemptible((0..).map(CoreId).zip(&self.occupations))
     }
 
-    /// Likewise, on these cores.
+    /// Likewise, among these cores.
     #[inline]
     pub(super) fn largest_preemptible_of(&self, cores: &[CoreId]) -> Option<(CoreId, DispatchKey)> {
         let occupations = cores.iter().map(|core| &self.occupations[core.index()]);

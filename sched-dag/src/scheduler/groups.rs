@@ -1,24 +1,24 @@
-//! Groups: the lines of DAGs with an affinity, next to the cluster's, and next to tables' cores.
+//! Groups: the lines of DAGs with an affinity, next to the cluster's line and the tables' cores.
 //!
-//! A DAG may state an *affinity*, some cores of its cluster; such cores are a *group*, and no core
-//! is in two. If no DAG states one, all cores of the cluster are the only group. A DAG that no table
-//! has is a *member* of its group, and its instances come in line there (T4 of
+//! A DAG may state an *affinity*, some cores of its cluster. Such cores form a *group*; groups do
+//! not overlap. If no DAG states an affinity, all cores of the cluster are the only group. A DAG
+//! without a table is a *member* of its group, and its instances enter the group's line (T4 of
 //! [`table`](crate::table)).
 //!
 //! # A dispatch with several lines
 //!
-//! First come the cores that tables have ([`lists`](super::lists)). Then, group by group, idle cores
-//! take the first in the group's line; when there is none, the least urgent instance on its cores
-//! gives way to it, unless that is an entry, keeps its core or has the smaller key. So a core is
-//! named in one exchange still: a group takes no core from an entry, nor from another group. The
-//! cluster's line is that of the only group, and comes last. Afterwards a group whose line is not
-//! empty has no idle core.
+//! The cores in tables come first ([`lists`](super::lists)). Then, group by group, idle cores take
+//! the first instance in the group's line. If no core is idle, the least urgent instance on the
+//! group's cores gives way to the first in line, unless it is an entry, keeps its core or has the
+//! smaller key. So each core is still named in a single exchange: a group takes no core from an
+//! entry, nor from another group. The cluster's line belongs to the only group, and comes last.
+//! Afterwards a group with a non-empty line has no idle core.
 //!
 //! # The short ways
 //!
-//! A core that has finished an instance goes on with its list, or else takes the first in its
-//! group's line. Only that core is concerned, unless another one is touched, the one instance that
-//! has become ready is in a line of other cores, or this one's list had to wait for the end.
+//! A core that has finished an instance goes on with its list, or else takes the first instance in
+//! its group's line. Only that core is concerned, unless another core is touched, the single
+//! instance made ready is in a line of other cores, or this core's list had to wait for the end.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -33,24 +33,24 @@ use crate::ids::{ClusterId, CoreId, DagId};
 use crate::policies::SchedulerOptions;
 use crate::task_set::{Dag, TaskSet};
 
-/// The line of the cluster, those of its groups, and the lists of its cores.
+/// The line of the cluster, the lines of its groups, and the lists of its cores.
 #[derive(Clone, Debug, Hash)]
 pub(super) struct ReadyLines {
     cluster: ReadyQueue,
-    /// By the number of a [`LineId`]; none if no DAG states an affinity.
+    /// By the number of a [`LineId`]; empty if no DAG states an affinity.
     apart: Box<[GroupLine]>,
     /// By core, the line of its group.
     groups: Box<[LineId]>,
     pub(super) lists: ListTable,
-    /// Whether all instances come into the cluster's line.
+    /// Whether all instances enter the cluster's line.
     is_one: bool,
-    /// How many are in lines of groups.
+    /// The number of instances in lines of groups.
     count: u32,
-    /// The line that an instance has come into last.
+    /// The line most recently entered by an instance.
     latest: LineId,
 }
 
-/// The line of a group that states its cores.
+/// The line of a group with stated cores.
 #[derive(Clone, Debug, Hash)]
 struct GroupLine {
     ready: ReadyQueue,
@@ -58,7 +58,7 @@ struct GroupLine {
 }
 
 impl ReadyLines {
-    /// Makes the lines of a cluster; gives vertices their ranks.
+    /// Makes the lines of a cluster and gives vertices their ranks.
     #[inline]
     pub(super) fn new(
         task_set: &TaskSet,
@@ -92,7 +92,7 @@ impl ReadyLines {
         cluster: ClusterId,
         vertices: &VertexTable,
     ) {
-        // One for each core, as lines are numbered; those that are not needed have no room.
+        // One line for each core, because lines are numbered by cores; unneeded lines get no room.
         let mut groups = vec![LineId::CLUSTER; cores as usize];
         for dag in members(task_set, cluster, vertices) {
             let line = LineId::new(dag.affinity());
@@ -114,13 +114,13 @@ impl ReadyLines {
         self.is_one = false;
     }
 
-    /// Reports whether a core executes what is in a line, which is not the cluster's.
+    /// Reports whether a core executes the instances of a line other than the cluster's.
     #[inline]
     fn is_for(&self, line: LineId, core: CoreId) -> bool {
         self.groups[core.index()] == line
     }
 
-    /// Returns the key of a vertex's next instance, which is of the job that `job` finds.
+    /// Returns the key of a vertex's next instance. The closure `job` finds the instance's job.
     #[inline]
     pub(super) fn key<'j>(
         &self,
@@ -131,7 +131,7 @@ impl ReadyLines {
         self.cluster.key(number, vertex, job)
     }
 
-    /// Puts an instance in line, or has the list of its core know of it.
+    /// Puts an instance in line, or reports it to the list of its core.
     #[inline]
     pub(super) fn insert(&mut self, vertex: &Vertex, key: DispatchKey) {
         match self.is_one {
@@ -140,7 +140,7 @@ impl ReadyLines {
         }
     }
 
-    /// Not a part of its callers, as most sets have one line.
+    /// Not inlined, as most sets have a single line.
     #[inline(never)]
     fn insert_apart(&mut self, vertex: &Vertex, key: DispatchKey) {
         self.latest = vertex.line;
@@ -154,7 +154,7 @@ impl ReadyLines {
         }
     }
 
-    /// Takes an instance out, which waits, or has begun on its list.
+    /// Takes out an instance that is in line, or that has begun on its list.
     #[inline]
     pub(super) fn remove(&mut self, vertex: &Vertex, key: DispatchKey) {
         if vertex.line.is_cluster() {
@@ -167,7 +167,7 @@ impl ReadyLines {
         }
     }
 
-    /// Reports whether none is in the cluster's line.
+    /// Reports whether the cluster's line is empty.
     #[inline]
     pub(super) const fn is_empty(&self) -> bool {
         self.cluster.is_empty()
@@ -185,13 +185,13 @@ impl ReadyLines {
         self.cluster.pop()
     }
 
-    /// Reports whether any is in the line of a group that states its cores.
+    /// Reports whether any instance is in the line of a group with stated cores.
     #[inline]
     const fn has_any_apart(&self) -> bool {
         self.count > 0
     }
 
-    /// Returns the smallest key in a line that is not the cluster's.
+    /// Returns the smallest key in a line other than the cluster's.
     #[inline]
     pub(super) fn peek_in(&self, line: LineId) -> Option<DispatchKey> {
         match self.has_any_apart() {
@@ -200,13 +200,13 @@ impl ReadyLines {
         }
     }
 
-    /// Not a part of its callers, as most sets have no such line.
+    /// Not inlined, as most sets have no such line.
     #[inline(never)]
     fn peek_apart(&self, line: LineId) -> Option<DispatchKey> {
         self.apart[line.0 as usize].ready.peek()
     }
 
-    /// Takes the instance with the smallest key out of a line that is not the cluster's.
+    /// Takes the instance with the smallest key out of a line other than the cluster's.
     #[inline]
     fn pop_in(&mut self, line: LineId) -> Option<DispatchKey> {
         let key = self.apart[line.0 as usize].ready.pop()?;
@@ -214,7 +214,7 @@ impl ReadyLines {
         Some(key)
     }
 
-    /// Takes out what a core without an instance and without a list executes next.
+    /// Takes out the next instance for a core without an instance and without a list.
     #[inline]
     pub(super) fn pop_for(&mut self, core: CoreId) -> Option<DispatchKey> {
         if self.has_any_apart()
@@ -234,21 +234,21 @@ impl ReadyLines {
         }
     }
 
-    /// Reports whether all instances come into the cluster's line.
+    /// Reports whether all instances enter the cluster's line.
     #[inline]
     pub(super) const fn is_one_line(&self) -> bool {
         self.is_one
     }
 
-    /// Reports whether the cluster's line is the only one, and empty: then the one instance that has
-    /// become ready comes next on a core that has finished its own.
+    /// Reports whether the cluster's line is the only line, and empty: then the single instance
+    /// made ready comes next on a core that has finished its own.
     #[inline]
     pub(super) fn is_one_empty_line(&self) -> bool {
         self.is_empty() && self.is_one
     }
 
-    /// Reports whether an instance, the only one that has become ready and of the line that is asked
-    /// for, comes next on a core that has finished its own, and concerns no other one.
+    /// Reports whether an instance, the only one made ready and in the given line, comes next on a
+    /// core that has finished its own, without concerning another core.
     #[inline]
     pub(super) fn is_next(&self, line: impl FnOnce() -> LineId, core: CoreId) -> bool {
         match self.is_one {
@@ -265,8 +265,8 @@ impl ReadyLines {
         }
     }
 
-    /// Reports whether the instances that have come in line last, of which there are some, may
-    /// concern another core than this one, which has finished one that `kept` it.
+    /// Reports whether the `count` > 0 instances that entered lines last may concern a core other
+    /// than this one, which has finished an instance that `kept` it.
     #[inline]
     pub(super) fn concern_others(
         &mut self,
@@ -291,7 +291,7 @@ impl ReadyLines {
     }
 }
 
-/// Returns a cluster's DAGs that no table has.
+/// Returns a cluster's DAGs without a table.
 fn members<'a>(
     task_set: &'a TaskSet,
     cluster: ClusterId,
@@ -304,8 +304,8 @@ fn members<'a>(
 }
 
 impl Scheduler {
-    /// Gives cores what comes before all in the cluster's line, or has no part in that: to the
-    /// entries of lists, and then to the groups that state their cores.
+    /// Gives cores to everything that precedes the cluster's line or is separate from it: to the
+    /// entries of lists, and then to the groups with stated cores.
     #[inline]
     pub(super) fn decide_apart(&mut self) {
         if !self.ready.is_one {
@@ -328,7 +328,7 @@ impl Scheduler {
         }
     }
 
-    /// Takes a core for the first in a line: an idle one, or one that something has to leave for it.
+    /// Takes a core for the first in a line: an idle core, or a core whose instance has to leave.
     fn take_for(&mut self, line: LineId, ready: DispatchKey) -> Option<CoreId> {
         let cores = &*self.ready.apart[line.0 as usize].cores;
         if let Some(idle) = self.cores.take_idle_of(cores) {

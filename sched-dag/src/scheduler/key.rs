@@ -1,12 +1,11 @@
 //! The key of an instance (R5).
 //!
-//! It is absolute: fixed when the instance becomes ready from things fixed at
-//! its job's release, and the same in every comparison, whether the instances
-//! wait or run. No two are equal.
+//! The key is absolute: fixed at readiness from data fixed at the job's release, and the same in
+//! every comparison, whether the instances wait or run. No two keys are equal.
 //!
-//! R5 orders by (the policy's number, with the job's release if that is added, DAG, job,
-//! subtask). All of that is one number here, so that one comparison does it. Its low 32 bits are the
-//! vertex, which counts subtasks DAG by DAG; what is above depends on the
+//! R5 orders by (the policy's number, with the job's release if the policy adds it, DAG, job,
+//! subtask). Here all parts form a single number, so that a single comparison suffices. Its low 32
+//! bits are the vertex, which counts subtasks DAG by DAG; the higher bits depend on the
 //! [`KeyOrder`]:
 //!
 //! | order | 127..96 | 95..64 | 63..32 |
@@ -16,24 +15,25 @@
 //! | `Release` | release and | number | slot |
 //! | `Sum` | release and | number | rank of (DAG, number) |
 //!
-//! Two jobs of one DAG have different releases, since it has a period, and a
-//! slot is of one DAG and counts DAG by DAG; so, if all of a DAG have one number, (sum, slot,
-//! vertex) is the order of (sum, DAG, job, subtask). Otherwise two
-//! jobs of a DAG may have a sum in common: the older one by the larger
-//! number. So there the larger one has the smaller rank.
+//! Two jobs of one DAG have different releases, because the DAG has a period. A slot belongs to one
+//! DAG, and slots are counted DAG by DAG. So, if all subtasks of each DAG have the same number,
+//! (sum, slot, vertex) is the order of (sum, DAG, job, subtask). Otherwise two jobs of a DAG may
+//! have the same sum: the older job by the larger number. So in that case the larger number has the
+//! smaller rank.
 
 use super::vertices::Vertex;
 
-/// The parts of which keys are made.
+/// The composition of keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum KeyOrder {
     /// Each subtask has a rank of its own.
     Rank,
     /// Subtasks of one DAG may have the same rank; then the older job is first.
     Job,
-    /// The smaller sum of release and number is first, and all subtasks of a DAG have one number.
+    /// The smaller sum of release and number is first, and all subtasks of a DAG have the same
+    /// number.
     Release,
-    /// The same, and they have several.
+    /// Likewise, with several numbers in a DAG.
     Sum,
 }
 
@@ -42,9 +42,9 @@ pub(super) enum KeyOrder {
 pub(super) struct DispatchKey(u128);
 
 impl DispatchKey {
-    /// Stands where there is no key; it is larger than any.
+    /// The mark for a missing key, larger than any key.
     pub(super) const NONE: Self = Self(u128::MAX);
-    /// Stands for the key of the innermost entry that has begun on a core.
+    /// The mark for the key of the innermost begun entry on a core.
     pub(super) const ENTRY: Self = Self::of_rank(0, u32::MAX - 1);
 
     /// Makes the key of a vertex under the order `Rank`.
@@ -64,10 +64,10 @@ impl DispatchKey {
         Self((first as u128) << 64 | (second as u128) << 32 | vertex as u128)
     }
 
-    /// Reports whether it stands for no key.
+    /// Reports whether this is the mark for a missing key.
     ///
-    /// Looks at 32 bits only: a processor that has just stored a key in two halves
-    /// waits until both have arrived before it can load it as one.
+    /// Looks at 32 bits only: a processor that has just stored a key in two halves waits until both
+    /// have arrived before it can load them as a whole.
     #[inline]
     pub(super) const fn is_none(&self) -> bool {
         self.vertex() == u32::MAX
@@ -85,13 +85,13 @@ impl DispatchKey {
         low(self.0 >> 96) as usize
     }
 
-    /// Returns the part before the vertex.
+    /// Returns the part above the vertex.
     #[inline]
     pub(super) const fn before_the_vertex(self) -> u128 {
         self.0 >> 32
     }
 
-    /// Makes a key of the part before the vertex, and a vertex.
+    /// Makes a key from the part above the vertex, and a vertex.
     #[inline]
     pub(super) const fn of_job(before: u128, vertex: u32) -> Self {
         Self(before << 32 | vertex as u128)

@@ -1,31 +1,33 @@
-//! The lists of the cores that tables have (T1 to T3 of [`table`](crate::table)).
+//! The lists of the cores in tables (T1 to T3 of [`table`](crate::table)).
 //!
-//! Each such core has its list, the *position* of the next entry, and the entries that have begun
-//! there and not finished, of which the *innermost* one runs. An instance of a table's DAG comes
-//! into no line: that its vertex says so is all that its entry needs. So the next entry, its
-//! vertex's phase and a depth decide what the core does, however many instances are ready.
+//! Each such core has its list, the *position* of the next entry, and the entries begun there and
+//! not finished, of which the *innermost* runs. An instance of a table's DAG never enters a line:
+//! the phase of its vertex is all that its entry needs. So the next entry, its vertex's phase and a
+//! depth decide the core's action, however many instances are ready.
 //!
 //! # When a core is looked at
 //!
-//! Between two instants no core's next entry may start, and none may be passed, but where an
-//! instance keeps its core. Only this changes that, and *touches* a core: its next entry becomes
-//! ready; what runs there ends; or jobs are skipped or cut, which touches all.
+//! Between two instants no core's next entry may start, and none may be passed, except where an
+//! instance keeps its core. Only three events change this, and *touch* a core: its next entry
+//! becomes ready; the instance running there ends; or jobs are skipped or cut, which touches all
+//! cores.
 //!
 //! # Begun for a moment
 //!
-//! If the entry that follows may start on top of one that starts, at the same instant, that one
-//! has begun in its place and is still ready: its start comes when the core is its own. Until then
-//! a cut of its job cancels it.
+//! An entry may start while the entry following it may start on top of it at the same instant. The
+//! first entry has then begun in its place and is still ready: its start comes when it gets the
+//! core. Until then a cut of its job cancels it.
 //!
 //! # Laps without work
 //!
-//! A step passes two laps of a list at most before it leaps to the first lap that may have work
-//! again; a list without one has come to its end.
+//! A step passes at most two laps of a list before it leaps to the next lap that may have work. A
+//! list without such a lap has come to its end.
 //!
 //! # Links
 //!
-//! Most hops are from an entry to the next one on the list, its only successor, of which it is the
-//! only predecessor. Then neither a counter nor the order decides anything: the core goes on.
+//! Most hops lead from an entry to the next entry on the list, where each is the only successor or
+//! predecessor of the other. Then neither a counter nor the order decides anything: the core goes
+//! on.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -39,33 +41,33 @@ use crate::scheduler::key::DispatchKey;
 use crate::table::{CoreList, Table, TableEntry};
 use crate::task_set::TaskSet;
 
-/// Stands where no entry has begun.
+/// The mark for a place without a begun entry.
 const NONE: u32 = u32::MAX;
 
 /// The lists of a cluster's cores.
 #[derive(Clone, Debug, Default, Hash)]
 pub(super) struct ListTable {
-    /// By core, without entries where no table has the core; none if no table has any.
+    /// By core; without entries where no table has the core. Empty if no table has any core.
     lists: Box<[ListState]>,
-    /// By vertex, where its cores begin in `cores`, and the number of its entries.
+    /// By vertex, the start of its cores in `cores`, and the number of its entries.
     rows: Box<[[u32; 2]]>,
     /// By vertex and job, the core of the entry.
     cores: Box<[CoreId]>,
     touched: BitSet,
 }
 
-/// In one cache line.
+/// A core's list and its progress, in one cache line.
 #[derive(Clone, Debug, Default, Hash)]
 #[repr(align(64))]
 struct ListState {
     entries: Box<[ListEntry]>,
-    /// The place of the next entry, or behind the last one; beyond that if the list is over.
+    /// The place of the next entry, or the place behind the last entry; larger if the list is over.
     position: usize,
     lap: u64,
-    /// One more than the depth of the innermost entry; 0: none has begun.
+    /// The depth of the innermost entry plus 1; 0: none has begun.
     open: u32,
     innermost: u32,
-    /// By depth, the vertices of the others.
+    /// By depth, the vertices of the other begun entries.
     below: Box<[u32]>,
 }
 
@@ -73,10 +75,10 @@ struct ListState {
 struct ListEntry {
     vertex: u32,
     depth: u32,
-    /// One more than the depth if the entry is linked to the one before; else 0.
+    /// The depth plus 1 if the entry is linked to the entry before; otherwise 0.
     link: u32,
     jobs_in_lap: u32,
-    /// In lap 0.
+    /// The number of the job in lap 0.
     job: i64,
 }
 
@@ -133,14 +135,14 @@ impl ListTable {
         first as usize + job.rem_euclid(count.into()) as usize
     }
 
-    /// Reports whether a table has a core.
+    /// Reports whether a table has the core.
     #[inline]
     pub(super) fn has(&self, core: CoreId) -> bool {
         let list = self.lists.get(core.index());
         list.is_some_and(|list| !list.entries.is_empty())
     }
 
-    /// Returns the vertex of the innermost entry that has begun on a core.
+    /// Returns the vertex of the innermost begun entry on a core.
     #[inline]
     pub(super) fn innermost(&self, core: CoreId) -> Option<u32> {
         let list = self.lists.get(core.index())?;
@@ -155,7 +157,7 @@ impl ListTable {
         }
     }
 
-    /// Touches the core of an instance that has become ready, if the entry is the next one there.
+    /// Touches the core of an instance that has become ready, if its entry is the next there.
     #[inline]
     pub(super) fn make_ready(&mut self, vertex: u32, job: u64) {
         let job = job.cast_signed();
@@ -169,14 +171,14 @@ impl ListTable {
         }
     }
 
-    /// Reports whether another core is touched than this one, which is looked at next.
+    /// Reports whether any core is touched other than this one, which is looked at next.
     #[inline]
     pub(super) fn touches_others(&mut self, core: CoreId) -> bool {
         self.touched.remove(core.index());
         !self.touched.is_empty()
     }
 
-    /// Takes note that a core has lost an instance of a vertex by its end.
+    /// Takes note that an instance of a vertex has ended on a core.
     #[inline]
     pub(super) fn end(&mut self, core: CoreId, vertex: u32) {
         if self.has(core) {
@@ -185,17 +187,17 @@ impl ListTable {
         }
     }
 
-    /// Likewise, of an instance that has no core, if its entry has begun.
+    /// Likewise, for an instance without a core, if its entry has begun.
     pub(super) fn end_of(&mut self, vertex: u32, job: u64) {
         let core = self.cores[self.place(vertex, job.cast_signed())];
         self.end(core, vertex);
     }
 
-    /// Returns the list of a core, and the vertex of its next entry, if that is linked to the
-    /// innermost one, which ends.
+    /// Returns the list of a core, and the vertex of the next entry, if the next entry is linked to
+    /// the ending innermost entry.
     ///
-    /// The depths say that the innermost one is the entry before: else it would have been in the
-    /// way of that.
+    /// The depths prove that the innermost entry is the entry before: otherwise the innermost entry
+    /// would have been in the way of the entry before.
     #[inline(always)]
     fn linked(&mut self, core: CoreId) -> Option<(&mut ListState, u32)> {
         let list = self.lists.get_mut(core.index())?;
@@ -213,7 +215,7 @@ impl ListState {
             let after = &stated[(place + 1) % stated.len()];
             let of = |entry: &TableEntry| (entry.dag, entry.job, entry.depth);
             let (dag, [from, to]) = (task_set.dag(entry.dag), [before.subtask, entry.subtask]);
-            // Of one DAG, before it is asked for the neighbours.
+            // The same DAG is checked first, before the neighbours are looked up in it.
             let is_link = of(before) == of(entry)
                 && after.depth <= entry.depth
                 && dag.successors(from) == [to]
@@ -239,7 +241,7 @@ impl ListState {
         }
     }
 
-    /// Returns the next entry, and its job.
+    /// Returns the next entry, and its job in the present lap.
     #[inline]
     fn next(&mut self) -> Option<(ListEntry, i64)> {
         if self.position == self.entries.len() {
@@ -258,7 +260,7 @@ impl ListState {
         self.position += 1;
     }
 
-    /// Takes a vertex out of those that have begun, if it is there.
+    /// Takes a vertex out of the begun entries, if it is there.
     fn remove(&mut self, vertex: u32) {
         if self.innermost != vertex {
             let place = self.below.iter_mut().find(|below| **below == vertex);
@@ -282,8 +284,8 @@ impl ListEntry {
         self.job.wrapping_add_unsigned(later)
     }
 
-    /// Returns how many laps come before the first one, from this lap on, in which the entry's job
-    /// may start; the next job that may is told.
+    /// Returns the number of laps, from this lap on, before the first lap in which the entry's job
+    /// may start. `next` finds the next job that may.
     fn laps_until(&self, lap: u64, next: impl Fn(i64) -> Option<u64>) -> Option<u64> {
         let job = self.job_in(lap);
         let left = next(job)?.cast_signed().saturating_sub(job);
@@ -293,28 +295,28 @@ impl ListEntry {
 
 impl Scheduler {
     /// Ends an instance of one slot on a core, and begins the next entry there, if both are linked.
-    /// Returns its vertex, and the instance.
+    /// Returns the entry's vertex and its instance.
     #[inline(always)]
     pub(super) fn hop_in_list(&mut self, core: CoreId, vertex: u32) -> Option<(u32, Instance)> {
         let (list, next) = self.ready.lists.linked(core)?;
-        // All is found before anything is written, so that nothing has to be found again.
+        // All data is found before anything is written, so that nothing has to be looked up again.
         let instance = self.vertices.hand_over(vertex, next, core)?;
         list.position += 1;
         list.innermost = next;
         Some((next, instance))
     }
 
-    /// Touches all cores with lists, as jobs have been skipped or cut.
+    /// Touches all cores with lists, because jobs have been skipped or cut.
     #[inline]
     pub(super) fn touch_lists(&mut self) {
         if !self.ready.lists.is_empty() {
             self.ready.lists.touch_all();
-            // The short way must not be taken before they have been looked at.
+            // The short way must not be taken before the touched cores have been looked at.
             self.fresh |= OWED;
         }
     }
 
-    /// Gives the cores that are touched to the innermost entries that have begun (T1 to T3).
+    /// Gives the touched cores to their innermost begun entries (T1 to T3).
     pub(super) fn decide_lists(&mut self) {
         while !self.ready.lists.touched.is_empty() {
             let core = CoreId(to_u32(self.ready.lists.touched.first()));
@@ -330,7 +332,7 @@ impl Scheduler {
                         false => key,
                     };
                     self.preempt(core, key);
-                    // A member that is in line again may be for another core (T4).
+                    // A member back in line may be for another core (T4).
                     self.fresh += 1;
                 }
                 _ => _ = self.cores.take_idle_of(&[core]),
@@ -351,7 +353,7 @@ impl Scheduler {
     }
 
     /// Begins and passes the next entries of a core as far as they may start (T1, T2). Returns the
-    /// vertex of the innermost one.
+    /// vertex of the innermost entry.
     pub(super) fn follow(&mut self, core: CoreId) -> Option<u32> {
         let Self {
             vertices,
@@ -381,10 +383,13 @@ impl Scheduler {
                 vertices.begin_entry(entry.vertex);
                 top = Some(entry.vertex);
             } else if own.may_start(model, job, vertex.progress) {
+                // The entry's job may start later: the list waits here, because entries start in
+                // order (T1).
                 break;
             } else {
                 list.position += 1;
                 passed += 1;
+                // A whole lap without work: leap, because passing lap by lap would have no bound.
                 if list.position == list.entries.len() && passed >= list.position {
                     let lap = list.lap + 1;
                     let laps = list.entries.iter().filter_map(|entry| {

@@ -1,8 +1,8 @@
 //! The scheduler's own record of each instant: the journal, and notices for its driver.
 //!
-//! The journal may have no room, or make way for newer events; so what a driver has to act on,
-//! such as the inputs of an instance that is cancelled, does not hang on it. A *notice* is an event
-//! of one of the few kinds that the driver wants to hear of, kept until it looks.
+//! The journal may have no room, or drop old events for newer ones. So information a driver has to
+//! act on, such as the inputs of a cancelled instance, does not depend on the journal. A *notice*
+//! is an event of one of the few kinds that the driver asked for, kept until the driver looks.
 
 use alloc::vec::Vec;
 
@@ -10,29 +10,29 @@ use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
 
-/// An event that a driver acts on, with a time that the journal has no room for.
+/// An event for the driver to act on, with a time that does not fit into the journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriverNotice {
     /// The event.
     pub event: Event,
-    /// When the job was to be released, or its deadline was, in nanoseconds.
+    /// The nominal release of the job, or its deadline, in nanoseconds.
     pub at_ns: Option<u64>,
 }
 
-/// The journal with what the next events of it have in common.
+/// The journal, with the data common to its next events.
 #[derive(Clone, Debug, Default)]
 pub struct EventLog {
     /// The instant.
     pub(super) now_ns: u64,
-    /// The core that makes the scheduler's step.
+    /// The core making the scheduler's step.
     pub here: CoreId,
     /// Whether anything has happened to a job as a whole, or a wait has begun.
     pub(super) has_job_event: bool,
-    /// Jobs of DAGs with a limit that have ended.
+    /// Ended jobs of DAGs with a limit.
     pub jobs_ended: u64,
-    /// By bits of [`EventKind`], which events are kept as notices.
+    /// By bits of [`EventKind`], the events kept as notices.
     heard: u32,
-    /// How many notices one event may come to; there is room for twice as many.
+    /// The most notices from a single change; there is room for twice as many.
     most_at_once: usize,
     notices: Vec<DriverNotice>,
     /// The events so far.
@@ -40,8 +40,8 @@ pub struct EventLog {
 }
 
 impl EventLog {
-    /// Keeps events of these kinds as notices from now on, of which one change of the scheduler
-    /// brings about so many at most. Returns how many there is room for.
+    /// Keeps events of these kinds as notices from now on. One change of the scheduler causes at
+    /// most `most_at_once` of them. Returns the number of notices there is room for.
     pub(super) fn hear(
         &mut self,
         kinds: impl IntoIterator<Item = EventKind>,
@@ -80,33 +80,33 @@ impl EventLog {
         core::mem::swap(&mut self.notices, room);
     }
 
-    /// Reports whether anything has happened to a job as a whole, or a wait has begun, since it was
-    /// last asked.
+    /// Reports whether, since the last call, anything has happened to a job as a whole, or a wait
+    /// has begun.
     #[inline]
     pub const fn take_job_event(&mut self) -> bool {
         core::mem::replace(&mut self.has_job_event, false)
     }
 
-    /// Writes down what a core does with an instance.
+    /// Records what a core does with an instance.
     #[inline]
     pub fn on_core(&mut self, core: CoreId, what: EventKind, time_ns: u64, instance: Instance) {
         (self.journal).write(core, what, time_ns, EventSubject::of(instance));
     }
 
-    /// Writes down what the core that makes this step has done with an instance.
+    /// Records what the core making this step has done with an instance.
     #[inline]
     pub(super) fn on_this(&mut self, what: EventKind, time_ns: u64, instance: Instance) {
         self.on_core(self.here, what, time_ns, instance);
     }
 
-    /// Writes down what has happened to an instance, at this instant.
+    /// Records an event of an instance, at this instant.
     #[inline]
     pub(super) fn of_instance(&mut self, what: EventKind, instance: Instance) {
         self.write(what, self.now_ns, EventSubject::of(instance));
         self.notify(what, EventSubject::of(instance), None);
     }
 
-    /// Writes down what has happened to a job as a whole, or a DAG, and when that was due or late.
+    /// Records an event of a job as a whole, or of a DAG, with the time the event was due or late.
     #[inline]
     pub(super) fn of_job(&mut self, what: EventKind, dag: DagId, job: u64, at_ns: Option<u64>) {
         self.has_job_event = true;
@@ -114,13 +114,13 @@ impl EventLog {
         self.notify(what, EventSubject::of_job(dag, job), at_ns);
     }
 
-    /// Writes down what has happened to a DAG.
+    /// Records an event of a DAG.
     #[inline]
     pub(super) fn of_dag(&mut self, what: EventKind, dag: DagId) {
         self.of_job(what, dag, 0, None);
     }
 
-    /// Writes down that a sporadic DAG's job was due then, right before its release.
+    /// Records that a sporadic DAG's job was due at `release_ns`, right before its release.
     #[inline]
     pub(super) fn due(&mut self, dag: DagId, job: u64, release_ns: u64) {
         self.write(EventKind::Due, release_ns, EventSubject::of_job(dag, job));
@@ -146,7 +146,7 @@ impl EventLog {
     #[cold]
     #[inline(never)]
     fn keep(&mut self, what: EventKind, subject: EventSubject, at_ns: Option<u64>) {
-        // Packed and unpacked, so that a notice is the very event that the journal has.
+        // Packed and unpacked, so that a notice equals the event in the journal.
         let words = Event::words(self.now_ns, what, self.here, subject);
         let event = Event::unpack(words);
         (self.notices).extend(event.map(|event| DriverNotice { event, at_ns }));

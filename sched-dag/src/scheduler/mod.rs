@@ -1,40 +1,37 @@
 //! The scheduler as a pure state machine.
 //!
-//! It has no clock, no thread and no I/O. A *driver* tells it what has happened
-//! and when; it answers with *decisions*. All that it needs is allocated when it
-//! is made.
+//! The scheduler has no clock, no thread and no I/O. A *driver* reports events with their times;
+//! the scheduler answers with *decisions*. All its memory is allocated at construction.
 //!
 //! # One instant
 //!
-//! R5 orders what happens at one instant: completions, then releases, then one
-//! dispatch that sees both. The types force this order:
+//! R5 orders the events of one instant: completions, then releases, then one dispatch that sees
+//! both. The types force this order:
 //!
-//! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
-//!    completions, signals to sporadic DAGs, and faults and requests to end;
-//! 2. [`Moment::dispatch`] ends it: it releases what is due, then gives the [`Decision`]s.
+//! 1. [`Scheduler::at`] begins the instant and returns a [`Moment`], which takes completions,
+//!    signals to sporadic DAGs, and faults and requests to end;
+//! 2. [`Moment::dispatch`] ends the instant: it releases due jobs, then returns the [`Decision`]s.
 //!
 //! A driver calls them when a subtask has returned, and at the latest at
 //! [`Scheduler::next_event_ns`].
 //!
-//! # What it guarantees
+//! # Guarantees
 //!
-//! - The rules R1 to R5 (see the [crate]), with the key that R5 states.
-//! - Each job ends exactly once, in the order of its DAG's jobs, and each due
-//!   job is released, skipped, or dropped with its DAG's end, exactly once.
-//! - Bounded steps: a release costs the sources of its DAG, a completion the
-//!   successors of its subtask, a decision the logarithm of the number of
-//!   subtasks. Besides, a job that is cut costs its
-//!   instances, once; at one instant that is at most the DAG's
-//!   subtasks and edges times the jobs that may be in flight. A backlog that is
-//!   skipped costs [`SKIPS_A_STEP`] events a step, however long it is. After a
-//!   pause of the driver, each release and each deadline that has passed
-//!   meanwhile costs its step.
+//! - The rules R1 to R5 (see the [crate]), with the key stated in R5.
+//! - Each job ends exactly once, in the order of its DAG's jobs, and each due job is released,
+//!   skipped, or dropped with its DAG's end, exactly once.
+//! - Bounded steps: a release costs the sources of its DAG, a completion the successors of its
+//!   subtask, a decision the logarithm of the number of subtasks. Besides, a cut job costs its
+//!   instances, once; at one instant these are at most the DAG's subtasks and edges times the jobs
+//!   that may be in flight. A skipped backlog costs [`SKIPS_A_STEP`] events a step, however long
+//!   the backlog is. After a pause of the driver, each release and each deadline passed meanwhile
+//!   costs its step.
 //!
-//! # What it does not
+//! # Limits
 //!
-//! It does not know execution times: a subtask that never returns keeps its
-//! core (or, preempted, its place in line). It does not measure, it believes
-//! the driver's times; a time earlier than one before counts as that one.
+//! The scheduler does not know execution times: a subtask that never returns keeps its core (or,
+//! preempted, its place in line). The scheduler does not measure, but trusts the driver's times; a
+//! time earlier than a previous time counts as the previous time.
 
 mod bits;
 mod dispatch;
@@ -80,39 +77,37 @@ pub use crate::scheduler::phase::{
 
 /// The state of all jobs in flight.
 ///
-/// A copy goes on by itself, as if it had been told all that the original was. Copies of
-/// one scheduler that [hash](Hash) alike are taken for the same state: what the task set
-/// and the options say is not in the hash.
+/// A copy goes on by itself, as if it had received all reports made to the original. Copies of one
+/// scheduler with equal [hashes](Hash) are taken for the same state: the hash leaves out the task
+/// set and the options.
 #[derive(Clone, Debug)]
 pub struct Scheduler {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
     dags: Box<[DagState]>,
     vertices: VertexTable,
-    /// The ready instances that do not run.
+    /// The ready instances waiting for a core.
     ready: ReadyLines,
-    /// How many instances have become ready since the last dispatch, and [`OWED`] if
-    /// a core has become idle since then that the next instance in line may need.
+    /// The number of instances that have become ready since the last dispatch, and [`OWED`] if
+    /// since then a core has become idle that the next instance in line may need.
     fresh: u32,
     cores: CoreTable,
-    /// When something happens to each DAG without a completion, and behind the DAGs, when each
-    /// wait ends at the latest, and when skips are told of.
+    /// For each DAG, the time of its next event without a completion; behind the DAGs, the latest
+    /// end of each wait, and the time of the next report of skips.
     timers: Timers,
     waits: WaitTable,
-    /// The least of these times, at hand for each completion; `u64::MAX` also if there
-    /// is none.
+    /// The earliest of these times, at hand for each completion; `u64::MAX` also if there is none.
     quiet_until_ns: u64,
-    /// How many skips were told of at the instant that is given.
+    /// An instant, and the number of skips reported at that instant.
     told: (u64, usize),
-    /// Vertices whose instances were cancelled and whose successors do not know
-    /// yet.
+    /// Vertices with cancelled instances whose successors have not been told yet.
     ending: Vec<u32>,
     decisions: Vec<Decision>,
     /// The log of each instant's events.
     pub log: EventLog,
 }
 
-/// Stands next to a count of instances: a dispatch is owed.
+/// A flag in the count of ready instances: a dispatch is owed.
 const OWED: u32 = 1 << 31;
 
 /// The state of one DAG.
@@ -121,14 +116,14 @@ struct DagState {
     jobs: JobTable,
     statistics: DagStatistics,
     survived: SurvivedFaults,
-    /// When the latest pause has ended; what was due before is skipped.
+    /// The end of the latest pause; jobs due before are skipped.
     resumed_ns: u64,
-    /// The jobs that are skipped and not told of.
+    /// The skipped jobs still to be reported.
     untold: Range<u64>,
 }
 
 impl Scheduler {
-    /// Makes the scheduler of all DAGs on all cores, which are not divided.
+    /// Makes the scheduler of all DAGs on all cores, without clusters.
     ///
     /// # Panics
     ///
@@ -137,9 +132,9 @@ impl Scheduler {
         Self::of_cluster(task_set, options, ClusterId(0))
     }
 
-    /// Makes the scheduler of one cluster of the machine that the options describe, with no job
-    /// released, and allocates all that it will ever need. Time begins at 0. It counts the
-    /// cluster's cores from 0. To it, the DAGs of other clusters are ended.
+    /// Makes the scheduler of one cluster of the machine described by the options, with no job
+    /// released, and allocates all its memory. Time begins at 0. The scheduler counts the cluster's
+    /// cores from 0, and treats the DAGs of other clusters as ended.
     ///
     /// # Panics
     ///
@@ -150,7 +145,7 @@ impl Scheduler {
         mut options: SchedulerOptions,
         cluster: ClusterId,
     ) -> Self {
-        // The options are the machine's, the scheduler's only the cluster's part of them.
+        // The options describe the machine; the scheduler has only the cluster's part.
         options.cores = to_u32(task_set.cores_of(cluster, options.cores).len());
         assert!(
             options.cores > 0,
@@ -163,11 +158,11 @@ impl Scheduler {
             .iter()
             .map(|dag| {
                 let first_slot = to_u32(slots);
-                // Also those of other clusters' DAGs: so a slot's number is the same in all
+                // Also the slots of other clusters' DAGs, so that a slot has the same number in all
                 // clusters' keys.
                 slots += dag.slots();
                 let mut jobs = JobTable::new(dag, options.policy, first_slot);
-                // Ended from the beginning on, they never come into the timers or the queue.
+                // Ended from the beginning on, they never enter the timers or the queue.
                 if cluster != dag.cluster() {
                     jobs.end_all();
                 }
@@ -205,20 +200,19 @@ impl Scheduler {
         }
     }
 
-    /// Begins the instant `now_ns`. A time earlier than one before counts as
-    /// that one.
+    /// Begins the instant `now_ns`. A time earlier than a previous time counts as the previous
+    /// time.
     #[inline]
     pub fn at(&mut self, now_ns: u64) -> Moment<'_> {
         self.log.now_ns = self.log.now_ns.max(now_ns);
         Moment::new(self, now_ns)
     }
 
-    /// Has events of these kinds kept as [notices](EventLog::has_notices), and returns how many
-    /// there is
-    /// room for.
+    /// Has events of these kinds kept as [notices](EventLog::has_notices), and returns the number
+    /// of notices there is room for.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
-        // At one instant a DAG's end may skip and cancel all that it has, and a change of mode
-        // each other DAG's waiting job; and a step tells of skips.
+        // At one instant a DAG's end may skip and cancel all jobs of the DAG, and a change of mode
+        // the waiting jobs of each other DAG; a step also reports skips.
         let of_dag = |dag: &Dag| dag.slots() * (dag.subtasks().len() + 4);
         let most = self.task_set.dags().iter().map(of_dag).max();
         let others = 8 * self.dags.len() + SKIPS_A_STEP;
@@ -231,15 +225,16 @@ impl Scheduler {
         &self.decisions
     }
 
-    /// Returns the decisions of the latest dispatch, and the log for what follows from them.
+    /// Returns the decisions of the latest dispatch, and the log for the events that follow from
+    /// them.
     #[inline]
     pub fn decided(&mut self) -> (&[Decision], &mut EventLog) {
         (&self.decisions, &mut self.log)
     }
 
-    /// Returns when the driver has to begin the next instant, if nothing
-    /// completes before: at the next release, or when a deadline has passed. An
-    /// ended DAG has neither. `None`: only completions are to come, or nothing.
+    /// Returns the time of the next instant, if nothing completes before: the next release, or the
+    /// first nanosecond after a deadline. An ended DAG has neither. `None`: only completions are to
+    /// come, or nothing.
     #[inline]
     pub fn next_event_ns(&self) -> Option<u64> {
         self.timers.peek().map(|(event_ns, _)| event_ns)
@@ -256,7 +251,7 @@ impl Scheduler {
         Some(self.vertices.get(vertex).present_instance())
     }
 
-    /// Reports whether every DAG [is over](Self::is_over), and every skip is told of.
+    /// Reports whether every DAG [is over](Self::is_over), and every skip is reported.
     #[inline]
     pub fn is_finished(&self) -> bool {
         let dags = self.task_set.dags().iter().zip(&self.dags);
@@ -264,10 +259,10 @@ impl Scheduler {
         are_over && self.timers.time_of(self.skips_timer()).is_none()
     }
 
-    /// Reports whether nothing of a DAG is left to be done: no job is in flight,
-    /// and none is to come. A DAG without a limit of jobs is over only once it
-    /// [is closed](Self::is_closed) and what it had started has ended; but a sporadic
-    /// one is over whenever no signal is pending, and may begin again.
+    /// Reports whether nothing of a DAG is left to be done: no job is in flight, and none is to
+    /// come. A DAG without a limit of jobs is over only once it [is closed](Self::is_closed) and
+    /// its started instances have ended. But a sporadic DAG is over whenever no signal is pending,
+    /// and may begin again.
     ///
     /// # Panics
     ///
@@ -278,8 +273,8 @@ impl Scheduler {
         state.jobs.are_over(self.task_set.dag(dag))
     }
 
-    /// Reports whether a DAG releases no further job, whatever comes: it was closed by
-    /// [a request](crate::lifecycle::Request::Close), or [is ended](Self::is_ended).
+    /// Reports whether a DAG releases no further job, whatever comes: the DAG was closed by [a
+    /// request](crate::lifecycle::Request::Close), or [is ended](Self::is_ended).
     ///
     /// # Panics
     ///
@@ -290,8 +285,7 @@ impl Scheduler {
     }
 
     /// Reports whether a DAG was ended by [`Moment::fail`] or [a
-    /// request](crate::lifecycle::Request::End).
-    /// Instances of it that had started before may still run.
+    /// request](crate::lifecycle::Request::End). Instances started before may still run.
     ///
     /// # Panics
     ///
@@ -311,8 +305,7 @@ impl Scheduler {
         &self.dags[dag.index()].statistics
     }
 
-    /// Returns the number of jobs of a DAG that are due and wait for an older
-    /// job to end.
+    /// Returns the number of a DAG's due jobs waiting for an older job to end.
     ///
     /// # Panics
     ///
@@ -322,7 +315,7 @@ impl Scheduler {
         self.dags[dag.index()].jobs.waiting()
     }
 
-    /// Returns the model that is scheduled.
+    /// Returns the scheduled task set.
     #[inline]
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
@@ -340,8 +333,8 @@ impl Scheduler {
         self.log.now_ns
     }
 
-    /// Returns the vertex of an instance's subtask. At most one instance of it is
-    /// ready or runs at a time.
+    /// Returns the vertex of an instance's subtask. At most one instance of a subtask is ready or
+    /// runs at a time.
     ///
     /// # Panics
     ///
@@ -351,8 +344,8 @@ impl Scheduler {
         self.task_set.vertex(instance)
     }
 
-    /// Returns the instance that a vertex does, be it ready, running or preempted. If there
-    /// is none, the number of the job means nothing.
+    /// Returns a vertex's present instance, be it ready, running or preempted. If there is none,
+    /// the number of the job means nothing.
     ///
     /// # Panics
     ///
@@ -365,7 +358,7 @@ impl Scheduler {
 
 impl Hash for Scheduler {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // The least time is that of the timers, and between instants nothing is ending.
+        // The earliest time follows from the timers, and between instants nothing is ending.
         (self.log.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
         (
             self.fresh,
@@ -383,14 +376,14 @@ impl Hash for Scheduler {
 pub struct DagStatistics {
     /// Jobs released.
     pub released: u64,
-    /// Jobs of which all subtasks have finished.
+    /// Jobs with all subtasks finished.
     pub completed: u64,
-    /// Jobs whose deadline has passed before they were complete, whether they
-    /// were released or still waited for their release.
+    /// Jobs whose deadline passed before they were complete, whether they were released or still
+    /// waited for their release.
     pub misses: u64,
     /// Misses since a job last met its deadline.
     pub consecutive_misses: u64,
-    /// The most misses without a job between them that met its deadline.
+    /// The most misses in a row, without a job in between meeting its deadline.
     pub most_consecutive_misses: u64,
     /// Releases that did not happen.
     pub skips: u64,
@@ -402,9 +395,9 @@ pub struct DagStatistics {
     pub signals: u64,
     /// Signals that came while an earlier one was still kept, or no job was left.
     pub dropped_signals: u64,
-    /// Instances that a fault has ended.
+    /// Instances ended by a fault.
     pub faults: u64,
-    /// Jobs that a fault has cut while the DAG went on.
+    /// Jobs cut by a fault while the DAG went on.
     pub failed: u64,
     /// Faults after which the DAG went on.
     pub restarts: u64,

@@ -1,28 +1,26 @@
-//! Releases, and what happens to those that find no room.
+//! Releases, and the fate of releases without room.
 //!
 //! # Rules of every policy
 //!
-//! 1. A job is due at its nominal release time O + kT, whatever happened to the
-//!    jobs before it. Its deadline is that time plus D, also if it is released
+//! 1. A job is due at its nominal release time O + kT, whatever happened to the jobs before. Its
+//!    deadline is the nominal release plus D, even if the job is released later.
+//! 2. Jobs are released in the order of their numbers. A due job is released at once unless an
+//!    older job waits or the release is blocked (the job J before it, or an older job, is in
+//!    flight).
+//! 3. A waiting job is released at the first instant at which it is the oldest waiting job and not
+//!    blocked; completions of that instant count.
+//! 4. A miss is noticed at the first instant after the deadline, whether the job is in flight or
+//!    waits, and once. A job skipped or aborted before its deadline counts as skipped or aborted
+//!    and never as a miss; at its deadline the job is a miss, too, as if the step came some time
 //!    later.
-//! 2. Jobs are released in the order of their numbers. A due job is released at
-//!    once unless an older one waits or its release is blocked (the job J
-//!    before it, or an older one, is in flight).
-//! 3. A waiting job is released at the first instant at which it is the oldest
-//!    that waits and is not blocked; completions of that instant count.
-//! 4. A miss is noticed at the first instant after the deadline, whether the
-//!    job is in flight or waits, and once. A job that is skipped or aborted
-//!    before its deadline counts as that and never as a miss; at its deadline it is
-//!    a miss, too, as if the step came some time later.
-//! 5. The run of consecutive misses ends only with a job that meets its
-//!    deadline. Skipped and aborted jobs neither lengthen nor end it.
+//! 5. The run of consecutive misses ends only with a job that meets its deadline. Skipped and
+//!    aborted jobs neither lengthen nor end the run.
 //!
 //! # Queue
 //!
-//! A due job that cannot be released waits. Any number of jobs may wait, in
-//! constant memory, since only their numbers are kept; what stays bounded is
-//! the number in flight. An overload that lasts therefore lasts in the
-//! deadlines, too; choose another policy if old jobs are worth nothing.
+//! A due job that cannot be released waits. Any number of jobs may wait, in constant memory, since
+//! only their numbers are kept; the number in flight stays bounded. Jobs therefore stay late as
+//! long as an overload lasts; choose another policy if old jobs are worth nothing.
 //!
 //! # Skip
 //!
@@ -30,15 +28,14 @@
 //!
 //! # Abort
 //!
-//! A due job that cannot be released aborts the oldest job in flight that is
-//! not cut yet, by an abort or a fault, and waits. If all in flight are cut already, the oldest
-//! waiting job, which may be the due one itself, is skipped.
+//! A due job that cannot be released aborts the oldest job in flight that is not cut yet, by an
+//! abort or a fault, and waits. If all jobs in flight are cut already, the oldest waiting job,
+//! which may be the due job itself, is skipped.
 //!
-//! An aborted job starts no further instance: those that are ready are
-//! cancelled at once, the others when they would become ready. Those that have
-//! started go on, at their key, to their end; a preempted one has started. The
-//! aborted job ends, and makes room, when no instance of it is left; if none
-//! has started and not finished, then at once.
+//! An aborted job starts no further instance: ready instances are cancelled at once, the others
+//! when they would become ready. Started instances go on, at their key, to their end; a preempted
+//! instance has started. The aborted job ends, and makes room, when no instance of the job is left;
+//! if none has started and not finished, at once.
 
 use super::Scheduler;
 use super::jobs::Job;
@@ -47,8 +44,8 @@ use crate::journal::EventKind;
 use crate::policy::{JobOutcome, OverrunPolicy};
 
 impl Scheduler {
-    /// Releases all jobs of a DAG that are due, and notices deadlines that have
-    /// passed. A number behind the DAGs' is that of a wait's timer, or of the skips'.
+    /// Releases all due jobs of a DAG, and notices passed deadlines. A number beyond the DAGs is
+    /// the timer of a wait, or of the reports of skips.
     #[inline]
     pub(super) fn serve(&mut self, dag: DagId) {
         if dag.index() >= self.dags.len() {
@@ -57,7 +54,7 @@ impl Scheduler {
                 false => self.tell_skips(),
             };
         }
-        // Mostly what is due is one release, and the job before has ended.
+        // Usually a single release is due, and the job before has ended.
         let (model, state) = (self.task_set.dag(dag), &mut self.dags[dag.index()]);
         let now_ns = self.log.now_ns;
         if let Some((sequence, event)) = (state.jobs).release_alone(model, state.resumed_ns, now_ns)
@@ -66,28 +63,28 @@ impl Scheduler {
             self.set_timer_to(dag, Some(event));
             return;
         }
-        // Deadlines before releases: a late job may be the one that blocks the next.
+        // Deadlines before releases: a late job may be blocking the next.
         self.judge(dag, None);
         self.release_waiting(dag);
         while let Some((job, release_ns)) = self.take_due(dag) {
             self.release_or_overrun(dag, job, release_ns);
             let jobs = &mut self.dags[dag.index()].jobs;
-            // Waiting jobs are judged only when announced: an end that makes room for this one must
-            // not find it late before an event has told of it.
+            // Waiting jobs are judged only when announced. Otherwise an end that makes room for
+            // this job could find the job late before any event has mentioned it.
             jobs.announce();
-            // Only if the driver came late has a deadline passed that was not known of before.
+            // Only a late driver can find an unknown passed deadline here.
             if jobs.first_deadline_ns(release_ns) < self.log.now_ns {
                 self.judge(dag, None);
             }
         }
-        // Once for all that was due, not once a job.
+        // Once for all due jobs, not once a job.
         self.set_timer(dag);
     }
 
     /// Deals with a job that has just become due.
     #[inline]
     fn release_or_overrun(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        // A driver that comes late may learn of a job of the pause after it.
+        // A late driver may learn of a job due in the pause only after the pause.
         if self.is_paused(dag) || release_ns < self.dags[dag.index()].resumed_ns {
             self.skip_oldest_waiting(dag);
             return;
@@ -98,12 +95,12 @@ impl Scheduler {
             return;
         }
         match self.task_set.dag(dag).overrun() {
-            // It waits as it is, by its number alone.
+            // The job waits as it is, by its number alone.
             OverrunPolicy::Queue => {}
             OverrunPolicy::Skip => self.skip_oldest_waiting(dag),
             OverrunPolicy::Abort => {
-                // The aborted job may have nothing that has started; then it has ended already,
-                // and there is room.
+                // The aborted job may have no started instance; then it has ended already, and
+                // there is room.
                 self.make_room(dag);
                 self.release_waiting(dag);
             }
@@ -136,7 +133,7 @@ impl Scheduler {
         }
     }
 
-    /// Tells of a job that is released, and releases its sources.
+    /// Reports a released job, and releases its sources.
     #[inline]
     fn begin_job(&mut self, dag: DagId, sequence: u64) {
         let state = &mut self.dags[dag.index()];
@@ -159,8 +156,8 @@ impl Scheduler {
         let sequence = jobs.oldest_uncut();
         let job = sequence.map_or(jobs.first_waiting, |sequence| jobs.job(sequence).number);
         self.judge_given_up(dag, job);
-        // All in flight are cut already, so room is on its way: aborting more would cost jobs and
-        // bring nothing.
+        // All jobs in flight are cut already, so room is on its way: aborting more would cost jobs
+        // without gaining room.
         let Some(sequence) = sequence else {
             self.skip_oldest_waiting(dag);
             return;

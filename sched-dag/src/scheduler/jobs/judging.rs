@@ -1,15 +1,13 @@
-//! Holding jobs against the deadlines of their sinks (R4).
+//! Checking jobs against the deadlines of their sinks (R4).
 //!
-//! To *judge* a job by a deadline is to find out whether the sinks that have it are
-//! late. By each relative deadline jobs are judged in the order of their numbers, each
-//! once: a job in flight when the deadline has passed, or when it ends; a waiting one, of
-//! which no sink can have finished, when it has passed. A job that is cut is judged by
-//! that.
+//! To *judge* a job by a deadline means to find out whether any sinks with the deadline are late.
+//! For each relative deadline, jobs are judged in the order of their numbers, each once: a job in
+//! flight when the deadline has passed, or when the job ends; a waiting job, none of whose sinks
+//! can have finished, when the deadline has passed. A cut counts as the judgement of a job.
 //!
-//! Which sinks are late shows in their progress, as long as each is looked at before
-//! another instant begins. So a sink that ends after a deadline that nobody has noticed
-//! yet is judged at once, and counts as late: had the deadline passed before, it would
-//! have been noticed.
+//! The progress of the sinks shows which are late, as long as each sink is looked at before another
+//! instant begins. So a sink ending after an unnoticed deadline is judged at once, and counts as
+//! late: had the deadline passed before, the scheduler would have noticed it.
 
 use alloc::boxed::Box;
 
@@ -21,32 +19,32 @@ use crate::scheduler::Scheduler;
 use crate::scheduler::vertices::VertexTable;
 use crate::task_set::Dag;
 
-/// One relative deadline of a DAG, and how far its jobs are judged by it.
+/// One relative deadline of a DAG, with the progress of judging jobs by it.
 #[derive(Clone, Debug, Hash)]
 pub(in crate::scheduler) struct Deadline {
     relative_ns: u64,
     sinks: Box<[SinkLateness]>,
-    /// The sequence number of the first job in flight that is not judged, if that is
-    /// not older than all in flight.
+    /// The sequence number of the first job in flight not judged, unless all jobs in flight are
+    /// younger.
     judged: u64,
-    /// The first waiting job that is not judged, if that is not older than all waiting.
+    /// The first waiting job not judged, unless all waiting jobs are younger.
     judged_waiting: u64,
 }
 
-/// A sink, and how many jobs it was late in.
+/// A sink, and the number of jobs in which it was late.
 #[derive(Clone, Debug, Hash)]
 struct SinkLateness {
     subtask: SubtaskId,
     misses: u64,
 }
 
-/// A job that is to be judged next.
+/// The job to judge next.
 #[derive(Clone, Copy, Debug)]
 struct UnjudgedJob {
     number: u64,
-    /// Its sequence number; `None` if it waits.
+    /// The job's sequence number; `None` if the job waits.
     sequence: Option<u64>,
-    /// By which deadline, and when that is.
+    /// The number of the deadline, and its time.
     deadline: usize,
     deadline_ns: u64,
 }
@@ -57,7 +55,7 @@ impl Deadline {
     pub(in crate::scheduler) fn all(dag: &Dag) -> Box<[Self]> {
         let sinks = dag.sinks();
         let relative_ns = |sink: usize| dag.subtask(sinks[sink]).relative_deadline_ns();
-        // Ascending, so that a waiting job misses the first one first.
+        // Ascending, so that a waiting job misses the first deadline first.
         let order = sorted_by_key(sinks.len(), relative_ns);
         let same = order.chunk_by(|one, other| relative_ns(*one) == relative_ns(*other));
         let deadline = |same: &[usize]| Self {
@@ -74,11 +72,11 @@ impl Deadline {
         same.map(deadline).collect()
     }
 
-    /// Takes over what is known of a waiting job that is released, with a sequence number.
+    /// Carries the judgement of a waiting job over to its release, with a sequence number.
     #[inline]
     pub(in crate::scheduler) fn release(&mut self, number: u64, sequence: u64) {
         if number < self.judged_waiting {
-            // Judged in order: so all in flight are.
+            // Jobs are judged in order, so all jobs in flight are judged.
             self.judged = sequence + 1;
         }
     }
@@ -91,17 +89,17 @@ impl Deadline {
 }
 
 impl JobTable {
-    /// Returns the first deadline of the job that is released at a time.
+    /// Returns the first deadline of a job released at `release_ns`.
     #[inline]
     pub(in crate::scheduler) fn first_deadline_ns(&self, release_ns: u64) -> u64 {
         release_ns + self.deadlines[0].relative_ns
     }
 
-    /// Returns when the first deadline has passed by which a job is not judged: the
-    /// deadline itself is still in time.
+    /// Returns the first instant after the earliest deadline with an unjudged job: a finish at the
+    /// deadline itself is in time.
     #[inline]
     pub(super) fn late_ns(&self, dag: &Dag) -> Option<u64> {
-        // Where there is one, no time is spent on looking for the first.
+        // With a single deadline, no time is spent on looking for the first.
         let deadline_ns = match &*self.deadlines {
             [only] => self.unjudged(dag, 0, only)?.deadline_ns,
             _ => self.first_unjudged(dag, None)?.deadline_ns,
@@ -109,7 +107,7 @@ impl JobTable {
         Some(deadline_ns + 1)
     }
 
-    /// Returns the job that is to be judged first, or when this job is, if one is given.
+    /// Returns the job to judge first, or the first judgement of job `only`, if given.
     #[inline(never)]
     fn first_unjudged(&self, dag: &Dag, only: Option<u64>) -> Option<UnjudgedJob> {
         let of_deadlines = self.deadlines.iter().enumerate();
@@ -120,9 +118,9 @@ impl JobTable {
 
     #[inline(always)]
     fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<UnjudgedJob> {
-        // Jobs that have ended were judged by their end.
+        // Ended jobs were judged by their end.
         let first = deadline.judged.max(self.oldest);
-        // A cut job is never late, so the next one that is not cut is due for judgement.
+        // A cut job is never late, so the next uncut job is due for judgement.
         let mut uncut = (first..self.next).filter(|&sequence| self.job(sequence).cut.is_none());
         if let Some(sequence) = uncut.next() {
             let job = self.job(sequence);
@@ -133,8 +131,8 @@ impl JobTable {
                 deadline_ns: job.release_ns + deadline.relative_ns,
             });
         }
-        // All in flight are judged; of the waiting ones only numbers are known, in which order
-        // they will be released.
+        // All jobs in flight are judged; of the waiting jobs only the numbers are known, in the
+        // order of their release.
         let number = self.first_waiting.max(deadline.judged_waiting);
         (number < self.announced).then(|| UnjudgedJob {
             number,
@@ -144,11 +142,11 @@ impl JobTable {
         })
     }
 
-    /// Counts the sinks that are late, and reports whether any is.
+    /// Counts the late sinks, and reports whether any is late.
     fn count_late(&mut self, unjudged: &UnjudgedJob, is_late: impl Fn(SubtaskId) -> bool) -> bool {
         let deadline = &mut self.deadlines[unjudged.deadline];
         match unjudged.sequence {
-            // Moves on before the sinks are looked at: each job is judged once by each deadline.
+            // Moves on before the sinks are looked at: each deadline judges each job once.
             Some(sequence) => deadline.judged = sequence + 1,
             None => deadline.judged_waiting = unjudged.number + 1,
         }
@@ -161,17 +159,17 @@ impl JobTable {
         late > 0
     }
 
-    /// Notes that a job has missed a deadline, and reports whether it is its first one.
+    /// Notes that a job has missed a deadline, and reports whether this is the job's first miss.
     #[inline]
     fn note_miss(&mut self, unjudged: &UnjudgedJob) -> bool {
         match unjudged.sequence {
             Some(sequence) => !core::mem::replace(&mut self.job_mut(sequence).missed, true),
-            // Nothing of it has finished: it misses one deadline after the other.
+            // None of its sinks has finished: the job misses all deadlines in turn.
             None => unjudged.deadline == 0,
         }
     }
 
-    /// Returns how many jobs a sink was late in; `None` if the subtask is no sink.
+    /// Returns the number of jobs in which a sink was late; `None` if the subtask is no sink.
     #[inline]
     fn misses_of(&self, subtask: SubtaskId) -> Option<u64> {
         let mut sinks = self.deadlines.iter().flat_map(|deadline| &deadline.sinks);
@@ -181,7 +179,7 @@ impl JobTable {
 }
 
 impl Scheduler {
-    /// Returns how many jobs a sink has missed its deadline in, whether they were
+    /// Returns the number of jobs in which a sink has missed its deadline, whether they were
     /// released or still waited for their release.
     ///
     /// # Panics
@@ -193,8 +191,8 @@ impl Scheduler {
         misses.expect("only sinks have deadlines; ask `Dag::sinks`")
     }
 
-    /// Notices all deadlines of a DAG that have passed. The instance of the vertex
-    /// `ended` has ended at this instant, and no other one since the last look.
+    /// Notices all passed deadlines of a DAG. The instance of the vertex `ended` has ended at this
+    /// instant, and no other instance since the last look.
     #[inline]
     pub(in crate::scheduler) fn judge(&mut self, dag: DagId, ended: Option<u32>) {
         let late_ns = self.dags[dag.index()].jobs.late_ns(self.task_set.dag(dag));
@@ -203,8 +201,8 @@ impl Scheduler {
         }
     }
 
-    /// Notices the deadlines at this instant, too, of a job that is given up at it: completions
-    /// come first, so what is not complete by now misses them.
+    /// Notices also the deadlines at this very instant, for a job given up at this instant:
+    /// completions come first, so sinks not finished by now miss them.
     pub(in crate::scheduler) fn judge_given_up(&mut self, dag: DagId, job: u64) {
         self.judge_late(dag, None, Some(job));
     }
@@ -214,8 +212,9 @@ impl Scheduler {
         let model = self.task_set.dag(dag);
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
-        // Each round judges one job by one deadline, in the order of time: so it costs what was
-        // missed since the last look, and the misses are written down in their order.
+        // Each round judges one job by one deadline, in the order of time. So the cost is
+        // proportional to the misses since the last look, and the misses are recorded in their
+        // order.
         let end_ns = self.log.now_ns + u64::from(given_up.is_some());
         while let Some(unjudged) = state.jobs.first_unjudged(model, given_up)
             // A finish at the deadline itself is in time.
@@ -226,7 +225,7 @@ impl Scheduler {
                 Some(sequence) => is_unfinished(vertices, first + sink.0, sequence, ended),
                 None => true,
             };
-            // Sinks are counted by each deadline, the job once.
+            // Each deadline counts its sinks; a job counts as missed once.
             if state.jobs.count_late(&unjudged, is_late) && state.jobs.note_miss(&unjudged) {
                 state.statistics.count_miss();
                 let deadline_ns = Some(unjudged.deadline_ns);
@@ -235,13 +234,14 @@ impl Scheduler {
         }
     }
 
-    /// Judges the DAG of a vertex whose instance has just ended, if that is one of several sinks.
+    /// Judges the DAG of a vertex whose instance has just ended, if the vertex is one of several
+    /// sinks.
     #[inline]
     pub(in crate::scheduler) fn judge_ended(&mut self, vertex: u32) {
         let ended = self.vertices.get(vertex);
         let (dag, subtask) = (ended.dag, ended.subtask);
         let sinks = self.task_set.dag(dag).sinks();
-        // With one sink the job ends with it, and the end of the job judges it.
+        // A single sink ends the job, and the end of the job judges it.
         if sinks.len() > 1 && sinks.binary_search(&subtask).is_ok() {
             self.judge(dag, Some(vertex));
         }

@@ -1,23 +1,20 @@
 //! The jobs of one DAG: ahead, waiting, in flight.
 //!
-//! Words: a job is *due* at its nominal release time O + kT. A due job is
-//! released at once, skipped, or *waits*. From its release to the end of its
-//! last instance it is *in flight*. Jobs in flight are known by sequence number
-//! (see [`vertices`](super::vertices)); they end in that order, because each instance
-//! waits for that of the job before.
+//! Words: a job is *due* at its nominal release time O + kT. A due job is released at once,
+//! skipped, or *waits*. From its release to the end of its last instance it is *in flight*. Jobs in
+//! flight are known by sequence number (see [`vertices`](super::vertices)); they end in that order,
+//! because each instance waits for the instance of the job before.
 //!
-//! A job's release is *blocked* while the job with its number minus the jobs in
-//! flight, J, or an older one, is in flight: both would use the same slot of
-//! every edge, which is the job's number modulo J. Without skipped jobs this is
-//! the same as J jobs being in flight.
+//! The release of job k is *blocked* while job k - J, or an older job, is in flight, where J is the
+//! most jobs that may be in flight. Both jobs would use the same slot of every edge, the job's
+//! number modulo J. Without skipped jobs, blocked means that J jobs are in flight.
 //!
-//! A periodic DAG's jobs are due on the grid. A sporadic DAG's next job is due
-//! once a signal has come, at the earliest one minimum inter-arrival time after
-//! the job before it (the module `signals` has the rules). At most one signal is
-//! kept, pending or as a waiting job, so at most one sporadic job waits, and it
-//! is the latest that was due.
+//! A periodic DAG's jobs are due on the grid. A sporadic DAG's next job is due once a signal has
+//! come, at the earliest one minimum inter-arrival time after the job before (the module `signals`
+//! has the rules). At most one signal is kept, pending or as a waiting job, so at most one sporadic
+//! job waits: the latest due job.
 //!
-//! The module `judging` holds jobs against their deadlines.
+//! The module `judging` compares jobs with their deadlines.
 
 mod judging;
 
@@ -51,29 +48,29 @@ pub(super) struct JobTable {
     in_flight: Box<[Job]>,
     /// The most jobs in flight, J.
     limit: u64,
-    /// How many subtasks have no successors.
+    /// The number of subtasks without successors.
     ends: u32,
-    /// The policy's number, if the release is added and all subtasks have the same.
+    /// The policy's number, if the policy adds the release and all subtasks have the same number.
     number_ns: u64,
     /// The sequence number of the oldest job in flight.
     pub(super) oldest: u64,
     /// The sequence number of the next job to be released.
     pub(super) next: u64,
-    /// How far the DAG's life has come.
+    /// The phase of the DAG's life.
     pub(super) phase: DagPhase,
     /// The first job that is not due yet.
     pub(super) next_due: u64,
-    /// Its nominal release time; `None`: there is no further job, or, of a
-    /// sporadic DAG, no signal for it yet.
+    /// The nominal release time of `next_due`; `None`: there is no further job, or no signal for
+    /// the next job of a sporadic DAG yet.
     next_due_ns: Option<u64>,
-    /// The nominal release time of the latest job that was due.
+    /// The nominal release time of the latest due job.
     last_due_ns: u64,
-    /// The first job that waits; all up to `next_due` do.
+    /// The first waiting job; all jobs from there to `next_due` wait.
     pub(super) first_waiting: u64,
-    /// The first job that is not announced yet: neither released, nor skipped, nor
-    /// queued. A due one that makes room for itself waits before it is announced.
+    /// The first job that is not announced yet: neither released, nor skipped, nor queued. A due
+    /// job making room for itself waits before it is announced.
     announced: u64,
-    /// How far jobs are judged by each deadline, ascending.
+    /// For each deadline, ascending, how far jobs are judged.
     pub(super) deadlines: Box<[Deadline]>,
 }
 
@@ -84,16 +81,16 @@ pub(super) struct Job {
     pub(super) number: u64,
     /// Its nominal release time.
     pub(super) release_ns: u64,
-    /// Its release with the [number](JobTable::number_ns).
+    /// The release time plus the [number](JobTable::number_ns).
     pub(super) sum_ns: u64,
-    /// The instances without successors that have not ended. Each other one ends before
-    /// some of these.
+    /// The instances without successors still to end. Each other instance ends before some of
+    /// these.
     pub(super) unfinished: u32,
     /// Its slot, counted over all DAGs.
     pub(super) slot: u32,
     /// Whether its deadline has passed before it was complete.
     pub(super) missed: bool,
-    /// How it will end, if it is *cut*: it starts no further instance.
+    /// The outcome of a *cut* job, which starts no further instance.
     pub(super) cut: Option<JobOutcome>,
 }
 
@@ -106,7 +103,7 @@ impl JobTable {
             ..Job::default()
         });
         let subtasks = dag.topological_order().iter();
-        // Sinks and subtasks that nobody follows alike: the job ends with the last of them.
+        // The job ends with the last subtask without successor, be it a sink or not.
         let ends = subtasks.filter(|&&subtask| dag.successors(subtask).is_empty());
         let numbers = policy.adds_release().then(|| policy.numbers(dag));
         Self {
@@ -147,9 +144,8 @@ impl JobTable {
         }
     }
 
-    /// Reports whether there is neither a job in flight, nor one waiting, nor
-    /// one ahead: the DAG is closed or ended, or has a limit of jobs and is there, or is
-    /// sporadic without a limit and has no signal.
+    /// Reports whether no job is in flight, waiting, or ahead: the DAG is closed or ended, or has
+    /// released its limit of jobs, or is sporadic without a limit and has no signal.
     #[inline]
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
         // A sporadic DAG without a limit keeps no run going, unless a signal is pending.
@@ -160,16 +156,16 @@ impl JobTable {
         self.oldest == self.next && self.waiting() == 0 && (self.is_closed() || none_ahead)
     }
 
-    /// Returns the job that a signal is for, or that one is kept for.
+    /// Returns the job that a signal is for, or for which a signal is kept.
     #[inline]
     pub(super) fn signal_job(&self) -> u64 {
-        // A waiting sporadic job is the one before `next_due`; it is what keeps the signal.
+        // A waiting sporadic job is the job before `next_due`, and stands for the kept signal.
         self.next_due - self.waiting().min(1)
     }
 
-    /// Lets the next job of a sporadic DAG be due at `now_ns`, or as soon after it
-    /// as the minimum inter-arrival time allows, and returns that time. `None` if
-    /// the signal is dropped: an earlier one is still kept, or no job is left.
+    /// Makes the next job of a sporadic DAG due at `now_ns`, or as soon after as the minimum
+    /// inter-arrival time allows, and returns that time. Returns `None` if the signal is dropped:
+    /// an earlier signal is still kept, or no job is left.
     #[inline]
     pub(super) fn signal(&mut self, dag: &Dag, now_ns: u64) -> Option<u64> {
         let limit_reached = dag.jobs().is_some_and(|jobs| self.next_due >= jobs);
@@ -177,20 +173,21 @@ impl JobTable {
             return None;
         }
         let earliest_ns = match self.next_due {
-            // The first job has none before it to keep its distance from.
+            // The first job has no predecessor to keep its distance from.
             0 => dag.offset_ns(),
             _ => self.last_due_ns.checked_add(dag.period_ns())?,
         };
-        // Never earlier than one minimum inter-arrival time after the job before: the bound rests
-        // on that.
+        // Never earlier than one minimum inter-arrival time after the job before: the analysis's
+        // bounds rest on it.
         let release_ns = now_ns.max(earliest_ns);
-        // A job whose deadline is beyond the last time is never due: its signal is dropped.
+        // A job whose deadline is beyond the last representable time is never due: its signal is
+        // dropped.
         let deadline_ns = release_ns.checked_add(dag.relative_deadline_ns())?;
         self.next_due_ns = (deadline_ns < u64::MAX).then_some(release_ns);
         self.next_due_ns
     }
 
-    /// Reports whether a job was due before `now_ns` and nobody has dealt with it.
+    /// Reports whether a job was due before `now_ns` and has not been dealt with.
     #[inline]
     pub(super) fn is_overdue(&self, now_ns: u64) -> bool {
         self.next_due_ns.is_some_and(|due_ns| due_ns < now_ns)
@@ -212,18 +209,17 @@ impl JobTable {
         self.oldest == self.next && self.first_waiting == self.next_due
     }
 
-    /// Reports whether a job waits, and the first of these is not blocked.
+    /// Reports whether a job waits, and the first waiting job is not blocked.
     #[inline]
     pub(super) fn are_releasable(&self) -> bool {
         let number = self.first_waiting;
         // By numbers, not by how many are in flight: skipped jobs have used no slot, but their
-        // numbers count. Mostly none waits, so that is asked first.
+        // numbers count. Mostly none waits, so that is checked first.
         number < self.next_due
             && (self.oldest == self.next || number - self.job(self.oldest).number < self.limit)
     }
 
-    /// Lets the next job that is due at `now_ns` wait, and returns it with its
-    /// nominal release time.
+    /// Makes the next job due at `now_ns` wait, and returns the job with its nominal release time.
     #[inline]
     pub(super) fn take_due(&mut self, dag: &Dag, now_ns: u64) -> Option<(u64, u64)> {
         let release_ns = self
@@ -233,12 +229,12 @@ impl JobTable {
         // The next sporadic job keeps its distance from this one.
         self.last_due_ns = release_ns;
         self.next_due += 1;
-        // Of a sporadic DAG this is no time: the next signal sets it.
+        // For a sporadic DAG this is `None`: the next signal sets the time.
         self.next_due_ns = due_ns(dag, self.next_due);
         Some((number, release_ns))
     }
 
-    /// Takes all due jobs for announced.
+    /// Marks all due jobs as announced.
     #[inline]
     pub(super) fn announce(&mut self) {
         self.announced = self.next_due;
@@ -285,12 +281,12 @@ impl JobTable {
         self.put_in_flight(number, release_ns, missed)
     }
 
-    /// Takes a job into flight, and returns the sequence number.
+    /// Takes a job into flight, and returns its sequence number.
     #[inline]
     fn put_in_flight(&mut self, number: u64, release_ns: u64, missed: bool) -> u64 {
         let sequence = self.next;
         self.next += 1;
-        // The job is complete when as many sinks have ended (R4).
+        // The job is complete when this many sinks have ended (R4).
         let (unfinished, number_ns) = (self.ends, self.number_ns);
         let job = self.job_mut(sequence);
         *job = Job {
@@ -298,7 +294,7 @@ impl JobTable {
             release_ns,
             sum_ns: release_ns + number_ns,
             unfinished,
-            // It belongs to the place, not to the job; keys are made of it.
+            // The slot belongs to the place, not to the job; keys are made from it.
             slot: job.slot,
             missed,
             cut: None,
@@ -323,7 +319,7 @@ impl JobTable {
         waiting
     }
 
-    /// Returns the nominal release time of a waiting job, or of one that has been skipped since.
+    /// Returns the nominal release time of a waiting job, or of a job that has been skipped since.
     #[inline]
     pub(super) fn waiting_release_ns(&self, dag: &Dag, number: u64) -> u64 {
         if dag.is_sporadic() {
@@ -334,7 +330,7 @@ impl JobTable {
         }
     }
 
-    /// Returns the first job from this number on that is in flight or still may be.
+    /// Returns the first job from this number on that is in flight or may still be released.
     pub(super) fn next_open(&self, dag: &Dag, number: i64) -> Option<u64> {
         let from = u64::try_from(number).unwrap_or(0);
         let mut in_flight = (self.oldest..self.next).map(|sequence| self.job(sequence).number);
@@ -345,8 +341,8 @@ impl JobTable {
         })
     }
 
-    /// Reports whether the instance of a job with this number may start, now or later, of a vertex
-    /// that has come so far and has not started it.
+    /// Reports whether an instance may still start, now or later: the instance of the job with this
+    /// number, for a vertex with this progress that has not started it.
     pub(super) fn may_start(&self, dag: &Dag, number: i64, progress: u64) -> bool {
         let is_open = self.next_open(dag, number).map(u64::cast_signed) == Some(number);
         let is_it = |sequence: &u64| self.job(*sequence).number.cast_signed() == number;
@@ -378,49 +374,48 @@ impl JobTable {
         self.phase >= DagPhase::Closed
     }
 
-    /// Drops all that is ahead, for good.
+    /// Drops all jobs ahead, for good.
     #[inline]
     pub(super) fn close(&mut self, phase: DagPhase) {
         self.phase = phase;
         self.next_due_ns = None;
     }
 
-    /// Drops all that waits and all that is ahead, and lets those in flight
-    /// start no further instance. Returns how many were in flight and not cut,
-    /// and how many waited.
+    /// Drops all waiting jobs and all jobs ahead, and lets jobs in flight start no further
+    /// instance. Returns the number of jobs in flight not cut before, and the number of waiting
+    /// jobs.
     #[inline]
     pub(super) fn end_all(&mut self) -> (u64, u64) {
         let mut cut_short = 0;
-        // At most J jobs, a number that the commit has fixed.
+        // At most J jobs, a number fixed at commit.
         for sequence in self.oldest..self.next {
             cut_short += u64::from(self.cut(sequence, JobOutcome::DagEnded));
         }
         let dropped = self.waiting();
         self.close(DagPhase::Ended);
-        // What waited is dropped at once, however many there are: only numbers are kept.
+        // All waiting jobs are dropped at once, however many there are: only numbers are kept.
         self.first_waiting = self.next_due;
         (cut_short, dropped)
     }
 
-    /// Takes the oldest job out of flight, all of whose instances have ended.
+    /// Takes the oldest job out of flight. All its instances have ended.
     #[inline]
     pub(super) fn end_oldest(&mut self) {
         self.oldest += 1;
     }
 
-    /// Returns when something happens to these jobs without a completion: a
-    /// release becomes due, or a deadline has passed. A release that no longer
-    /// is blocked is due at `now_ns`.
+    /// Returns the time and kind of the next event of these jobs without a completion: a release
+    /// becomes due, or a deadline has passed. A release no longer blocked is due at `now_ns`.
     #[inline]
     pub(super) fn next_event(&self, dag: &Dag, now_ns: u64) -> Option<(u64, TimerKind)> {
         let release = self
             .next_due_ns
             .map(|due_ns| (due_ns, release_kind(self.next_due)));
-        // Mostly a job has just ended, and it was the only one.
+        // Usually the only job has just ended.
         if self.are_at_rest() {
             return release;
         }
-        // Not at its nominal time, which is past: it was blocked then.
+        // Not at its nominal time, which is past: the release was blocked then.
         if self.are_releasable() {
             return Some((now_ns, TimerKind::Other));
         }
@@ -431,7 +426,7 @@ impl JobTable {
     }
 }
 
-/// Returns the next one of a release and the instant after a deadline.
+/// Returns the earlier of a release and the instant after a deadline.
 #[inline]
 fn sooner(release: Option<(u64, TimerKind)>, late_ns: u64) -> (u64, TimerKind) {
     let release = release.filter(|&(due_ns, _)| due_ns <= late_ns);
@@ -447,8 +442,8 @@ fn release_kind(number: u64) -> TimerKind {
     }
 }
 
-/// Returns a job's nominal release time; `None` beyond the DAG's limit of jobs,
-/// or if the instant after its deadline is not a time, or if only a signal says.
+/// Returns a job's nominal release time. Returns `None` beyond the DAG's limit of jobs, if the
+/// instant after the deadline overflows, or if only a signal determines the time.
 #[inline]
 fn due_ns(dag: &Dag, number: u64) -> Option<u64> {
     if dag.is_sporadic() || dag.jobs().is_some_and(|jobs| number >= jobs) {
