@@ -1,18 +1,18 @@
-//! The verified model: what remains true for as long as the scheduler runs.
+//! The verified model: all properties that stay true for as long as the scheduler runs.
 //!
-//! Only the verification makes a [`TaskSet`], so its holder may rely on
-//! acyclic graphs, non-zero periods and deadlines, and indices in range.
+//! Only the verification makes a [`TaskSet`], so its holder may rely on acyclic graphs, non-zero
+//! periods and deadlines, and indices in range.
 //!
 //! # How many instances of a DAG can be suspended at once: each keeps a stack
 //!
-//! Only an instance that has started and may be preempted is suspended, and a subtask has one
-//! started instance at a time (R2). Of one job no two started instances precede one another, so
-//! there are as many at most as the graph is wide; and no wider than the number of chains that it
-//! can be cut into (R. P. Dilworth, Annals of Mathematics 51, 1950). Chains are found greedily,
-//! in one pass, which need not find the fewest.
+//! Only a started, preemptible instance is ever suspended, and a subtask has at most one started
+//! instance at a time (R2). No two started instances of the same job precede one another, so their
+//! number is at most the width of the graph. The width is at most the number of chains into which
+//! the graph can be cut (R. P. Dilworth, Annals of Mathematics 51, 1950). Chains are found
+//! greedily, in a single pass that need not find the fewest.
 //!
-//! A job that is aborted, or cut by a fault that its DAG survives, makes room for the next one
-//! while instances of it go on; then the jobs in flight are no limit.
+//! An aborted job, or a job cut by a survived fault, makes room for the next job while its
+//! instances go on; then the number of jobs in flight is no limit.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -33,7 +33,7 @@ use crate::wcets::WcetSource;
 #[derive(Clone, Debug, Default)]
 pub struct TaskSet {
     pub(crate) dags: Box<[Dag]>,
-    /// The cores of each cluster; none if they are not divided.
+    /// The number of cores of each cluster; empty if cores are not divided.
     clusters: Box<[u32]>,
     /// Each DAG's first vertex.
     first_vertices: Box<[u32]>,
@@ -61,21 +61,21 @@ pub struct Dag {
     pub(crate) first_job: u64,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
-    /// Its sinks are also those that state a deadline.
+    /// Its sinks include subtasks with a stated deadline.
     pub(crate) graph: Graph,
     pub(crate) state_precedences: Box<[StatePrecedence]>,
     pub(crate) topics: Box<[Topic]>,
     pub(crate) locks: Box<[LockUse]>,
 }
 
-/// An edge that two subtasks have because they share a state.
+/// An edge between two subtasks because they share a state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StatePrecedence {
     /// The state's name.
     pub state: String,
-    /// The subtask that uses it first in each job.
+    /// The subtask using the state first in each job.
     pub earlier: SubtaskId,
-    /// The subtask that waits for that one.
+    /// The subtask waiting for `earlier`.
     pub later: SubtaskId,
 }
 
@@ -91,13 +91,14 @@ pub struct Subtask {
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
     pub(crate) relative_deadline_ns: u64,
-    /// The longest that an instance waits to enter all its sections.
+    /// The longest total wait of an instance to enter all its sections.
     pub(crate) lock_wait_ns: u64,
 }
 
 impl TaskSet {
-    /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. It has
-    /// these jobs only, as its recording does; those before them are not released.
+    /// Makes a DAG lose no job, for a replay: due releases queue, whatever overrun policy the DAG
+    /// has stated. The DAG has only the given jobs, as in its recording; earlier jobs are not
+    /// released.
     pub fn replay(&mut self, dag: DagId, jobs: Range<u64>) {
         let dag = &mut self.dags[dag.index()];
         dag.overrun = OverrunPolicy::Queue;
@@ -105,7 +106,7 @@ impl TaskSet {
         dag.jobs = Some(dag.jobs.map_or(jobs.end, |stated| stated.min(jobs.end)));
     }
 
-    /// Counts the subtasks of verified DAGs.
+    /// Makes a task set of verified DAGs, and counts their subtasks.
     pub(crate) fn new(dags: Box<[Dag]>, clusters: &[u32]) -> Self {
         let mut vertices = 0;
         let firsts = dags.iter().map(|dag| {
@@ -123,14 +124,14 @@ impl TaskSet {
         }
     }
 
-    /// Has these tables enforced, which are of whole DAGs and in the cores' range.
+    /// Has these tables enforced. They cover whole DAGs and are in the cores' range.
     #[doc(hidden)]
     pub fn set_tables(&mut self, tables: Vec<Table>) {
         self.tables = tables.into();
     }
 
-    /// Fixes the set: no DAG is paused, resumed or ended from outside, and no mode entered. The text is
-    /// a certificate for its analysis, which `certify` makes there.
+    /// Fixes the set: no DAG is paused, resumed or ended from outside, and no mode is entered. The
+    /// text is a certificate for the set's analysis, made by `certify` in the analysis.
     pub fn fix(&mut self, certificate: &str) {
         self.certificate = Some(certificate.into());
     }
@@ -145,7 +146,7 @@ impl TaskSet {
         &self.tables
     }
 
-    /// Returns the table of a DAG, which is in one or in none.
+    /// Returns the table of a DAG. A DAG is in at most one table.
     pub fn table_of(&self, dag: DagId) -> Option<&Table> {
         let mut tables = self.tables.iter();
         tables.find(|table| table.entries().any(|entry| entry.dag == dag))
@@ -165,7 +166,7 @@ impl TaskSet {
         &self.dags
     }
 
-    /// Returns one DAG.
+    /// Returns a DAG.
     ///
     /// # Panics
     ///
@@ -174,7 +175,7 @@ impl TaskSet {
         &self.dags[dag.index()]
     }
 
-    /// Returns the number of all DAGs' subtasks, which are the vertices from 0 on.
+    /// Returns the number of subtasks of all DAGs, which equals the number of vertices.
     pub const fn vertices(&self) -> usize {
         self.vertices
     }
@@ -201,7 +202,7 @@ impl Dag {
         &self.name
     }
 
-    /// Returns the hash of the names and edges that were registered.
+    /// Returns the hash of the registered names and edges.
     pub const fn graph_hash(&self) -> u64 {
         self.graph_hash
     }
@@ -211,38 +212,38 @@ impl Dag {
         matches!(self.activation, Activation::Sporadic)
     }
 
-    /// Returns the time between two nominal releases, of a sporadic DAG the
-    /// minimum inter-arrival time; never 0.
+    /// Returns the time between two nominal releases; for a sporadic DAG the minimum inter-arrival
+    /// time. Never 0.
     pub const fn period_ns(&self) -> u64 {
         self.period_ns
     }
 
-    /// Returns the time after a release by which the job shall be complete, the largest
-    /// of its sinks' deadlines, never 0.
+    /// Returns the time after a release by which the job shall be complete: the largest deadline of
+    /// its sinks, never 0.
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
     }
 
-    /// Returns the least relative deadline of its sinks.
+    /// Returns the smallest relative deadline of its sinks.
     pub(crate) fn least_deadline_ns(&self) -> u64 {
         let of_subtasks = self.subtasks.iter().map(|of| of.relative_deadline_ns);
         of_subtasks.min().unwrap_or(self.relative_deadline_ns)
     }
 
-    /// Returns the time of the first nominal release, of a sporadic DAG the
-    /// earliest one.
+    /// Returns the time of the first nominal release; for a sporadic DAG the earliest possible
+    /// time.
     pub const fn offset_ns(&self) -> u64 {
         self.offset_ns
     }
 
-    /// Returns the nominal release O + kT of a periodic DAG's job `job`, at most the
-    /// last time there is.
+    /// Returns the nominal release O + kT of job `job` of a periodic DAG, capped at the last
+    /// representable time.
     pub const fn grid_ns(&self, job: u64) -> u64 {
         job.saturating_mul(self.period_ns)
             .saturating_add(self.offset_ns)
     }
 
-    /// Returns the nominal release of a job, which of a sporadic DAG was due then.
+    /// Returns the nominal release of a job. For a sporadic DAG this is `due_ns`.
     pub(crate) const fn release_ns(&self, job: u64, due_ns: u64) -> u64 {
         match self.is_sporadic() {
             true => due_ns,
@@ -255,8 +256,8 @@ impl Dag {
         self.in_flight
     }
 
-    /// Returns the number of slots for the jobs in flight: a power of two, so that
-    /// finding a job's slot needs no division.
+    /// Returns the number of slots for the jobs in flight: a power of two, so that finding a job's
+    /// slot needs no division.
     pub(crate) fn slots(&self) -> usize {
         (self.in_flight as usize).next_power_of_two()
     }
@@ -271,12 +272,13 @@ impl Dag {
         self.on_fault
     }
 
-    /// Returns the longest time between the nominal releases of two jobs of a periodic DAG that
-    /// follow each other and are not lost by faults that it survives, while it is not paused.
+    /// Returns the longest time between the nominal releases of two successive completed jobs of a
+    /// periodic DAG, counting the jobs lost by survived faults in between, while the DAG is not
+    /// paused.
     pub fn renewal_ns(&self) -> u64 {
         let lost_in_a_row = match self.on_fault {
             OnFault::EndDag => 0,
-            // One more would be within a window of these.
+            // Another fault would fall into a window of these.
             OnFault::DropJob(limit) if u64::from(limit.faults) < limit.window => {
                 limit.faults.min(limit.in_all)
             }
@@ -285,7 +287,7 @@ impl Dag {
         self.period_ns.saturating_mul(1 + u64::from(lost_in_a_row))
     }
 
-    /// Returns the first job to release: 0, but in a replay that begins later.
+    /// Returns the first job to release: 0, except in a replay that begins later.
     pub const fn first_job(&self) -> u64 {
         self.first_job
     }
@@ -300,7 +302,7 @@ impl Dag {
         &self.subtasks
     }
 
-    /// Returns one subtask.
+    /// Returns a subtask.
     ///
     /// # Panics
     ///
@@ -309,7 +311,7 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
-    /// Reports whether not every core of the cluster may execute it.
+    /// Reports whether some core of the cluster may not execute the DAG.
     pub(crate) fn is_confined(&self) -> bool {
         !self.affinity().is_empty()
     }
@@ -319,8 +321,8 @@ impl Dag {
         &self.graph.sources
     }
 
-    /// Returns the subtasks without successor, ascending, never empty; also those that
-    /// state a deadline and precede another sink only because of a shared state.
+    /// Returns the subtasks without successor, ascending, never empty. Includes subtasks with a
+    /// stated deadline that precede another sink only because of a shared state.
     pub fn sinks(&self) -> &[SubtaskId] {
         &self.graph.sinks
     }
@@ -335,19 +337,19 @@ impl Dag {
         self.graph.successors.neighbours(subtask)
     }
 
-    /// Returns the topics, in the order of their writers. Edges that were stated
-    /// without a topic have none.
+    /// Returns the topics, in the order of their writers. Edges stated without a topic are not
+    /// among them.
     pub fn topics(&self) -> &[Topic] {
         &self.topics
     }
 
-    /// Returns the subtasks in an order in which every predecessor comes first.
+    /// Returns the subtasks in a topological order: every predecessor comes first.
     pub fn topological_order(&self) -> &[SubtaskId] {
         &self.graph.topological_order
     }
 
-    /// Returns the edges that follow from shared states. They are among the
-    /// predecessors and successors; there may be another reason for one, too.
+    /// Returns the edges that follow from shared states. They are among the predecessors and
+    /// successors; an edge may have another reason, too.
     pub fn state_precedences(&self) -> &[StatePrecedence] {
         &self.state_precedences
     }
@@ -357,7 +359,7 @@ impl Dag {
         &self.locks
     }
 
-    /// Returns the first use of a lock of which no longest section is stated.
+    /// Returns the first use of a lock without a stated longest section.
     pub fn unbounded_lock(&self) -> Option<&LockUse> {
         self.locks.iter().find(|of| of.longest_ns.is_none())
     }
@@ -374,17 +376,17 @@ impl Subtask {
         self.wcet_ns
     }
 
-    /// Returns its waits, in order.
+    /// Returns the waits of the subtask, in order.
     pub const fn waits(&self) -> &[Wait] {
         &self.waits
     }
 
-    /// Returns the sum of its waits' limits.
+    /// Returns the sum of the limits of its waits, in nanoseconds.
     pub fn waiting_ns(&self) -> u64 {
         self.waits().iter().map(|wait| wait.limit_ns).sum()
     }
 
-    /// Returns the WCETs of its segments, if they are known; that of a subtask without waits is one.
+    /// Returns the WCETs of its segments, if known. A subtask without waits has a single segment.
     pub fn segments_ns(&self) -> Option<Vec<u64>> {
         let later = self.waits().iter().map(|wait| wait.segment_ns);
         let later = later.collect::<Option<Vec<u64>>>()?;
@@ -392,20 +394,20 @@ impl Subtask {
         Some(core::iter::once(first).chain(later).collect())
     }
 
-    /// Returns the WCET, and its [waits for locks](Self::lock_wait_ns).
+    /// Returns the WCET plus the [waits for locks](Self::lock_wait_ns).
     pub(crate) fn locking_wcet_ns(&self) -> Option<u64> {
         self.wcet_ns?.checked_add(self.lock_wait_ns)
     }
 
-    /// Returns the WCETs of its segments, of which the first has all waits for locks.
+    /// Returns the WCETs of its segments. The first includes all waits for locks.
     pub(crate) fn locking_segments_ns(&self) -> Option<Vec<u64>> {
         let mut segments = self.segments_ns()?;
         segments[0] = segments[0].checked_add(self.lock_wait_ns)?;
         Some(segments)
     }
 
-    /// Returns a time that none of its segments exceeds, waits for locks included: that of the
-    /// longest one, or of all together if that is all that is known.
+    /// Returns an upper bound on each of its segments, waits for locks included: the longest
+    /// segment, or the whole WCET if only the sum is known.
     pub fn longest_segment_ns(&self) -> Option<u64> {
         let segments = self.locking_segments_ns();
         segments.map_or(self.locking_wcet_ns(), |segments| {
@@ -413,25 +415,25 @@ impl Subtask {
         })
     }
 
-    /// Returns its WCET with what each of its segments is charged, `None` if there is none or the
-    /// sum overflows.
+    /// Returns its WCET plus the charge `of_segment_ns` for each segment. Returns `None` if there
+    /// is no WCET or the sum overflows.
     pub fn charged_ns(&self, of_segment_ns: u64) -> Option<u64> {
         let charge_ns = of_segment_ns.checked_mul(1 + self.waits.len() as u64)?;
         self.locking_wcet_ns()?.checked_add(charge_ns)
     }
 
-    /// Returns the stack that it needs, in bytes, if the app stated one.
+    /// Returns the subtask's stack, in bytes, if the app stated it.
     pub const fn stack_bytes(&self) -> Option<u64> {
         self.stack_bytes
     }
 
-    /// Returns where the WCET is from.
+    /// Returns the source of the WCET.
     pub const fn wcet_source(&self) -> WcetSource {
         self.wcet_source
     }
 
-    /// Returns how long an instance may execute for, `u64::MAX` if there is no limit: its
-    /// budget, else so many WCETs, or no limit if that is 0.
+    /// Returns the longest allowed execution of an instance, in nanoseconds: the budget, otherwise
+    /// `wcets` WCETs. `u64::MAX` means no limit, also if `wcets` is 0.
     pub fn most_execution_ns(&self, wcets: u64) -> u64 {
         let wcet_ns = self.wcet_ns.filter(|_| wcets > 0);
         let limit_ns = wcet_ns.map(|wcet_ns| wcet_ns.saturating_mul(wcets));
@@ -448,8 +450,8 @@ impl Subtask {
         self.non_preemptive
     }
 
-    /// Returns the time after a release by which the most urgent of the sinks that it
-    /// reaches shall have finished; a sink reaches itself. Never 0.
+    /// Returns the time after a release by which the most urgent sink reachable from the subtask
+    /// shall have finished; a sink reaches itself. Never 0.
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
     }
@@ -462,8 +464,8 @@ impl TaskSet {
         self.dags().iter().map(Dag::most_suspended).sum()
     }
 
-    /// Returns the size of a stack that every subtask can run on, if those that state none need
-    /// so many bytes.
+    /// Returns the size of a stack suitable for every subtask, if subtasks without a stated stack
+    /// need `unstated` bytes.
     #[inline(never)]
     pub fn largest_stack_bytes(&self, unstated: u64) -> u64 {
         let subtasks = self.dags().iter().flat_map(Dag::subtasks);
@@ -473,8 +475,8 @@ impl TaskSet {
 }
 
 impl Dag {
-    /// Returns a number of instances, of all jobs, that is never exceeded by those that are
-    /// suspended at once where started instances may lose their cores.
+    /// Returns an upper bound on the number of instances, of all jobs, suspended at once where
+    /// started instances may lose their cores.
     pub fn most_suspended(&self) -> usize {
         let may_be = self.subtasks.iter().filter(|of| !of.is_non_preemptive());
         let may_be = may_be.count();
@@ -485,8 +487,8 @@ impl Dag {
         }
     }
 
-    /// Returns the number of chains that the graph is cut into: a subtask goes on with the chain
-    /// of the first predecessor that no other has gone on with.
+    /// Returns the number of chains of a greedy cut of the graph: a subtask continues the chain of
+    /// its first predecessor whose chain no other subtask has continued.
     fn chains(&self) -> usize {
         let mut is_continued = vec![false; self.subtasks.len()];
         let begins_one = |subtask: &&_| {
@@ -505,7 +507,7 @@ impl Dag {
 }
 
 impl TaskSet {
-    /// Divides the cores, and puts each DAG into a cluster for a reason.
+    /// Divides the cores, and puts each DAG into a cluster with the reason.
     pub(crate) fn divide(&mut self, sizes: &[u32], of_dags: &[(ClusterId, AssignmentReason)]) {
         self.clusters = sizes.into();
         for (dag, (cluster, why)) in self.dags.iter_mut().zip(of_dags) {
@@ -513,16 +515,16 @@ impl TaskSet {
         }
     }
 
-    /// Lets a DAG execute on these cores of its cluster only.
+    /// Lets a DAG execute only on these cores of its cluster.
     pub(crate) fn confine(&mut self, dag: DagId, cores: Vec<u32>) {
         self.dags[dag.index()].affinity = cores.into();
     }
 
-    /// Returns the cores that may execute a DAG, ascending, on a machine of `all`.
+    /// Returns the cores allowed to execute a DAG, ascending, on a machine of `all` cores.
     pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
         let cluster = self.cores_of(self.dag(dag).cluster(), all);
         let lists = self.table_of(dag).map_or(&[][..], |table| &table.lists);
-        // No DAG has both.
+        // No DAG has both a list and an affinity.
         let stated = lists.iter().map(|list| &list.core);
         let stated = stated.chain(self.dag(dag).affinity());
         let stated: Vec<u32> = stated.map(|core| cluster.start + core).collect();
@@ -537,12 +539,12 @@ impl TaskSet {
         !self.clusters.is_empty()
     }
 
-    /// Returns the clusters; if the cores are not divided, the one of all cores.
+    /// Returns the clusters; without a division, a single cluster of all cores.
     pub fn clusters(&self) -> impl Iterator<Item = ClusterId> + use<> {
         (0..).map(ClusterId).take(self.clusters.len().max(1))
     }
 
-    /// Returns the cores of a cluster, on a machine of `all`.
+    /// Returns the cores of a cluster, on a machine of `all` cores.
     ///
     /// # Panics
     ///
@@ -567,17 +569,18 @@ impl TaskSet {
 }
 
 impl Dag {
-    /// Returns the cluster whose cores run it; if the cores are not divided, cluster 0.
+    /// Returns the cluster whose cores run the DAG; cluster 0 if the cores are not divided.
     pub fn cluster(&self) -> ClusterId {
         self.cluster.unwrap_or_default()
     }
 
-    /// Returns why the commit has chosen that; `None` if it has not.
+    /// Returns why the commit has chosen the cluster; `None` if the commit has not chosen.
     pub const fn why_there(&self) -> Option<AssignmentReason> {
         self.why_there
     }
 
-    /// Returns the cores of its cluster that execute it, ascending, counted from 0; empty: all.
+    /// Returns the cores of its cluster allowed to execute the DAG, ascending, counted from 0;
+    /// empty: all.
     pub const fn affinity(&self) -> &[u32] {
         &self.affinity
     }

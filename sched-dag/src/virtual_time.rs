@@ -1,19 +1,19 @@
 //! The driver in virtual time: a [`Scheduler`] run without a machine, or one for each cluster.
 //!
-//! Time jumps from event to event. The work of the cores comes from a
-//! [`Workload`], which is asked once for each instance, at its start, how long
-//! it executes; it may run the function of the instance's [body](SubtaskBody) to find out.
+//! Time jumps from event to event. The work of the cores comes from a [`Workload`], asked once for
+//! each instance, at its start, for its execution time. The workload may run the function of the
+//! instance's [body](SubtaskBody) to find out.
 //!
-//! An instance that executes for no time finishes at the instant of its start,
-//! after the dispatch that started it; another dispatch at the same instant
-//! follows, and so on until nothing happens any more.
+//! An instance with an execution time of 0 finishes at the instant of its start, after the dispatch
+//! that started it. Another dispatch at the same instant follows, and so on until nothing happens
+//! any more.
 //!
-//! Clusters have one clock: what ends at one instant ends in all of them before anything
-//! starts in one.
+//! Clusters share a clock: everything ending at one instant ends in all clusters before anything
+//! starts in any of them.
 //!
-//! A workload may let an instance fail at the end of its execution time, which
-//! ends its DAG or costs its job. Of what ends at one instant, completions come before
-//! failures, and these in the order of their instances.
+//! A workload may let an instance fail at the end of its execution time, which ends its DAG or
+//! costs its job. At one instant, completions come before failures, and failures in the order of
+//! their instances.
 //!
 //! After [`VirtualTime::new`] nothing is allocated here.
 //!
@@ -60,34 +60,33 @@ use crate::policies::SchedulerOptions;
 use crate::scheduler::{DriverNotice, Moment, Scheduler};
 use crate::task_set::TaskSet;
 
-/// A scheduler in virtual time with its bodies, or those of all clusters.
+/// A scheduler in virtual time with its bodies, or the schedulers of all clusters.
 pub struct VirtualTime<B: SubtaskBody = Instance> {
     clusters: Box<[ClusterRun<B>]>,
     now_ns: u64,
-    /// Instances that fail at the present instant.
+    /// Instances failing at the present instant.
     failing: Vec<(Instance, CoreId, B)>,
     letters: Arc<Mailboxes>,
 }
 
-/// Why a run in virtual time has ended.
+/// The reason why a run in virtual time has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum RunOutcome {
-    /// Every job of every DAG has ended; an ended DAG has no further ones. Or
-    /// nothing happens any more, because a sporadic DAG gets no further signal.
+    /// Every job of every DAG has ended; an ended DAG has no further jobs. Or nothing happens any
+    /// more, because a sporadic DAG gets no further signal.
     Finished,
-    /// The next event lies after the time up to which the run should go.
+    /// The next event lies after the requested end of the run.
     TimeReached,
-    /// The instance would finish after the last time there is. The run cannot
-    /// be continued.
+    /// The instance would finish after the last representable time. The run cannot be continued.
     TimeOverflow(Instance),
-    /// The workload has [stopped](Workload::stops) it.
+    /// The workload has [stopped](Workload::stops) the run.
     Stopped,
 }
 
 impl VirtualTime {
-    /// Makes a driver for a task set on the machine that the options describe, and allocates all
-    /// that it will need.
+    /// Makes a driver for a task set on the machine described by the options, and allocates all
+    /// memory for the run.
     pub fn new(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
         Self::of_bodies(task_set, options, instances(task_set), &[])
     }
@@ -103,8 +102,8 @@ fn instances(task_set: &TaskSet) -> impl Iterator<Item = Instance> {
 }
 
 impl<B: SubtaskBody> VirtualTime<B> {
-    /// Makes one for a body of each subtask. By DAG, `after_fault` is the one that gets a signal
-    /// when a fault ends it.
+    /// Makes a driver with a body for each subtask. For each DAG, `after_fault` names the DAG to be
+    /// signalled when a fault ends it.
     pub fn of_bodies(
         task_set: &Arc<TaskSet>,
         options: SchedulerOptions,
@@ -138,11 +137,11 @@ impl<B: SubtaskBody> VirtualTime<B> {
         this
     }
 
-    /// Takes what serves requests other than signals.
+    /// Sets the lifecycle, which serves requests other than signals.
     ///
     /// # Errors
     ///
-    /// Why it cannot be divided among the clusters.
+    /// The reason why the lifecycle cannot be divided among the clusters.
     pub fn with_lifecycle(
         mut self,
         lifecycle: Option<Box<dyn Lifecycle>>,
@@ -157,7 +156,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         Ok(self)
     }
 
-    /// Writes all that happens down.
+    /// Records all events in a journal.
     #[must_use]
     pub fn recording(mut self) -> Self {
         for cluster in &mut self.clusters {
@@ -187,14 +186,13 @@ impl<B: SubtaskBody> VirtualTime<B> {
 
     /// Runs until every job has ended.
     ///
-    /// With a DAG without a limit of jobs this is the end of time; see
+    /// For a DAG without a limit of jobs that is the end of time; see
     /// [`run_until`](Self::run_until).
     pub fn run(&mut self, workload: &mut impl Workload<B>) -> RunOutcome {
         self.run_until(u64::MAX, workload)
     }
 
-    /// Runs all events up to and including those at `until_ns`. May be called
-    /// again with a later time.
+    /// Runs all events up to and including `until_ns`. May be called again with a later time.
     pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload<B>) -> RunOutcome {
         let begun_ns = Ok(0);
         let now = &mut VirtualInstant {
@@ -207,20 +205,20 @@ impl<B: SubtaskBody> VirtualTime<B> {
         while !now.workload.stops() {
             let of_scheduler = |cluster: &ClusterRun<B>| cluster.engine.scheduler.next_event_ns();
             let due = self.clusters.iter().filter_map(of_scheduler);
-            // The time may have passed the due one already, by another event.
+            // Another event may already have moved the time past the due time.
             let interrupts = due.map(|due_ns| {
                 (due_ns.saturating_add(now.workload.late_ns(due_ns))).max(self.now_ns)
             });
             let scheduler_ns = interrupts.min();
             let request_ns = now.workload.next_request_ns();
-            // A request that was made for an earlier time comes now: time does not go back.
+            // A request for an earlier time comes now: time does not go back.
             let request_ns = request_ns.map(|request_ns| request_ns.max(self.now_ns));
-            // Whatever comes first; what comes at the same time is one instant.
+            // The earliest event decides; all events at the same time form one instant.
             let events = [self.next_finish_ns(), scheduler_ns, request_ns];
             let Some(event_ns) = events.into_iter().flatten().min() else {
                 return RunOutcome::Finished;
             };
-            // Nothing is taken yet, so a later call goes on here.
+            // No event is taken yet, so a later call goes on here.
             if event_ns > until_ns {
                 return RunOutcome::TimeReached;
             }
@@ -257,28 +255,28 @@ impl<B: SubtaskBody> VirtualTime<B> {
         self.clusters.iter().filter_map(of_cores).min()
     }
 
-    /// Goes through one instant. That the run cannot go on is the error.
+    /// Runs one instant. The error is the outcome when the run cannot go on.
     fn step(&mut self, now: &mut VirtualInstant<'_, impl Workload<B>>) -> Result<(), RunOutcome> {
         self.now_ns = now.now_ns;
-        // A mode that waits comes after all completions and faults of the instant (M3).
+        // A waiting mode comes after all completions and faults of the instant (M3).
         let mut waiting = None;
         for (place, cluster) in self.clusters.iter_mut().enumerate() {
             let is_mode = |request| request == Request::GoOn && waiting.replace(place).is_none();
             cluster.engine.requests.give_away(is_mode);
         }
-        // The short way was all of the instant.
+        // The short way was the whole instant.
         if self.finish(waiting.is_none(), now)? {
             return Ok(());
         }
         let mut failing = core::mem::take(&mut self.failing);
-        // In an order that does not depend on cores: D6 counts faults in the order in which they
-        // are told.
+        // In an order independent of cores: D6 counts faults in the order in which they are
+        // reported.
         failing.sort_unstable_by_key(|(instance, ..)| *instance);
         for (instance, core, body) in failing.drain(..) {
             let place = self.cluster_index(instance.dag);
             self.clusters[place].fail(core, body, now);
         }
-        // The list goes back for its memory.
+        // The list goes back to keep its memory.
         self.failing = failing;
         if let Some(place) = waiting {
             self.clusters[place].engine.requests.keep(Request::GoOn);
@@ -293,9 +291,9 @@ impl<B: SubtaskBody> VirtualTime<B> {
         clusters.try_for_each(|cluster| cluster.decide(now))
     }
 
-    /// Completes what finishes now, and notes what fails instead.
-    /// If it is one instance and nothing else happens, that `may_be_all` of the
-    /// instant; whether it is is the result.
+    /// Completes the instances finishing now, and notes the instances failing instead. If only one
+    /// instance finishes and nothing else happens, its completion `may_be_all` of the instant; the
+    /// result reports whether it was.
     fn finish(
         &mut self,
         mut may_be_all: bool,
@@ -306,7 +304,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
                 let mut others_ns =
                     [self.next_finish_ns(), now.workload.next_request_ns()].into_iter();
                 let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now.now_ns));
-                // The short way is right only if this finish is all that happens at this instant.
+                // The short way is right only if nothing else happens at this instant.
                 let is_alone = core::mem::take(&mut may_be_all) && is_last;
                 let (cluster, instance) = (&mut self.clusters[place], body.subject().instance());
                 if now.workload.fails(instance) {
@@ -319,7 +317,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         Ok(false)
     }
 
-    /// Serves a request at this instant, in the clusters that it concerns.
+    /// Serves a request at this instant, in the clusters concerned.
     fn serve(&mut self, request: Request, now: &mut VirtualInstant<'_, impl Workload<B>>) {
         self.letters.send(None, request, |cluster| {
             now.has_letters = true;
@@ -327,7 +325,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         });
     }
 
-    /// Returns the place of the cluster that runs a DAG.
+    /// Returns the place of the cluster running a DAG.
     fn cluster_index(&self, dag: DagId) -> usize {
         match &*self.clusters {
             // Undivided cores are one cluster, whatever the DAGs state.
@@ -344,62 +342,64 @@ impl<B: SubtaskBody> fmt::Debug for VirtualTime<B> {
     }
 }
 
-/// The behaviour of instances, and how long each executes.
+/// The behaviour of instances, and their execution times.
 pub trait Workload<B = Instance> {
     /// Returns the execution time of an instance in nanoseconds, up to its end or its next wait; 0
     /// is allowed. Called once for each instance at its start, and again after each wait. `None`:
     /// the run is [stopped](RunOutcome::Stopped) at once.
     fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
-    /// Reports whether an instance fails, instead of finishing, when its
-    /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
-    /// instance, at its end, and where it would begin to wait.
+    /// Reports whether an instance fails, instead of finishing, at the end of its execution time.
+    /// The failure ends its DAG, or drops its job. Called once for each instance, at its end, and
+    /// before each begin of a wait.
     fn fails(&mut self, _instance: Instance) -> bool {
         false
     }
 
-    /// Reports whether the function of an instance that fails could be replaced, if its body says
-    /// so as well. Called once for each, right before the scheduler is told.
+    /// Reports whether the function of a failing instance could be replaced, if its body agrees.
+    /// Called once for each failure, right before the scheduler is told.
     fn is_replaceable(&mut self, _instance: Instance) -> bool {
         true
     }
 
-    /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
+    /// Called when an instance has ended and its outputs are published, or when a fault has ended
+    /// it at the given cost.
     fn ended(&mut self, _instance: Instance, _now_ns: u64, _fault: Option<FaultCost>) {}
 
-    /// An instance has begun a wait, whose answer may be a [`Request::Answer`] from now on.
+    /// Called when an instance has begun a wait. From now on a [`Request::Answer`] may answer the
+    /// wait.
     fn waits(&mut self, _wait: WaitId, _now_ns: u64) {}
 
-    /// A job is released, skipped or completed, or a DAG ended.
+    /// Called when a job is released, skipped or completed, or a DAG is ended.
     fn hear(&mut self, _notice: &DriverNotice) {}
 
-    /// Takes a request that has come now, by a completion or a fault.
+    /// Takes a request made now by a completion or a fault.
     fn request(&mut self, _request: Request, _now_ns: u64) {}
 
-    /// Returns when the next request comes. Asked again at every instant.
+    /// Returns the time of the next request, in nanoseconds. Called again at every instant.
     fn next_request_ns(&self) -> Option<u64> {
         None
     }
 
-    /// Returns the next request that has come by now, and forgets it.
+    /// Returns the next request due by now, and forgets it.
     fn take_request(&mut self, _now_ns: u64) -> Option<Request> {
         None
     }
 
-    /// Returns how late the timer's interrupt is that is due then; what comes before it at the
-    /// scheduler does what is due. Asked several times for one interrupt.
+    /// Returns the delay of the timer interrupt due at the given time, in nanoseconds. An earlier
+    /// step of the scheduler does the due work before the interrupt. Called several times for one
+    /// interrupt.
     fn late_ns(&self, _due_ns: u64) -> u64 {
         0
     }
 
-    /// Reports whether the run is to stop, though jobs are left. Asked before each
-    /// instant.
+    /// Reports whether the run is to stop, even if jobs are left. Called before each instant.
     fn stops(&self) -> bool {
         false
     }
 }
 
-/// A workload of which only the execution times matter.
+/// A workload with nothing but execution times.
 #[derive(Debug)]
 pub struct ExecutionTimes<F>(
     /// Returns the execution time of an instance in nanoseconds.
@@ -412,7 +412,7 @@ impl<B: SubtaskBody, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F
     }
 }
 
-/// Stands for a body without a function, which can always be replaced.
+/// Serves as a body without a function. It can always be replaced.
 impl SubtaskBody for Instance {
     type Alternate = ();
 
@@ -441,11 +441,11 @@ impl SubtaskBody for Instance {
     fn replace(&mut self) {}
 }
 
-/// A cluster: a scheduler with its bodies, which runs by itself.
+/// A cluster: a scheduler with its bodies, running by itself.
 struct ClusterRun<B: SubtaskBody> {
-    /// Parked is a body, behind the time that its instance has left.
+    /// A parked body comes with the time left for its instance.
     engine: Engine<B, (u64, B)>,
-    /// By core, the body of its instance, and when that finishes if nothing intervenes.
+    /// By core, the body of its instance, and the finish time if nothing intervenes.
     running: Box<[Option<(u64, B)>]>,
 }
 
@@ -453,10 +453,10 @@ struct ClusterRun<B: SubtaskBody> {
 struct VirtualInstant<'a, W> {
     now_ns: u64,
     workload: &'a mut W,
-    /// How long the instance that has begun last executes.
+    /// The execution time of the instance begun last.
     begun_ns: Result<u64, RunOutcome>,
     letters: &'a Mailboxes,
-    /// Whether there is one, for the cluster that is told next.
+    /// Whether there are letters for the cluster told next.
     has_letters: bool,
 }
 
@@ -476,7 +476,7 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
 
     fn start(&mut self, _: CoreId, body: &mut B, _: u64) -> u64 {
         let execution_ns = self.workload.execute(body, self.now_ns);
-        // Nothing can be returned from here; the loop looks at it when the step is over.
+        // No error can be returned from here; the loop checks `begun_ns` when the step is over.
         self.begun_ns = execution_ns.ok_or(RunOutcome::Stopped);
         self.now_ns
     }
@@ -509,7 +509,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         running.map(|(finish_ns, _)| *finish_ns).min()
     }
 
-    /// Takes what finishes by now from the first core that has such a thing.
+    /// Takes an instance finishing by now from the first core with such an instance.
     fn take_finished(&mut self, now_ns: u64) -> Option<(CoreId, B)> {
         let mut cores = (0..).map(CoreId).zip(&mut self.running);
         cores.find_map(|(core, running)| {
@@ -528,7 +528,8 @@ impl<B: SubtaskBody> ClusterRun<B> {
         self.engine.tell((now.now_ns, here), now, change);
     }
 
-    /// Completes what has finished on a core, and reports whether that is all of the instant.
+    /// Completes the finished instance of a core, and reports whether its completion is the whole
+    /// instant.
     fn complete(
         &mut self,
         core: CoreId,
@@ -561,7 +562,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         Ok(true)
     }
 
-    /// Ends what has failed on a core.
+    /// Ends the failed instance of a core.
     fn fail(&mut self, core: CoreId, body: B, now: &mut VirtualInstant<'_, impl Workload<B>>) {
         let instance = body.subject().instance();
         if let Some(vertex) = self.engine.placement.lose(core.index()) {
@@ -571,7 +572,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         }
     }
 
-    /// Ends the instant, and has its cores follow.
+    /// Ends the instant, and makes its cores carry out the decisions.
     fn decide(&mut self, now: &mut VirtualInstant<'_, impl Workload<B>>) -> Result<(), RunOutcome> {
         let now_ns = now.now_ns;
         self.engine.decide(now_ns, now);
@@ -590,7 +591,7 @@ impl<B: SubtaskBody> ClusterRun<B> {
         Ok(())
     }
 
-    /// Has a core without an instance begin or continue what it should.
+    /// Makes a core without an instance begin or continue its next instance.
     fn go_on(
         &mut self,
         core: CoreId,

@@ -1,36 +1,33 @@
-//! The instances that wait for a core, in the order of their keys (R5).
+//! The instances waiting for a core, in the order of their keys (R5).
 //!
 //! # Ranks, or a heap
 //!
-//! If the policy adds no release, the order of all instances that can ever wait together
-//! is mostly known at commit: then each subtask has a *rank*, and the queue is a
-//! set of bits, which costs the same however many wait; up to 64 subtasks are bits of
-//! one word, which is at hand without any call. That holds unless two
-//! subtasks of one DAG share a number and jobs of that DAG overlap, because
-//! then the job comes before the subtask. In that case the queue is a heap. If the policy
-//! adds the release it is a heap of jobs or, where subtasks of one DAG have different numbers, of
-//! instances.
+//! If the policy adds no release, the order of all instances that can ever wait together is mostly
+//! known at commit. Then each subtask has a *rank*, and the queue is a set of bits, with the same
+//! cost however many wait. Up to 64 subtasks are bits of a single word, at hand without any call.
+//! The exception: if two subtasks of one DAG share a number and jobs of that DAG overlap, the job
+//! comes before the subtask, and the queue is a heap. If the policy adds the release, the queue is
+//! a heap of jobs or, where subtasks of one DAG have different numbers, of instances.
 //!
 //! # Alone
 //!
-//! Often a released instance is the only one in line and starts at once. So an instance that comes
-//! into an empty queue is kept outside of the order: it passes through without being sorted in, and
-//! joins the others when a second one comes.
+//! Often a released instance is the only instance in line and starts at once. So an instance
+//! entering an empty queue is kept outside of the order: it passes through without being sorted in,
+//! and joins the others when a second instance comes.
 //!
-//! # The heap of items that are known by index
+//! # The heap of items with an index
 //!
-//! The items are `0..capacity`, each in the heap at most once, so that an item
-//! can be found and removed, or get another key, in logarithmic time (Williams,
-//! Communications of the ACM 7, 1964, with a table of positions next to it). Each entry
-//! has four below it, which makes the way half as long as with two, and an entry that
-//! moves is written once, where it ends (LaMarca and Ladner, Journal of Experimental
-//! Algorithmics 1, 1996). All memory is taken when the heap is made.
+//! The items are `0..capacity`, each in the heap at most once, so an item can be found and removed,
+//! or get another key, in logarithmic time (Williams, Communications of the ACM 7, 1964, with a
+//! table of positions next to the heap). Each entry has four below it, which makes paths half as
+//! long as with two, and a moving entry is written once, at its final place (LaMarca and Ladner,
+//! Journal of Experimental Algorithmics 1, 1996). All memory is allocated when the heap is made.
 //!
 //! # The heap of jobs
 //!
-//! Where all instances of a job have the same sum, as under EDF with one deadline, it is jobs that
-//! are put in order, by a heap, and each has a set of bits for its subtasks: a job with a
-//! hundred ready subtasks is one entry of the heap, not a hundred.
+//! Where all instances of a job have the same sum, as under EDF with one deadline, the heap orders
+//! jobs, and each job has a set of bits for its subtasks: a job with a hundred ready subtasks is
+//! one entry of the heap, not a hundred.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -45,20 +42,21 @@ use crate::order::{sorted, sorted_by_key};
 use crate::policies::Policy;
 use crate::task_set::{Dag, TaskSet};
 
-/// The instances in line. At most one of a vertex waits at a time.
+/// The instances in line. At most one instance of a vertex waits at a time.
 #[derive(Clone, Debug, Hash)]
 pub(super) struct ReadyQueue {
-    /// How many are in line.
+    /// The number of instances in line.
     count: u32,
-    /// The key of the only one, if it came into an empty queue, or none.
+    /// The key of the only instance, if it entered an empty queue; otherwise no key.
     alone: DispatchKey,
     order: KeyOrder,
-    /// Under `Sum` the policy's number of each vertex, else nothing.
+    /// The policy's number of each vertex under `Sum`, otherwise empty.
     numbers_ns: Box<[u64]>,
     line: OrderedLine,
 }
 
-/// `repr(u8)`, so that testing for the first variant takes one comparison.
+/// The ordered part of the line. `repr(u8)`, so that testing for the first variant takes one
+/// comparison.
 #[derive(Clone, Debug, Hash)]
 #[repr(u8)]
 enum OrderedLine {
@@ -74,14 +72,14 @@ enum OrderedLine {
         /// The vertex of each rank.
         vertices: Box<[u32]>,
     },
-    /// For keys that begin with what all of a job have.
+    /// For keys beginning with a part common to all instances of a job.
     OfJobs(JobHeap),
     /// For any keys, by vertex.
     Keyed(IndexedHeap<DispatchKey>),
 }
 
 impl ReadyQueue {
-    /// Makes the queue for a set and a policy; gives vertices their ranks.
+    /// Makes the queue for a set and a policy, and gives vertices their ranks.
     #[inline]
     pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut VertexTable) -> Self {
         let numbers = task_set.dags().iter().map(|dag| policy.numbers(dag));
@@ -93,7 +91,7 @@ impl ReadyQueue {
                 let jobs = JobHeap::new(task_set);
                 return Self::of(KeyOrder::Release, OrderedLine::OfJobs(jobs));
             }
-            // Of two jobs of a DAG with the same sum the older one has the larger number.
+            // Of two jobs of a DAG with the same sum, the older has the larger number.
             let of_dag = |dag: DagId, number: u64| u128::from(dag.0) << 64 | u128::from(!number);
             let keys = (0..).zip(&of_vertices);
             let keys = keys.map(|(vertex, number)| of_dag(vertices.get(vertex).dag, *number));
@@ -104,17 +102,17 @@ impl ReadyQueue {
             };
         }
         let keys: Vec<u128> = of_vertices.into_iter().map(u128::from).collect();
-        // Then no key needs its job: the whole order is known at the commit.
+        // No key needs its job: the whole order is known at the commit.
         if dags.all(|(dag, numbers)| has_ranks(dag, numbers)) {
             let order = rank(&keys, vertices, KeyOrder::Rank);
             return Self::of(KeyOrder::Rank, ranked(&order));
         }
-        // The rank stands for (number, DAG), so that the job's number can follow it in the key.
+        // The rank represents (number, DAG), so that the job's number can follow it in the key.
         rank(&keys, vertices, KeyOrder::Job);
         Self::of(KeyOrder::Job, keyed(vertices.len()))
     }
 
-    /// Makes a queue that nothing comes into.
+    /// Makes a queue for no instances.
     pub(super) fn without_room() -> Self {
         Self::of(KeyOrder::Job, keyed(0))
     }
@@ -130,7 +128,7 @@ impl ReadyQueue {
         }
     }
 
-    /// Returns the key of a vertex's next instance, which is of the job that `job` finds.
+    /// Returns the key of a vertex's next instance. The closure `job` finds the instance's job.
     #[inline]
     pub(super) fn key<'j>(
         &self,
@@ -138,7 +136,7 @@ impl ReadyQueue {
         vertex: &Vertex,
         job: impl FnOnce() -> &'j Job,
     ) -> DispatchKey {
-        // The usual one is told apart by one comparison, and the next one by another.
+        // The usual order is recognized by one comparison, the next by a second.
         if self.order == KeyOrder::Rank {
             return DispatchKey::of_rank(vertex.rank, number);
         }
@@ -149,7 +147,7 @@ impl ReadyQueue {
         self.rare_key(number, vertex, job)
     }
 
-    /// Apart, so that no other key pays for it.
+    /// Out of line, so that no other key pays for it.
     #[inline(never)]
     fn rare_key(&self, number: u32, vertex: &Vertex, job: &Job) -> DispatchKey {
         match self.order {
@@ -161,7 +159,7 @@ impl ReadyQueue {
         }
     }
 
-    /// Reports whether none waits.
+    /// Reports whether the queue is empty.
     #[inline]
     pub(super) const fn is_empty(&self) -> bool {
         self.count == 0
@@ -204,7 +202,7 @@ impl ReadyQueue {
         }
     }
 
-    /// Takes an instance out, which waits.
+    /// Takes a waiting instance out.
     #[inline]
     pub(super) fn remove(&mut self, key: DispatchKey) {
         self.count -= 1;
@@ -216,7 +214,7 @@ impl ReadyQueue {
 }
 
 impl OrderedLine {
-    /// Returns the smallest key, of which there is one.
+    /// Returns the smallest key. The line is not empty.
     #[cold]
     #[inline]
     fn peek(&self) -> DispatchKey {
@@ -239,7 +237,8 @@ impl OrderedLine {
         }
     }
 
-    // `cold`: a call, which leaves the caller its registers, but compiled as the caller is.
+    // `cold` makes this a call, which leaves the caller its registers, but compiled with the
+    // caller's optimization.
     #[cold]
     #[inline]
     fn insert_beyond_a_word(&mut self, key: DispatchKey) {
@@ -259,13 +258,13 @@ impl OrderedLine {
         }
     }
 
-    /// Takes the instance with the smallest key out, of which there is one.
+    /// Takes the instance with the smallest key out. The line is not empty.
     #[inline(always)]
     fn pop(&mut self) -> DispatchKey {
         match self {
             Self::Word { ranks, vertices } => {
                 let rank = ranks.trailing_zeros();
-                // Clears the lowest bit that is set, which is the first in line.
+                // Clears the lowest set bit, the first in line.
                 *ranks &= ranks.wrapping_sub(1);
                 DispatchKey::of_rank(rank, vertices[rank as usize])
             }
@@ -329,14 +328,14 @@ fn keyed(vertices: usize) -> OrderedLine {
     OrderedLine::Keyed(IndexedHeap::new(vertices))
 }
 
-/// Reports whether the subtasks of a DAG, as far as they wait together, are in
-/// the same order whatever jobs they do.
+/// Reports whether the subtasks of a DAG, as far as they wait together, are in the same order
+/// whatever jobs they do.
 fn has_ranks(dag: &Dag, numbers: &[u64]) -> bool {
     dag.in_flight() == 1 || (sorted(numbers).windows(2)).all(|pair| pair[0] != pair[1])
 }
 
-/// Gives each vertex its place in the order of (key, DAG, subtask), or of (key, DAG) if something
-/// of the job comes next; returns the vertices in that order.
+/// Gives each vertex its place in the order of (key, DAG, subtask), or of (key, DAG) if a part of
+/// the job comes next. Returns the vertices in that order.
 fn rank(keys: &[u128], vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
     // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
     let order = sorted_by_key(keys.len(), |vertex| keys[vertex]);
@@ -356,7 +355,7 @@ fn rank(keys: &[u128], vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
     order
 }
 
-/// How many entries stand below each.
+/// The number of entries below each entry.
 const BELOW: usize = 4;
 
 /// The position of an item that is not in the heap.
@@ -366,12 +365,12 @@ const ABSENT: usize = usize::MAX;
 #[derive(Debug, Hash)]
 pub(super) struct IndexedHeap<K> {
     entries: Vec<(K, usize)>,
-    /// Where in `entries` each item is.
+    /// By item, its position in `entries`.
     positions: Box<[usize]>,
 }
 
 impl<K: Copy> Clone for IndexedHeap<K> {
-    /// Takes the same room: the copy of a `Vec` has none but for what is in it.
+    /// Takes the same room: a cloned `Vec` has capacity only for its elements.
     fn clone(&self) -> Self {
         let mut entries = Vec::with_capacity(self.positions.len());
         entries.extend_from_slice(&self.entries);
@@ -398,7 +397,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         self.entries.first().copied()
     }
 
-    /// Returns the key of an item, if it is in.
+    /// Returns the key of an item, if the item is in the heap.
     pub(super) fn key_of(&self, item: usize) -> Option<K> {
         self.entries.get(self.positions[item]).map(|(key, _)| *key)
     }
@@ -409,7 +408,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         let position = self.positions[item];
         let entry = (key, item);
         match self.entries.get(position) {
-            // `ABSENT` is no position, so an item that is not in the heap is found here.
+            // `ABSENT` is no position, so an item outside the heap ends up here.
             None => {
                 self.entries.push(entry);
                 self.rise(self.entries.len() - 1, entry);
@@ -427,7 +426,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         Some((key, item))
     }
 
-    /// Takes an item out, if it is in.
+    /// Takes an item out, if it is in the heap.
     #[inline]
     pub(super) fn remove(&mut self, item: usize) {
         let position = self.positions[item];
@@ -439,8 +438,8 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         let Some(last) = self.entries.pop() else {
             return;
         };
-        // The last entry fills the gap; it may belong above or below. If it was the gap itself,
-        // nothing is left to do.
+        // The last entry fills the gap, and may belong above or below. If the last entry was the
+        // gap itself, nothing is left to do.
         if let Some((removed, _)) = self.entries.get(position) {
             match *removed < last.0 {
                 true => self.sink(position, last),
@@ -449,12 +448,12 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         }
     }
 
-    /// Puts an entry where `position` is, or above.
+    /// Puts an entry at `position`, or above.
     #[inline]
     fn rise(&mut self, mut position: usize, entry: (K, usize)) {
         while position > 0 {
             let above = (position - 1) / BELOW;
-            // Of equal keys the upper one stays: an exchange would only cost writes.
+            // Of equal keys the upper entry stays: an exchange would only cost writes.
             if self.entries[above].0 <= entry.0 {
                 break;
             }
@@ -464,7 +463,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         self.put(position, entry);
     }
 
-    /// Puts an entry where `position` is, or below; at once if nothing is below.
+    /// Puts an entry at `position`, or below; at once if nothing is below.
     #[inline]
     fn sink_if_above(&mut self, position: usize, entry: (K, usize)) {
         // A leaf with a larger key stays a leaf.
@@ -475,7 +474,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         }
     }
 
-    /// Puts an entry where `position` is, or below.
+    /// Puts an entry at `position`, or below.
     #[inline]
     fn sink(&mut self, mut position: usize, entry: (K, usize)) {
         while let first = BELOW * position + 1
@@ -496,11 +495,11 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 }
 
-/// Returns the smallest of the first [`BELOW`] entries, the first of equal ones, and where it is.
+/// Returns the smallest of the first [`BELOW`] entries, the first of equal entries, and its place.
 #[inline]
 fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
     if let Some((four, _)) = entries.split_first_chunk::<BELOW>() {
-        // Which one it is cannot be foretold: places are calculated, and no jump depends on it.
+        // The smallest is unpredictable: places are calculated, without a conditional jump.
         let one = usize::from(four[1].0 < four[0].0);
         let other = 2 + usize::from(four[3].0 < four[2].0);
         let place = match four[other].0 < four[one].0 {
@@ -519,12 +518,12 @@ fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
     Some(least)
 }
 
-/// Instances by what all of a job have, then by the slot of the job, then by vertex.
+/// Instances by the part common to their job, then by the slot of the job, then by vertex.
 #[derive(Clone, Debug, Hash)]
 struct JobHeap {
-    /// The part before the vertex in the keys of the jobs that have ready instances, by slot.
+    /// By slot, the part before the vertex in the keys of each job with ready instances.
     jobs: IndexedHeap<u128>,
-    /// By slot.
+    /// The ready instances by slot.
     lines: Box<[JobQueue]>,
 }
 
@@ -533,7 +532,7 @@ struct JobHeap {
 struct JobQueue {
     /// The first vertex of its DAG.
     first: u32,
-    /// The ready ones, counted from there.
+    /// The ready subtasks, counted from `first`.
     subtasks: BitSet,
 }
 

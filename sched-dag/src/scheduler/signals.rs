@@ -1,28 +1,25 @@
 //! Sporadic DAGs: released by signals, never faster than stated.
 //!
-//! Words: a *signal* is an event that wants one job of a sporadic DAG. The DAG's
-//! *minimum inter-arrival time* T is its period in the model. The rules, whose
-//! scenarios in `tests/scenarios/sharing.txt` bear their numbers:
+//! Words: a *signal* is an event asking for one job of a sporadic DAG. The DAG's *minimum
+//! inter-arrival time* T is its period in the model. The scenarios of the rules, in
+//! `tests/scenarios/sharing.txt`, bear their numbers:
 //!
-//! - **S1, release.** A signal at time a lets the next job k be due at its
-//!   nominal release time r(k) = max(a, r(k-1) + T), job 0 at max(a, O). A signal
-//!   that comes early is thereby delayed. Releases are never less than T apart,
-//!   whatever sends the signals.
-//! - **S2, one is kept.** While a signal's job is not yet due, or is due and
-//!   waits for an older job to end, further signals are *dropped*, and counted.
-//!   So a burst of signals costs two jobs, and constant memory.
-//! - **S3, from there on as ever.** The deadline is r(k) + D; overrun policy,
-//!   keys, joins and misses are those of a periodic job. A signal at the instant
-//!   of a completion may release at that instant: signals come after completions
-//!   and before releases.
-//! - **S4, the end.** Signals beyond the limit of jobs, and to an ended DAG, are
-//!   dropped. A sporadic DAG without limit is over whenever it has nothing in
-//!   flight and no signal is kept: it keeps no run going.
+//! - **S1, release.** A signal at time a makes the next job k due at its nominal release time
+//!   r(k) = max(a, r(k-1) + T), job 0 at max(a, O). So a signal that comes early is delayed.
+//!   Releases are never less than T apart, whatever sends the signals.
+//! - **S2, one is kept.** While a signal's job is not yet due, or is due and waits for an older job
+//!   to end, further signals are *dropped*, and counted. So a burst of signals costs two jobs, and
+//!   constant memory.
+//! - **S3, from there on as ever.** The deadline is r(k) + D; overrun policy, keys, joins and
+//!   misses are as for a periodic job. A signal at the instant of a completion may release at that
+//!   instant: signals come after completions and before releases.
+//! - **S4, the end.** Signals beyond the limit of jobs, and to an ended DAG, are dropped. A
+//!   sporadic DAG without limit is over whenever nothing of it is in flight and no signal is kept:
+//!   it keeps no run going.
 //!
-//! For the analysis a sporadic DAG is one with period T. All tests there hold for
-//! every pattern of releases at least T apart: the sporadic one is the model of
-//! the papers that they come from. A response time counts from r(k), not from the
-//! signal, which may have come up to T before.
+//! For the analysis a sporadic DAG is a DAG with period T. All its tests hold for every pattern of
+//! releases at least T apart: the papers behind the tests use the sporadic model. A response time
+//! counts from r(k), not from the signal, which may have come up to T before.
 
 use super::Scheduler;
 use crate::ids::DagId;
@@ -37,13 +34,13 @@ impl Scheduler {
             "a signal to dag {}, which is periodic; signal sporadic DAGs only",
             dag.0
         );
-        // A driver that comes late: what was due before this signal is not kept any more.
+        // A late driver: a job due before this signal no longer keeps an earlier signal.
         if self.dags[dag.index()].jobs.is_overdue(self.log.now_ns) {
             self.serve(dag);
         }
         let model = self.task_set.dag(dag);
         let state = &mut self.dags[dag.index()];
-        // Asked before the signal is taken, which may make this job due.
+        // Read before the signal is taken, because taking it may make this job due.
         let job = state.jobs.signal_job();
         let release_ns = state.jobs.signal(model, self.log.now_ns);
         state.statistics.signals += 1;

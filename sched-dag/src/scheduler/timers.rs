@@ -1,18 +1,18 @@
-//! When something happens without a completion: to each DAG a release or a deadline, to each wait
-//! its limit, and the next telling of skips.
+//! The times of events without a completion: for each DAG a release or a deadline, for each wait
+//! its limit, and the next report of skips.
 //!
 //! # Release classes
 //!
 //! DAGs of one period and offset have their releases at the same instants. Many such DAGs form a
-//! *release class*, whose members stand in *lanes*: in two of them by their next release, of an
-//! even job or an odd job, and in the third by the deadline of the job in flight. The order in a
-//! lane, by DAG or by relative deadline, is known at the commit. So a lane is a set of bits, and
-//! has a single timer in the heap, for its first member. A release moves a bit from lane to lane,
-//! and so does the end of the job, however many members there are.
+//! *release class*, whose members are in *lanes*: in two of them by their next release, of an even
+//! job or an odd job, and in the third by the deadline of the job in flight. The order in a lane,
+//! by DAG or by relative deadline, is known at the commit. So a lane is a set of bits, and has a
+//! single timer in the heap, for its first member. A release moves a bit from lane to lane, and so
+//! does the end of the job, however many members there are.
 //!
 //! All members of a lane count from the same release. A DAG with another event, as after an
-//! overrun, is in the heap by itself, as DAGs without a class are. So each DAG has its event at the
-//! very instant that its jobs ask for. Of an instant, a lane's members come in the order of the
+//! overrun, is in the heap by itself, like DAGs without a class. So each DAG has its event at the
+//! very instant its jobs ask for. Within an instant, a lane's members come in the order of the
 //! DAGs.
 
 use alloc::boxed::Box;
@@ -43,7 +43,7 @@ const LANES: usize = TimerKind::Other as usize;
 /// The least number of members of a class: the timers of fewer cost less in the heap.
 const LEAST: usize = 16;
 
-/// Stands for no class, and for no place in a lane.
+/// The mark for no class, and for no place in a lane.
 const NONE: u32 = u32::MAX;
 
 /// A DAG as a member of its class.
@@ -166,7 +166,8 @@ impl Timers {
         }
     }
 
-    // `cold`: a call, which leaves the caller its registers, but compiled as the caller is.
+    // `cold` makes this a call, which leaves the caller its registers, but compiled with the
+    // caller's optimization.
     #[cold]
     #[inline]
     fn set_member(&mut self, dag: usize, event: Option<(u64, TimerKind)>) {
@@ -177,7 +178,8 @@ impl Timers {
         } else {
             let (number, place) = (member.lane_of(from), member.places[from as usize]);
             let lane = &mut self.lanes[number];
-            // Mostly a deadline is not before the next release, and that stays the next event.
+            // Usually a deadline is not before the next release, so the release stays the next
+            // event.
             if let Some((event_ns, kind)) = event
                 && kind == from
                 && event_ns == lane.event_ns(place)
@@ -189,7 +191,7 @@ impl Timers {
                 let timer = self.first_lane + number;
                 match lane.first {
                     NONE => self.heap.remove(timer),
-                    // All releases of a lane are at one time.
+                    // All releases of a lane are at the same time.
                     first if from == TimerKind::Deadline => {
                         self.heap.set(timer, lane.event_ns(first))
                     }
@@ -239,7 +241,7 @@ impl ReleaseLane {
         self.release_ns + self.order[place as usize].0
     }
 
-    /// Takes the member at a place out, and reports whether that was the first.
+    /// Takes the member at a place out, and reports whether it was the first.
     #[inline(always)]
     fn leave(&mut self, place: u32) -> bool {
         self.waiting.remove(place as usize);
@@ -253,8 +255,8 @@ impl ReleaseLane {
         was_first
     }
 
-    /// Adds the member at a place, and reports whether that is the first; `None`, and nothing is
-    /// changed, if the others count from another release.
+    /// Adds the member at a place, and reports whether it is the first now. Returns `None`, with
+    /// nothing changed, if the other members count from another release.
     #[inline(always)]
     fn join(&mut self, place: u32, event_ns: u64) -> Option<bool> {
         let release_ns = event_ns - self.order[place as usize].0;
