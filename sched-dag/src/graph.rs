@@ -1,7 +1,7 @@
 //! The precedence graph of one DAG in a form that is quick to walk.
 //!
-//! Everything here is linear in subtasks and edges, and nothing recurs: a
-//! chain of many thousand subtasks shall not need a deep stack.
+//! Everything here is linear in subtasks and edges, and nothing recurs: a chain of many thousand
+//! subtasks shall not need a deep stack.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -18,23 +18,23 @@ pub(crate) struct AdjacencyList {
     pub(crate) neighbours: Box<[SubtaskId]>,
 }
 
-/// Both directions of a DAG's edges, and what follows from them.
+/// Both directions of a DAG's edges, and the properties derived from them.
 #[derive(Clone, Debug)]
 pub(crate) struct Graph {
-    /// Each once, ascending.
+    /// The predecessors of each subtask, each once, ascending.
     pub(crate) predecessors: AdjacencyList,
-    /// Each once, ascending.
+    /// The successors of each subtask, each once, ascending.
     pub(crate) successors: AdjacencyList,
     /// The subtasks without predecessor, ascending.
     pub(crate) sources: Box<[SubtaskId]>,
     /// The subtasks without successor, ascending.
     pub(crate) sinks: Box<[SubtaskId]>,
-    /// All subtasks that are neither in a cycle nor after one, each after its predecessors.
+    /// All subtasks neither in a cycle nor after a cycle, each after its predecessors.
     pub(crate) topological_order: Box<[SubtaskId]>,
 }
 
 impl AdjacencyList {
-    /// Lists for each subtask the other ends of its edges in the order of these, which may be
+    /// Lists for each subtask the other ends of its edges, in the order of the edges, which may be
     /// stated in the other direction: a counting sort.
     fn new(count: usize, edges: &[(u32, u32)], is_reversed: bool) -> Self {
         let orient = |&(from, to): &(u32, u32)| match is_reversed {
@@ -64,7 +64,7 @@ impl AdjacencyList {
         &self.neighbours[self.range(subtask.index())]
     }
 
-    /// Returns where the neighbours of a subtask stand.
+    /// Returns the range of a subtask's neighbours.
     pub(crate) fn range(&self, subtask: usize) -> Range<usize> {
         self.starts[subtask] as usize..self.starts[subtask + 1] as usize
     }
@@ -89,8 +89,7 @@ impl AdjacencyList {
 impl Graph {
     /// Makes the graph of `count` subtasks from edges in range, which may repeat.
     pub(crate) fn new(count: usize, edges: &[(u32, u32)]) -> Self {
-        // A radix sort by successor, then by predecessor; then repeated edges
-        // are neighbours.
+        // A radix sort by successor, then by predecessor; afterwards repeated edges are adjacent.
         let by_successor = AdjacencyList::new(count, edges, true).edges();
         let mut sorted = AdjacencyList::new(count, &by_successor, true).edges();
         sorted.dedup();
@@ -139,14 +138,14 @@ impl Graph {
         self.successors.subtasks()
     }
 
-    /// Returns for each subtask how many predecessors it has.
+    /// Returns the number of predecessors of each subtask.
     pub(crate) fn predecessor_counts(&self) -> Vec<usize> {
         let count = |subtask| self.predecessors.neighbours(subtask).len();
         self.subtasks().map(count).collect()
     }
 
-    /// Returns for each subtask the largest sum of weights along a path that begins with it.
-    /// No sum may overflow.
+    /// Returns for each subtask the largest sum of weights along a path beginning there. No sum may
+    /// overflow.
     pub(crate) fn levels<W>(&self, weights: &[W]) -> Vec<W>
     where
         W: Copy + Default + Ord + Add<Output = W>,
@@ -160,8 +159,8 @@ impl Graph {
         levels
     }
 
-    /// Returns for each subtask the number of its part, in which the edges'
-    /// directions are ignored, and how many parts there are.
+    /// Returns for each subtask the number of its connected part, ignoring the edges' directions,
+    /// and the number of parts.
     pub(crate) fn parts(&self) -> (Vec<u32>, usize) {
         const UNSEEN: u32 = u32::MAX;
         let mut part_of = vec![UNSEEN; self.len()];

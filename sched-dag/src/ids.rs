@@ -1,7 +1,7 @@
-//! Names of things by index: DAGs, subtasks, instances and cores.
+//! Ids by index: DAGs, subtasks, instances and cores.
 //!
-//! Every id is an index into a table that was sized at commit, so looking one
-//! up is one bounds-checked access. Ids follow the order of registration.
+//! Every id is an index into a table with a size fixed at commit, so a lookup is one bounds-checked
+//! access. Ids follow the order of registration.
 
 use core::fmt;
 
@@ -24,21 +24,21 @@ macro_rules! ids {
 }
 
 ids! {
-    /// A DAG task, by its position among the DAGs of one commit.
+    /// A DAG task, by position among the DAGs of one commit.
     DagId;
-    /// A subtask, by its position among the subtasks of its DAG.
+    /// A subtask, by position among the subtasks of its DAG.
     SubtaskId;
-    /// A subtask, by its position among the subtasks of all DAGs of one commit.
+    /// A subtask, by position among the subtasks of all DAGs of one commit.
     Vertex;
-    /// A processor, by its position among the processors that the scheduler serves.
+    /// A processor, by position among the processors of the scheduler.
     CoreId;
-    /// A cluster of cores, by its position among those of one commit.
+    /// A cluster of cores, by position among the clusters of one commit.
     ClusterId;
-    /// A mode, by its position among those of one commit.
+    /// A mode, by position among the modes of one commit.
     ModeId;
 }
 
-/// One execution of a subtask: the part of job `job` that `subtask` does.
+/// One execution of a subtask: the part of job `job` done by `subtask`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instance {
     /// The DAG task.
@@ -63,7 +63,7 @@ impl fmt::Display for Instance {
     }
 }
 
-/// Writes something by its name, as in "dag `lidar`", or as in "dag 3" if it has none.
+/// Writes an object by its name, as in "dag `lidar`", or as in "dag 3" without a name.
 pub(crate) fn named<'n>(kind: &'n str, number: u32, name: &'n str) -> impl fmt::Display + 'n {
     fmt::from_fn(move |f| match name {
         "" => write!(f, "{kind} {number}"),
@@ -75,7 +75,7 @@ pub(crate) fn named<'n>(kind: &'n str, number: u32, name: &'n str) -> impl fmt::
 ///
 /// # Panics
 ///
-/// If it does not fit, which the verification has excluded before.
+/// If the index does not fit. The verification has excluded such an index before.
 pub(crate) fn to_u32(index: usize) -> u32 {
     u32::try_from(index).expect("counts are verified to fit 32 bits")
 }

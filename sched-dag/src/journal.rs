@@ -1,49 +1,47 @@
-//! The journal: what happened in a run, each moment written down once.
+//! The journal: the events of a run, each recorded once.
 //!
-//! A driver writes an [`Event`] at each moment: the kernel with its cores' clocks,
-//! virtual time and host threads with the scheduler's. All that is said of a run
-//! later is computed from these events: the times of jobs and instances, breaches of
-//! the rules and statistics by [`law`](crate::law), the lines of a trace, what a
-//! viewer draws.
+//! A driver writes an [`Event`] at each moment: the kernel with its cores' clocks, virtual time and
+//! host threads with the scheduler's time. All later statements about a run are computed from these
+//! events: the times of jobs and instances, breaches of the rules and statistics by
+//! [`law`](crate::law), the lines of a trace, the drawings of a viewer.
 //!
-//! [`EventKind`] is the only list of words. Here they are printed and read, and here an
-//! event is packed into three [words](Event::words) of 64 bits and unpacked.
+//! [`EventKind`] is the only list of event words. This module prints and reads them, and packs an
+//! event into three [words](Event::words) of 64 bits and unpacks it.
 //!
 //! # Order
 //!
-//! Events stand in the order in which the scheduler learnt of them: of the events of
-//! one instance, one job and one core each comes after all that it follows from. Their
-//! times need not ascend: on a machine a function returns before the scheduler hears
-//! of it, and another core may come between.
+//! Events are in the order in which the scheduler learnt of them: among the events of one instant,
+//! one job and one core, each event comes after all its causes. Their times need not ascend: on a
+//! machine a function returns before the scheduler hears of it, and another core may come between.
 
 use core::fmt;
 use core::str::FromStr;
 
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 
-/// Something that happened.
+/// An event of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
-    /// When, in nanoseconds from the run's epoch.
+    /// The time, in nanoseconds from the run's epoch.
     pub time_ns: u64,
-    /// The kind of it.
+    /// The kind of event.
     pub what: EventKind,
-    /// The core that it happened on, or that made the scheduler's step; of a
+    /// The core of the event, or the core that made the scheduler's step; for a
     /// [`Request`](EventKind::Request) the core that shall switch.
     pub core: CoreId,
     /// The DAG.
     pub dag: DagId,
     /// The job.
     pub job: u64,
-    /// The subtask; `None` if it happened to a whole job.
+    /// The subtask; `None` for an event of a whole job.
     pub subtask: Option<SubtaskId>,
 }
 
 /// The subject of an event, packed: an instance or a whole job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EventSubject {
-    /// The DAG in bits 44 to 63, the subtask in bits 24 to 43: at most 2^20 instances
-    /// may be in flight, so at most so many DAGs and subtasks there are.
+    /// The DAG in bits 44 to 63, the subtask in bits 24 to 43. At most 2^20 instances may be in
+    /// flight, so the numbers of DAGs and subtasks fit.
     pub ids: u64,
     /// The job.
     pub job: u64,
@@ -82,7 +80,7 @@ impl EventSubject {
 }
 
 impl Event {
-    /// Returns the words of something that happened: time, job, and the rest.
+    /// Returns the words of an event: time, job, and the rest.
     #[inline]
     pub const fn words(
         time_ns: u64,
@@ -94,7 +92,7 @@ impl Event {
         [time_ns, subject.job, rest]
     }
 
-    /// Returns the words of an event whose core counts from another one, modulo 2^16.
+    /// Returns the words of an event with its core counted from core `first`, modulo 2^16.
     #[allow(clippy::cast_possible_truncation, reason = "a part of a word is meant")]
     pub(crate) const fn on_core_from([time_ns, job, rest]: [u64; 3], first: u32) -> [u64; 3] {
         let core = ((rest >> CORE) as u16).wrapping_add(first as u16);
@@ -102,7 +100,7 @@ impl Event {
         [time_ns, job, others | (core as u64) << CORE]
     }
 
-    /// Unpacks an event, `None` if the words are of none.
+    /// Unpacks an event. Returns `None` if the words are not an event.
     #[allow(clippy::cast_possible_truncation, reason = "parts of a word are meant")]
     pub fn unpack([time_ns, job, rest]: [u64; 3]) -> Option<Self> {
         let what = EventKind::from_number(rest as u8)?;
@@ -117,14 +115,14 @@ impl Event {
         })
     }
 
-    /// Returns the instance, if it happened to one.
+    /// Returns the instance of the event, if it has one.
     pub fn instance(&self) -> Option<Instance> {
         let Self { dag, job, .. } = *self;
         self.subtask.map(|subtask| Instance { dag, job, subtask })
     }
 }
 
-/// To what an event happens.
+/// The kind of object an event happens to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum EventTarget {
     /// A job as a whole.
@@ -137,7 +135,7 @@ enum EventTarget {
     Core,
 }
 
-/// Makes the vocabulary of its table: to add an event is to add a row.
+/// Makes the vocabulary from its table: adding an event means adding a row.
 macro_rules! events {
     ($($(#[$doc:meta])+ $name:ident = $word:literal, $object:ident;)+) => {
         /// The kind of an event. Printed, and read, as its name in lower case.
@@ -154,7 +152,7 @@ macro_rules! events {
             $($(#[$doc])+ $name,)+
         }
 
-        /// All of it, by number: the word, and to what it happens.
+        /// All kinds, by number: each kind's word and object.
         const EVENTS: &[(EventKind, &str, EventTarget)] = &[$((EventKind::$name, $word, EventTarget::$object),)+];
     };
 }
@@ -172,11 +170,11 @@ events! {
     Missed = "missed", Job;
     /// No instance of a job is left.
     Completed = "completed", Job;
-    /// All that an instance waits for has happened.
+    /// An instance waits for nothing any more but a core.
     Ready = "ready", Instance;
     /// An instance will not run.
     Cancelled = "cancelled", Instance;
-    /// A core shall run the instance instead of what it runs.
+    /// A core shall run the instance instead of its present instance.
     Request = "request", Instance;
     /// The instance's function is called.
     Start = "start", Core;
@@ -188,28 +186,28 @@ events! {
     Finish = "finish", Core;
     /// The instance was ended by a fault.
     Ended = "ended", Core;
-    /// A signal came, which lets a sporadic DAG's job be due.
+    /// A signal came and makes a sporadic DAG's job due.
     Signalled = "signalled", Job;
-    /// A signal came while one was kept for the job, or no job was left.
+    /// A signal came while another was kept for the job, or no job was left.
     Dropped = "dropped", Job;
-    /// A sporadic DAG's job that is being released was due: the event's time is the
-    /// nominal release, which no grid tells.
+    /// A sporadic DAG's job that is being released was due: the event's time is the nominal
+    /// release, which no grid tells.
     Due = "due", Job;
-    /// A DAG starts no further instance, because of a fault or an end request. The event's job
-    /// is 0 and means nothing.
+    /// A DAG starts no further instance, because of a fault or an end request. The event's job is 0
+    /// and means nothing.
     DagEnded = "dag_ended", Dag;
-    /// The instance was ended by a fault, which has cut its job, and its subtask goes on
-    /// with another function.
+    /// A fault has ended the instance and cut its job, and its subtask goes on with another
+    /// function.
     Restarted = "restarted", Instance;
-    /// A DAG is paused: it releases no job from now on. As with the two that follow, the
-    /// event's job is 0 and means nothing.
+    /// A DAG is paused: it releases no job from now on. As with the next two kinds, the event's job
+    /// is 0 and means nothing.
     Off = "off", Dag;
-    /// A DAG is resumed: what is due from now on is released.
+    /// A DAG is resumed: jobs due from now on are released.
     On = "on", Dag;
     /// A DAG is closed: it releases no further job.
     Closed = "closed", Dag;
-    /// The run enters a mode, whose number stands where the job's does. The event's DAG is 0
-    /// and means nothing.
+    /// The run enters a mode, whose number is in the place of the job. The event's DAG is 0 and
+    /// means nothing.
     Entered = "entered", Dag;
     /// The instance gives its core up and begins a wait.
     Wait = "wait", Core;
@@ -217,7 +215,7 @@ events! {
     Wake = "wake", Instance;
 }
 
-/// A text that is none of the words.
+/// A text that is not an event word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownWord;
 
@@ -232,17 +230,17 @@ impl EventKind {
         EVENTS[self as usize].1
     }
 
-    /// Reports whether it happens to a DAG as a whole, or to the run, and to no job.
+    /// Reports whether the event happens to a DAG as a whole, or to the run, and to no job.
     pub const fn is_of_dag(self) -> bool {
         matches!(EVENTS[self as usize].2, EventTarget::Dag)
     }
 
-    /// Reports whether it happens to a job or a DAG, not to an instance.
+    /// Reports whether the event happens to a job or a DAG, not to an instance.
     pub const fn is_of_job(self) -> bool {
         matches!(EVENTS[self as usize].2, EventTarget::Job | EventTarget::Dag)
     }
 
-    /// Reports whether it happens on a core, not only in the scheduler's books.
+    /// Reports whether the event happens on a core, not only in the scheduler's books.
     pub const fn is_of_machine(self) -> bool {
         matches!(EVENTS[self as usize].2, EventTarget::Core)
     }

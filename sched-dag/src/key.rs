@@ -1,4 +1,4 @@
-//! Keys by which DAGs and subtasks are looked up after the commit: a name, a number, or a handle.
+//! Keys for looking up DAGs and subtasks after the commit: a name, a number, or a handle.
 
 use crate::ids::{DagId, SubtaskId};
 use crate::nearest::nearest_of;
@@ -27,7 +27,7 @@ pub trait DagKey {
     ///
     /// # Panics
     ///
-    /// If there is no such DAG: whoever asks is wrong.
+    /// If there is no such DAG, a mistake of the caller.
     fn find_in(&self, task_set: &TaskSet) -> DagId;
 }
 
@@ -39,7 +39,7 @@ pub trait SubtaskKey {
     ///
     /// # Panics
     ///
-    /// If there is no such subtask: whoever asks is wrong.
+    /// If there is no such subtask, a mistake of the caller.
     fn find_in(&self, dag: &Dag) -> SubtaskId;
 }
 

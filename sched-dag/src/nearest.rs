@@ -1,20 +1,20 @@
 //! The nearest match to a mistyped name.
 //!
 //! *Distance* is Damerau's (10.1145/363958.363994): the fewest insertions, deletions and
-//! replacements of one character, and swaps of two neighbours, that turn one word into
-//! the other, no place being changed twice. Names that are too far away are left as
-//! soon as that is certain, so that many of them cost little.
+//! replacements of one character, and swaps of two neighbours, to turn one word into the other,
+//! with no place changed twice. The comparison with a name stops as soon as the name is certainly
+//! too far away, so many such names cost little.
 
 use core::mem;
 
-/// The longest name that is compared, in characters: the work grows with the square.
+/// The longest name compared, in characters: the work grows with the square.
 const LONGEST: usize = 200;
 
-/// The distances of a word to each beginning of another one.
+/// The distances of a word to each beginning of another word.
 type Row = [u8; LONGEST + 1];
 
-/// Returns the allowed name nearest to `word`, if one is near enough to be
-/// what was meant: at most a third of its length away, but at least 1.
+/// Returns the allowed name nearest to `word`, if near enough to be the intended name: at most a
+/// third of the word's length away, but at least 1.
 ///
 /// ```
 /// assert_eq!(sched_dag::nearest("lidra", &["camera", "lidar"]), Some("lidar"));
@@ -24,8 +24,8 @@ pub fn nearest<'n>(word: &str, allowed: &[&'n str]) -> Option<&'n str> {
     nearest_of(word, &mut allowed.iter().copied())
 }
 
-/// Works like [`nearest`] for names that come one after the other. Allocates nothing, so that a
-/// console can ask during a run.
+/// Works like [`nearest`] for names from an iterator. Allocates nothing, so that a console can ask
+/// during a run.
 ///
 /// ```
 /// let names = ["camera", "lidar"].map(String::from);
@@ -42,7 +42,7 @@ pub fn nearest_of<'n>(word: &str, allowed: &mut dyn Iterator<Item = &'n str>) ->
         .map(|(_, name)| name)
 }
 
-/// Returns the distance of two words, if it is at most `most`.
+/// Returns the distance of two words, or `None` if it exceeds `most`.
 fn distance(a: &str, b: &str, most: usize) -> Option<usize> {
     let lengths = [a, b].map(|word| word.chars().take(LONGEST + 1).count());
     if lengths[0].max(lengths[1]) > LONGEST || lengths[0].abs_diff(lengths[1]) > most {
@@ -67,7 +67,7 @@ fn distance(a: &str, b: &str, most: usize) -> Option<usize> {
             row[j] = least;
             left = Some(of_b);
         }
-        // All rows below are made of these two.
+        // All rows below are computed from these two.
         let both = row[..=lengths[1]].iter().chain(&above[..=lengths[1]]);
         if both.min().is_some_and(|&distance| distance > most) {
             return None;

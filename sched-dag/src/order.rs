@@ -1,17 +1,16 @@
-//! Sorting, once for all.
+//! Sorting, with a single copy of the code.
 //!
-//! Each type and each closure that the library's sort is called with makes another
-//! copy of it, of some 6 KiB, in an image that has 512. A commit sorts a dozen
-//! times and in no hurry; so all of them sort positions by this one function, a plain
-//! merge sort of 0.6 KB.
+//! The library's sort is compiled anew for each type and each closure, at some 6 KiB a copy, in an
+//! image of 512 KiB. A commit sorts a dozen times and in no hurry. So all callers sort positions by
+//! this one function, a plain merge sort of 0.6 KB.
 
 use alloc::vec::Vec;
 use core::cmp::Ordering;
 
-/// Sorts positions by a comparison; equal ones stay in their order.
+/// Sorts positions by a comparison; equal positions stay in their order.
 pub(crate) fn sort(positions: &mut [usize], compare: &mut dyn FnMut(usize, usize) -> Ordering) {
     let mut sorted = positions.to_vec();
-    // The length of the runs that are in order already.
+    // The length of the runs already in order.
     let mut length = 1;
     while length < positions.len() {
         let pairs = positions.chunks(2 * length);
@@ -33,13 +32,13 @@ pub(crate) fn sort(positions: &mut [usize], compare: &mut dyn FnMut(usize, usize
     }
 }
 
-/// Sorts positions by their keys, ascending; equal ones stay in their order.
+/// Sorts positions by their keys, ascending; equal keys stay in their order.
 pub(crate) fn sort_by_key<K: Ord>(positions: &mut [usize], key: impl Fn(usize) -> K) {
     sort(positions, &mut |one, other| key(one).cmp(&key(other)));
 }
 
-/// Returns the positions of a list in the order of their keys, ascending; equal
-/// ones stay in their order. An image has one sort for all that call this.
+/// Returns the positions of a list in the order of their keys, ascending; equal keys stay in their
+/// order. An image has a single sort for all callers.
 pub fn sorted_by_key<K: Ord>(count: usize, key: impl Fn(usize) -> K) -> Vec<usize> {
     let mut positions: Vec<usize> = (0..count).collect();
     sort_by_key(&mut positions, key);

@@ -1,8 +1,8 @@
-//! The changes that can be asked of a run. [`lifecycle`](crate::lifecycle) has the rules.
+//! Requests for changes of a run. [`lifecycle`](crate::lifecycle) has the rules.
 
 use crate::ids::{DagId, Instance, ModeId};
 
-/// A change that is asked of a run: by a function, with effect from its completion on, by another
+/// A requested change of a run: by a function, with effect from its completion on, by another
 /// cluster, or from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
@@ -12,27 +12,28 @@ pub enum Request {
     Pause(DagId),
     /// A paused DAG releases jobs again.
     Resume(DagId),
-    /// A DAG releases no further job, and what is in flight goes on. Asked from outside only.
+    /// A DAG releases no further job, and jobs in flight go on. Requested from outside only.
     Close(DagId),
-    /// A DAG is ended: nothing of it starts any more. Asked from outside only.
+    /// A DAG is ended: nothing of it starts any more. Requested from outside only.
     End(DagId),
     /// Another set of DAGs runs.
     Enter(ModeId, ModeEntry),
     /// The run ends: no DAG releases a further job.
     ShutDown,
-    /// The run begins. No function asks for that, but a driver, before all else.
+    /// The run begins. Not for functions: a driver makes the request, before any other.
     Begin,
-    /// Waiting requests may take effect. A driver asks for that in each step until they have,
-    /// before all else.
+    /// Waiting requests may take effect. A driver makes the request in each step until they have,
+    /// before any other.
     GoOn,
     /// A wait has its answer.
     Answer(WaitId),
-    /// Nothing but a step. An engine asks for that, lest a completion take the short way.
+    /// Nothing but a step. An engine makes the request to keep a completion from taking the short
+    /// way.
     Step,
 }
 
 impl Request {
-    /// Reports whether what it comes to is for a [`Lifecycle`](crate::lifecycle::Lifecycle) to say,
+    /// Reports whether the effect is for a [`Lifecycle`](crate::lifecycle::Lifecycle) to decide,
     /// where there is one.
     pub const fn is_of_lifecycle(self) -> bool {
         !matches!(
@@ -42,29 +43,29 @@ impl Request {
     }
 }
 
-/// A wait of an instance. No two waits of a run have the same.
+/// A wait of an instance. No two waits of a run have equal ids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WaitId {
-    /// The instance that waits.
+    /// The waiting instance.
     pub instance: Instance,
-    /// The number of the wait among those of the instance, from 0 on.
+    /// The number of the wait among the waits of the instance, from 0 on.
     pub number: u32,
 }
 
-/// The longest time that a wait takes.
+/// The limit of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WaitLimit {
     /// So many nanoseconds.
     For(u64),
-    /// Until so many nanoseconds after the release of the job; none if that is past.
+    /// Until so many nanoseconds after the release of the job; no wait if that is past.
     SinceRelease(u64),
 }
 
-/// When a mode is entered.
+/// The time at which a mode is entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModeEntry {
     /// At the instant of the request (M2).
     AtOnce,
-    /// When nothing is in flight of the DAGs that leave (M3).
+    /// When nothing of the leaving DAGs is in flight (M3).
     WhenIdle,
 }

@@ -1,8 +1,8 @@
-//! The times of a table: those of a run of its lists by WCETs.
+//! The times of a table, from a run of its lists by WCETs.
 //!
-//! Each entry starts as early as its release, its list and all that it waits for let it: passes over
-//! the lists delay starts until no start changes. If there are such times, as many passes as
-//! entries find them; else the order alone makes entries wait for each other, or work exceeds time.
+//! Each entry starts as early as the release, the list and the predecessors allow. Passes over the
+//! lists delay starts until no start changes. If valid times exist, as many passes as entries find
+//! them; otherwise the order alone makes entries wait for each other, or the work exceeds the time.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,12 +12,12 @@ use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::table::{Table, TableEntry};
 use crate::task_set::TaskSet;
 
-/// Longer than all laps: a longer entry is not told from it.
+/// A time longer than all laps, and the cap for the length of an entry.
 const LONG_NS: u64 = 1 << 60;
 
 impl TaskSet {
-    /// Returns a table with the times of a run by such WCETs. All are 0 if a WCET is not
-    /// known, or if the entries do not keep to their laps.
+    /// Returns a table with the times of a run by the given WCETs. All times are 0 if a WCET is
+    /// unknown, or if the entries do not keep to their laps.
     pub(crate) fn timed(
         &self,
         table: &Table,
@@ -30,7 +30,7 @@ impl TaskSet {
                 let known = wcet_ns(entry.dag, entry.subtask);
                 are_known &= known.is_some();
                 entry.length_ns = known.unwrap_or(0);
-                // What is released in a lap before may start at once.
+                // A job released in a lap before may start at once.
                 let dag = self.dag(entry.dag);
                 let offset_ns = if is_alone { 0 } else { dag.offset_ns() };
                 let later_ns = i128::from(entry.job) * i128::from(dag.period_ns());
@@ -54,7 +54,7 @@ impl TaskSet {
 
     /// Returns an entry without a start, and its core: entries wait for each other.
     pub(crate) fn blocked_entry(&self, table: &Table) -> Option<(u32, TableEntry)> {
-        // Each entry takes one unit of time, and a lap more than all of them.
+        // Each entry takes one unit of time, and a lap is longer than all entries together.
         let mut run = TableRun::new(self, table, table.entries().count() as u64 + 1);
         let lists = run.table.lists.iter_mut();
         for entry in lists.flat_map(|list| &mut list.entries) {
@@ -63,8 +63,8 @@ impl TaskSet {
         run.late_entry()
     }
 
-    /// Times tables anew, by WCETs with what the analysis charges each instance, unless their
-    /// times are not those of plain WCETs.
+    /// Times tables anew, by WCETs plus the analysis's charge for each instance, unless a table's
+    /// times differ from the times by plain WCETs.
     pub fn charge_tables(&mut self, settings: &AnalysisSettings) {
         let wcet_ns = |dag, subtask| self.dag(dag).subtask(subtask).locking_wcet_ns();
         let charged = |table: &Table| {
@@ -84,18 +84,18 @@ impl TaskSet {
     }
 }
 
-/// Returns the first job to be released in lap 0; the laps of a DAG alone begin with its jobs.
+/// Returns the first job to be released in lap 0; the laps of a single DAG begin with its jobs.
 pub(crate) fn first_in_lap(offset_ns: u64, period_ns: u64, is_alone: bool) -> i64 {
     match is_alone {
         true => 0,
-        // Beyond half of the numbers none of these jobs is ever released.
+        // Beyond half of the number range, none of the jobs is ever released.
         false => {
             -i64::try_from(offset_ns / period_ns).map_or(i64::MAX / 2, |of| of.min(i64::MAX / 2))
         }
     }
 }
 
-/// Returns the WCETs of an entry of a list, and of all nested entries: nothing relies on an earlier
+/// Returns the WCETs of a list's entry and of all nested entries: nothing relies on an earlier
 /// finish.
 fn length_ns(list: &[TableEntry], place: usize) -> u64 {
     let entry = &list[place];
@@ -106,7 +106,7 @@ fn length_ns(list: &[TableEntry], place: usize) -> u64 {
     })
 }
 
-/// The run of a table, with the starts that are found so far.
+/// The run of a table, with the starts found so far.
 struct TableRun<'t> {
     task_set: &'t TaskSet,
     table: Table,
@@ -135,8 +135,8 @@ impl<'t> TableRun<'t> {
         }
     }
 
-    /// Delays starts until they are settled. Returns an entry that does not start in its lap, if
-    /// there is one; one that waits for others rather than one behind it.
+    /// Delays starts until they settle. Returns an entry that does not start in its lap, if there
+    /// is one, and prefers an entry waiting for others to an entry behind it.
     fn late_entry(&mut self) -> Option<(u32, TableEntry)> {
         let mut begun = vec![Vec::new(); self.table.lists.len()];
         let mut passes = 0..=self.table.entries().count();
@@ -144,14 +144,14 @@ impl<'t> TableRun<'t> {
         let lists = self.table.lists.iter();
         let all = lists.flat_map(|list| list.entries.iter().map(|of| (list.core, *of)));
         let waits = |of: &TableEntry| self.ready_ns(of) >= of.start_ns.cast_signed();
-        // The first of the latest.
+        // The first entry with the latest start.
         let late = all.rev().max_by_key(|(_, of)| (of.start_ns, waits(of)));
         late.filter(|(_, of)| !is_settled || of.start_ns.cast_signed() >= self.lap_ns)
     }
 
-    /// Delays starts as those found before demand, and reports whether there are such; beyond its
-    /// lap it does not matter when an entry starts. Told of each list are the depths and ends of
-    /// those that have begun and not finished before the lap.
+    /// Delays starts as far as the previous starts demand, and reports whether any was delayed. A
+    /// start is capped at the end of the lap, where the exact time does not matter. `begun` holds
+    /// for each list the depths and ends of the entries begun before the lap and not finished.
     fn delay(&mut self, begun: &mut [Vec<(u32, i64)>]) -> bool {
         let mut has_delayed = false;
         for (number, begun) in begun.iter_mut().enumerate() {
@@ -179,8 +179,8 @@ impl<'t> TableRun<'t> {
         has_delayed
     }
 
-    /// Returns when all that an entry waits for has ended: its predecessors, its subtask in the job
-    /// before, and the job that leaves its own room.
+    /// Returns the end of everything an entry waits for: the predecessors, the same subtask in the
+    /// job before, and the job whose end makes room for the entry's job.
     fn ready_ns(&self, entry: &TableEntry) -> i64 {
         let dag = self.task_set.dag(entry.dag);
         let first = self.task_set.first_vertex(entry.dag) as usize;
@@ -203,7 +203,7 @@ impl<'t> TableRun<'t> {
     }
 }
 
-/// Returns the place of a job among those of a lap.
+/// Returns the place of a job among the jobs of a lap.
 fn in_lap(job: i64, jobs: i64) -> usize {
     usize::try_from(job.rem_euclid(jobs)).unwrap_or(0)
 }

@@ -1,7 +1,7 @@
 //! The topics of a verified DAG, for code that shows the graph.
 //!
-//! Scheduling needs the edges alone, which are in [`Dag`](crate::Dag). Their
-//! topics are kept here, as they were stated.
+//! Scheduling needs only the edges, which are in [`Dag`](crate::Dag). The stated topics of the
+//! edges are kept here.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -16,18 +16,18 @@ use crate::spec::DagSpec;
 pub struct Topic {
     /// The name.
     pub name: String,
-    /// The name of the message's type, as the compiler gives it.
+    /// The name of the message's type, as given by the compiler.
     pub type_name: &'static str,
-    /// The subtask that writes it.
+    /// The subtask writing the topic.
     pub writer: SubtaskId,
-    /// The subtasks that read it, ascending.
+    /// The subtasks reading the topic, ascending.
     pub readers: Box<[SubtaskId]>,
-    /// Whether subtasks, of any DAG, also read its latest value.
+    /// Whether subtasks, of any DAG, also read the topic's latest value.
     pub is_sampled: bool,
 }
 
-/// Collects the topics of a DAG without fault, in the order of their writers and,
-/// within a writer, of its outputs.
+/// Collects the topics of a valid DAG, in the order of their writers and, within a writer, of its
+/// outputs.
 pub(crate) fn topics_of(spec: &DagSpec) -> Box<[Topic]> {
     let subtasks = spec.subtasks.iter().enumerate();
     let inputs = subtasks.flat_map(|(subtask, reader)| {

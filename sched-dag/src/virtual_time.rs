@@ -5,14 +5,14 @@
 //! instance's [body](SubtaskBody) to find out.
 //!
 //! An instance with an execution time of 0 finishes at the instant of its start, after the dispatch
-//! that started it. Another dispatch at the same instant follows, and so on until nothing happens
-//! any more.
+//! of the start. Another dispatch at the same instant follows, and so on until nothing happens any
+//! more.
 //!
 //! Clusters share a clock: everything ending at one instant ends in all clusters before anything
 //! starts in any of them.
 //!
-//! A workload may let an instance fail at the end of its execution time, which ends its DAG or
-//! costs its job. At one instant, completions come before failures, and failures in the order of
+//! A workload may let an instance fail at the end of its execution time, which ends the DAG or
+//! costs the job. At one instant, completions come before failures, and failures in the order of
 //! their instances.
 //!
 //! After [`VirtualTime::new`] nothing is allocated here.
@@ -344,13 +344,13 @@ impl<B: SubtaskBody> fmt::Debug for VirtualTime<B> {
 
 /// The behaviour of instances, and their execution times.
 pub trait Workload<B = Instance> {
-    /// Returns the execution time of an instance in nanoseconds, up to its end or its next wait; 0
+    /// Returns the execution time of an instance in nanoseconds, up to the end or the next wait; 0
     /// is allowed. Called once for each instance at its start, and again after each wait. `None`:
     /// the run is [stopped](RunOutcome::Stopped) at once.
     fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
-    /// Reports whether an instance fails, instead of finishing, at the end of its execution time.
-    /// The failure ends its DAG, or drops its job. Called once for each instance, at its end, and
+    /// Reports whether an instance fails, instead of finishing, at the end of the execution time.
+    /// The failure ends the DAG, or drops the job. Called once for each instance, at its end, and
     /// before each begin of a wait.
     fn fails(&mut self, _instance: Instance) -> bool {
         false
@@ -362,8 +362,8 @@ pub trait Workload<B = Instance> {
         true
     }
 
-    /// Called when an instance has ended and its outputs are published, or when a fault has ended
-    /// it at the given cost.
+    /// Called when an instance has ended and the outputs are published, or when a fault has ended
+    /// the instance at the given cost.
     fn ended(&mut self, _instance: Instance, _now_ns: u64, _fault: Option<FaultCost>) {}
 
     /// Called when an instance has begun a wait. From now on a [`Request::Answer`] may answer the
@@ -412,7 +412,7 @@ impl<B: SubtaskBody, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F
     }
 }
 
-/// Serves as a body without a function. It can always be replaced.
+/// Serves as a body without a function, always replaceable.
 impl SubtaskBody for Instance {
     type Alternate = ();
 

@@ -1,7 +1,7 @@
-//! WCETs that come from a file: those that runs of the same graph were observed to need.
+//! WCETs from a file, observed in runs of the same graph.
 //!
-//! The file is text, a record a line; `#` begins a comment. `./scripts/recording --observe` writes
-//! it, and a commit takes it back:
+//! The file is text, one record a line; `#` begins a comment. `./scripts/recording --observe`
+//! writes the file, and a commit reads it back:
 //!
 //! ```text
 //! margin PERCENT                 what was added to the longest call
@@ -10,40 +10,39 @@
 //! end
 //! ```
 //!
-//! The hash is of names and edges, so that WCETs of another graph are told from these.
-//! WCETs that the file lacks stay as the app has stated them. That of a subtask that waits is one for
-//! all its segments together, and takes the place of all that are stated. Nothing here trusts the
-//! file.
+//! The hash covers names and edges, to distinguish WCETs of another graph. WCETs missing from the
+//! file stay as stated by the app. The WCET of a subtask with waits covers all its segments
+//! together, and replaces all stated values. Nothing here trusts the file.
 
 use core::fmt;
 
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::spec::DagSpec;
 
-/// Where a WCET is from.
+/// The source of a WCET.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WcetSource {
-    /// There is none.
+    /// There is no WCET.
     None,
-    /// The app or the DAG file states it.
+    /// The app or the DAG file states the WCET.
     Stated,
-    /// It is the longest call of a run, and a margin.
+    /// The WCET is the longest call of a run, plus a margin.
     Observed {
-        /// The margin, in hundredths of the longest call.
+        /// The margin, in percent of the longest call.
         margin_percent: u32,
     },
 }
 
-/// One line of the file.
+/// A line of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WcetRecord<'t> {
-    /// The margin that was added to each longest call, in per cent.
+    /// The margin added to each longest call, in percent.
     Margin(u32),
     /// A DAG begins.
     Dag {
-        /// The hash of its names and edges.
+        /// The hash of the DAG's names and edges.
         hash: u64,
-        /// Its name.
+        /// The name of the DAG.
         name: &'t str,
     },
     /// A WCET of the latest DAG.
@@ -52,14 +51,14 @@ pub enum WcetRecord<'t> {
         wcet_ns: u64,
         /// The subtask's number.
         subtask: usize,
-        /// Its name.
+        /// The name of the subtask.
         name: &'t str,
     },
     /// The file ends.
     End,
 }
 
-/// Why a commit does not take a file of WCETs.
+/// The reason why a commit rejects a file of WCETs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WcetFault {
     /// The line, counted from 1.
@@ -114,12 +113,12 @@ fn record(line: &str) -> Option<WcetRecord<'_>> {
     })
 }
 
-/// Gives the subtasks of a DAG the WCETs that a file has for them.
+/// Gives the subtasks of a DAG their WCETs from a file.
 ///
 /// # Errors
 ///
-/// The first line that is no record; one that names a subtask that the DAG does not have;
-/// or that of the DAG of this name, if the file has it with another graph only.
+/// The first line that is no record; the first record naming a subtask missing in the DAG; or the
+/// line of the DAG of this name, if the file has it only with another graph.
 pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
     let own = graph_hash(spec);
     let (mut margin_percent, mut is_own, mut was_found, mut foreign) = (0, false, false, None);
@@ -140,14 +139,14 @@ pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
                 name,
             } if is_own => {
                 let found = spec.subtasks.get_mut(subtask);
-                // The hash is of names, too, so another name here means that the file was edited.
+                // The hash covers names, too, so another name here means an edited file.
                 let found = found.filter(|subtask| subtask.name == name);
                 let problem = UNKNOWN;
                 let found = found.ok_or(WcetFault { line, problem })?;
                 found.wcet_ns = Some(wcet_ns);
                 found.wcet_margin_percent = Some(margin_percent);
-                // The sum is of all segments: nothing follows from it for one of them, and what is
-                // stated of the later ones would not be parts of it.
+                // The sum covers all segments: nothing follows for a single segment, and the stated
+                // values of the later segments would not be parts of the sum.
                 for wait in &mut found.waits {
                     wait.segment_ns = None;
                 }
@@ -166,7 +165,7 @@ pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
 
 /// Returns a hash of a DAG's names and edges, and of nothing else.
 pub fn graph_hash(spec: &DagSpec) -> u64 {
-    // What may stand in no name ends each.
+    // A byte that occurs in no name ends each word.
     let word = |hash, word: &str| fnv_1a(fnv_1a(hash, word.as_bytes()), &[0xff]);
     let mut hash = word(EMPTY, &spec.name);
     for subtask in &spec.subtasks {

@@ -1,14 +1,14 @@
 //! The table of a kind of text: variant, fields, code and words in one place.
 
-/// Declares an enum whose variants each have a code, which never changes and is for
-/// machines, and a text of one line. The text names the fields; what has to be
-/// computed of them (they are references there) follows it, as in `write!`. A variant
-/// may hold one other text instead, with a name in parentheses; `of` says whose code it has
-/// then.
+/// Declares an enum whose variants each have a code and a text of one line. The code never changes
+/// and is for machines. The text names the fields; expressions computed from the fields (references
+/// there) follow the text, as in `write!`. A variant may instead hold another text, with a name in
+/// parentheses; then `of` names the source of its code.
 ///
-/// If the texts need more than the fields, brackets behind the enum's name say what, and
-/// `words` takes it. Then there may be a type of all that a row says next to its code, in
-/// parentheses, and `columns` returns it. The caller writes the `Display` of such a table.
+/// If the texts need more than the fields, brackets behind the enum's name declare the additional
+/// argument, and `words` takes it. Such a table may also declare a type, in parentheses, for the
+/// columns of a row next to its code; `columns` returns them. The caller writes the `Display` of
+/// such a table. The doc comment of a variant is its meaning in `MEANINGS`, and so an output.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! worded {
@@ -41,13 +41,13 @@ macro_rules! worded {
         }
 
         impl $Table {
-            /// Every code that is a variant's own.
+            /// Every code of a variant's own.
             pub const CODES: &'static [&'static str] = &[$($($code,)?)+];
 
-            /// The text of every variant, with braces where it varies.
+            /// The text of every variant, with braces for the variable parts.
             pub const TEXTS: &'static [&'static str] = &[$($text,)+];
 
-            /// The meaning of every variant, as it is documented.
+            /// The documented meaning of every variant.
             pub const MEANINGS: &'static [&'static str] = &[$(concat!($($doc),+),)+];
 
             /// Returns the kind as a stable word in snake case.
@@ -75,8 +75,8 @@ macro_rules! worded {
     };
 }
 
-/// Declares an enum whose variants each have a text alone, which names the fields as that of
-/// a [`worded`](crate::worded!) one does.
+/// Declares an enum whose variants each have only a text, which names the fields like a
+/// [`worded`](crate::worded!) text.
 macro_rules! texts {
     ($(#[$about:meta])* pub enum $Table:ident {
         $(
@@ -92,7 +92,7 @@ macro_rules! texts {
         }
 
         impl $Table {
-            /// The text of every variant, with braces where it varies.
+            /// The text of every variant, with braces for the variable parts.
             pub const TEXTS: &'static [&'static str] = &[$($text,)+];
         }
 

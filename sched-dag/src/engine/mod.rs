@@ -1,24 +1,22 @@
-//! The engine of one cluster: its scheduler, the bodies that it decides about, and what is asked
-//! of them, in the steps that every platform takes.
+//! The engine of one cluster: its scheduler, the bodies under the scheduler's control, and the
+//! pending requests, in the steps common to every platform.
 //!
-//! A platform holds the engine under one lock, or alone. It says when it is, starts a body on a
-//! core, and reaches other clusters, by its [`PlatformPort`]; what runs the instances of a subtask
-//! is a
-//! [`SubtaskBody`]. An event is one call: [`complete`](Engine::complete), [`fail`](Engine::fail),
-//! or
-//! [`step`](Engine::step) for all else. Then the platform brings the cores that the step
-//! [concerns](PlatformPort::retarget) to what they should run: [`next`](Engine::next) gives a core
-//! its next
-//! instance, [`suspend`](Engine::suspend) takes one away.
+//! A platform holds the engine under one lock, or alone. Through its [`PlatformPort`] the platform
+//! reports the time, starts a body on a core, and reaches other clusters. A [`SubtaskBody`] runs
+//! the instances of a subtask. Each event is one call: [`complete`](Engine::complete),
+//! [`fail`](Engine::fail), or [`step`](Engine::step) for everything else. Then the platform brings
+//! the cores [concerned](PlatformPort::retarget) by the step to their targets:
+//! [`next`](Engine::next) gives a core its next instance, [`suspend`](Engine::suspend) takes an
+//! instance away.
 //!
-//! # What is guaranteed
+//! # Guarantees
 //!
-//! - What a fault costs, what requests come to and who runs next is decided here, for all
-//!   platforms alike.
-//! - The journal is in the order in which things were decided. A [start](PlatformPort::start) is
-//!   written before the function begins.
-//! - After [`Engine::of_clusters`] nothing is allocated here, and no step is unbounded but by the releases
-//!   and deadlines that have passed since the last one.
+//! - The cost of a fault, the effect of requests and the choice of the next instance are decided
+//!   here, alike for all platforms.
+//! - The journal is in the order of the decisions. A [start](PlatformPort::start) is recorded
+//!   before the function begins.
+//! - After [`Engine::of_clusters`] nothing is allocated here, and every step is bounded except for
+//!   the releases and deadlines passed since the last step.
 
 mod run;
 
@@ -38,37 +36,37 @@ use crate::task_set::{Dag, TaskSet};
 
 pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
 
-/// A cluster's scheduler, its bodies, and what is asked of it. `P` is what a platform keeps of an
-/// instance that is suspended.
+/// A cluster's scheduler, its bodies, and the pending requests. `P` is a platform's representation
+/// of a suspended instance.
 #[derive(Debug)]
 pub struct Engine<B: SubtaskBody, P> {
     /// The scheduler, with its journal.
     pub scheduler: Scheduler,
-    /// Which core has which body.
+    /// The places of the bodies on cores.
     pub placement: Placement<B, P>,
     /// The cluster.
     pub cluster: ClusterId,
-    /// The model.
+    /// The task set.
     pub task_set: Arc<TaskSet>,
     /// Requests of the run on their way to the scheduler.
     pub requests: PendingRequests,
-    /// The bodies whose functions faults have ended for good.
+    /// The bodies whose functions were ended by faults for good.
     pub lost: Vec<B>,
-    /// By vertex.
+    /// By vertex, the function to take over after a fault.
     alternates: Box<[Option<B::Alternate>]>,
-    /// By DAG, the one that gets a signal when a fault ends it.
+    /// By DAG, the handler DAG to be signalled when a fault ends the DAG.
     after_fault: Vec<Option<DagId>>,
-    /// Room to look at notices in.
+    /// Room for looking at notices.
     notices: Vec<DriverNotice>,
-    /// Cancelled instances whose bodies run older ones, and so cannot discard yet. While there are
-    /// any, [`Request::Step`] keeps completions from taking the short way.
+    /// Cancelled instances whose bodies run older instances, and so cannot discard yet. While there
+    /// are any, [`Request::Step`] keeps completions from taking the short way.
     undiscarded: Vec<(Vertex, u64)>,
 }
 
 impl<B: SubtaskBody, P> Engine<B, P> {
-    /// Makes one without bodies for each cluster of a task set, which has its part of what serves
-    /// requests, and takes all memory that they will need. By DAG, `after_fault` is the one that gets a
-    /// signal when a fault ends it.
+    /// Makes an engine without bodies for each cluster of a task set, with the cluster's part of
+    /// the lifecycle, and allocates all memory the engines need. By DAG, `after_fault` is the
+    /// handler DAG to be signalled when a fault ends the DAG.
     pub fn of_clusters<C: PlatformPort<B>>(
         task_set: &Arc<TaskSet>,
         options: SchedulerOptions,
@@ -94,7 +92,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let (vertices, cores) = (task_set.vertices(), scheduler.options().cores as usize);
         let of_dag = |dag: &Dag| dag.slots() * dag.subtasks().len();
         let instances: usize = task_set.dags().iter().map(of_dag).sum();
-        // The engine itself hears of cancelled instances, whose inputs it discards.
+        // The engine itself needs to hear of cancelled instances, to discard their inputs.
         let room = scheduler.hear(C::HEARS.iter().copied().chain([EventKind::Cancelled]));
         // The journal comes from the platform, which knows how much memory there is.
         scheduler.log.journal = journal;
@@ -106,8 +104,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             alternates: (0..vertices).map(|_| None).collect(),
             after_fault: after_fault.to_vec(),
             notices: Vec::with_capacity(room),
-            // No more instances are in flight at the end of a step, and each is cancelled once at most.
-            // A late one tells of those of several jobs, one after the other.
+            // At the end of a step there are no more instances in flight, and each is cancelled at
+            // most once. A late step cancels the instances of several jobs, job by job.
             undiscarded: Vec::with_capacity(instances + room),
             scheduler,
             task_set,
@@ -116,19 +114,18 @@ impl<B: SubtaskBody, P> Engine<B, P> {
 
     /// Takes the body of a subtask, before the run.
     pub fn put(&mut self, vertex: Vertex, body: B) {
-        // Kept apart from the body, so that it can be asked while the body runs.
+        // Kept apart from the body, so that it can be queried while the body runs.
         self.alternates[vertex.index()] = body.alternate();
         self.placement.replace(vertex, body);
     }
 
-    /// Writes down what a core does with the instance of a vertex.
+    /// Records what a core does with the instance of a vertex.
     pub fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex, time_ns: u64) {
         let instance = self.scheduler.instance_of(vertex);
         self.scheduler.log.on_core(core, what, time_ns, instance);
     }
 
-    /// Takes a step at an instant, on a core: what has `happened`, requests, releases, a
-    /// dispatch.
+    /// Takes a step at an instant, on a core: the event `happened`, requests, releases, a dispatch.
     #[inline]
     pub fn step(
         &mut self,
@@ -140,7 +137,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.decide(instant.0, port);
     }
 
-    /// Tells the scheduler what has happened and what is asked for. The instant stays open.
+    /// Tells the scheduler of an event and of pending requests. The instant stays open.
     #[inline(always)]
     pub fn tell(
         &mut self,
@@ -151,19 +148,18 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.scheduler.log.here = here;
         let mut moment = self.scheduler.at(now_ns);
         happened(&mut moment);
-        // Requests after completions: a function asks by its completion, and it takes effect with
-        // it.
+        // Requests after completions: a function's request takes effect with its completion.
         if !self.requests.are_none() || port.has_letters() {
             self.serve(now_ns, port);
         }
         self.act(port);
     }
 
-    /// Serves what is asked for. Apart, as in most steps nothing is.
+    /// Serves the pending requests. Out of line, as most steps have none.
     #[cold]
     #[inline(never)]
     fn serve(&mut self, now_ns: u64, port: &mut impl PlatformPort<B>) {
-        // Those for other clusters first, so that they are not served here.
+        // Requests to other clusters first, so that they are not served here.
         self.requests.give_away(|request| port.forward(request));
         let mut moment = self.scheduler.at(now_ns);
         if let Some(letters) = port.take_letters() {
@@ -175,7 +171,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.discard_late();
     }
 
-    /// Ends the instant: what is due is released, and the cores are given what they should run.
+    /// Ends the instant: releases the due jobs, and sets the cores' targets.
     #[inline]
     pub fn decide(&mut self, now_ns: u64, port: &mut impl PlatformPort<B>) {
         // As often as notices fill their room; each round the port takes them out.
@@ -185,7 +181,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let _ = self.scheduler.at(now_ns).dispatch();
         self.act(port);
         self.set_targets(port);
-        // It is about the step, and whoever takes one looks at the next event anyway.
+        // The flag concerns the step, and the platform reads the next event after each step anyway.
         self.scheduler.log.take_job_event();
     }
 
@@ -194,8 +190,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.scheduler.decisions()
     }
 
-    /// Takes note that a core has finished an instance. Where `is_alone`, that may be all of the
-    /// instant, and the core may go on without a step.
+    /// Takes note that a core has finished an instance. If `is_alone`, the completion may be the
+    /// whole instant, and the core may go on without a step.
     #[inline(always)]
     pub fn complete<C: PlatformPort<B>>(
         &mut self,
@@ -205,16 +201,16 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         is_alone: bool,
         port: &mut C,
     ) -> NextAction<B> {
-        // Before the scheduler knows: a latest value is there when a successor of this instance
-        // starts.
+        // Before the scheduler knows: the latest value must be there when a successor of this
+        // instance starts.
         if body.has_effects()
             && let Some(limit) = self.publish(&mut body, port.on_clock(finish_ns))
         {
-            // Asked here, so that the port need not lie in memory for those that do not wait.
+            // Checked here, so that the port need not be in memory for subtasks without waits.
             let is_alone = is_alone && !port.has_letters();
             return self.wait((core, vertex), body, (finish_ns, limit), is_alone, port);
         }
-        // Something else belongs to this instant, so the whole step has to be taken.
+        // Another event belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
             let instance = self.scheduler.instance_of(vertex);
             self.placement.finish(core.index(), vertex, body);
@@ -224,7 +220,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let (done, unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
             let (ended, hop) = ((core, finish_ns), (vertex, next, decision.instance.job));
-            // Each way by itself: the frequent one asks nothing twice.
+            // A separate copy for each way: the frequent way makes no check twice.
             return match unwritten {
                 Unwritten::FinishAndReady => self.hop::<C, true, true>(ended, hop, body, port),
                 Unwritten::Finish => self.hop::<C, true, false>(ended, hop, body, port),
@@ -242,7 +238,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         NextAction::Look { is_rescheduled }
     }
 
-    /// Has a core go on from one vertex to the next, with the next one's instance of a job.
+    /// Makes a core go on from one vertex to the next, with the next vertex's instance of a job.
     #[inline(always)]
     fn hop<C: PlatformPort<B>, const HAS_ENDED: bool, const IS_NEW: bool>(
         &mut self,
@@ -255,13 +251,13 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let finish = (EventKind::Finish, finish_ns, body.subject());
         let exchanged = self.placement.exchange(core, vertex, body, next);
         if !HAS_ENDED {
-            // Jobs may have been cut on this way, too, and their inputs are given up before
-            // the next function begins.
+            // Jobs may have been cut on this way, too: their inputs are given up before the next
+            // function begins.
             self.act(port);
         }
         let log = &mut self.scheduler.log;
         let Some(mut body) = exchanged else {
-            // It is suspended, so it has been ready before.
+            // The next instance is suspended, so its readiness was recorded before.
             if HAS_ENDED {
                 log.journal.write_all(core, [finish]);
             }
@@ -285,8 +281,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         NextAction::Run(body)
     }
 
-    /// Takes note that the turn of a core's instance has ended in a wait, which may be all of the
-    /// instant, too. Apart, as most sets have none.
+    /// Takes note that the turn of a core's instance has ended in a wait, which may be the whole
+    /// instant, too. Out of line, as most sets have no waits.
     #[cold]
     #[inline(never)]
     fn wait<C: PlatformPort<B>>(
@@ -330,7 +326,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 
     /// Ends the wait whose limit has come, at an instant and on a core, and gives its instance an
-    /// idle core. Reports whether that is all of the instant; if not, the step has to be taken.
+    /// idle core. Reports whether this is the whole instant; if not, a step has to be taken.
     #[inline]
     pub fn wake(&mut self, (now_ns, here): (u64, CoreId), port: &mut impl PlatformPort<B>) -> bool {
         let is_alone = self.requests.are_none() && !port.has_letters();
@@ -345,8 +341,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         woken.is_some()
     }
 
-    /// Takes note that a turn of an instance has ended that no core has any more; it ran last on
-    /// `core`. It ended at the first time, and the instant is the second.
+    /// Takes note that a turn has ended of an instance no longer on any core; it ran last on
+    /// `core`. The turn ended at the first time; the second time is the instant.
     pub fn complete_parked(
         &mut self,
         (core, vertex): (CoreId, Vertex),
@@ -365,11 +361,11 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             None => self.placement.finish_parked(vertex, body),
         }
         let turn = TurnEnd { instance, limit_ns };
-        // By the whole step: its core runs something else by now, so it passes on to nobody.
+        // By the whole step: the core runs another instance by now, so there is no hand-off.
         self.step((now_ns, core), port, |moment| moment.end_turn(turn));
     }
 
-    /// Returns for how long an instance waits that begins now.
+    /// Returns the limit of a wait beginning now, in nanoseconds.
     fn limit_ns(&self, vertex: Vertex, limit: WaitLimit, now_ns: u64) -> u64 {
         match limit {
             WaitLimit::For(limit_ns) => limit_ns,
@@ -380,7 +376,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
     }
 
-    /// Returns the cost of a fault of the vertex' instance if it comes now.
+    /// Returns the cost of a fault of the vertex's present instance.
     fn cost_of_fault(&self, vertex: Vertex) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
         let alternate = self.alternates[vertex.index()].as_ref();
@@ -392,8 +388,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
     }
 
-    /// Ends an instance by a fault on a core, and with it its job or its DAG. The platform has
-    /// taken the body back, unless nothing can: then the fault costs the DAG.
+    /// Ends an instance by a fault on a core, and its job or its DAG with it. The platform has
+    /// taken the body back if possible; without the body the fault costs the DAG.
     #[inline]
     pub fn fail(
         &mut self,
@@ -416,7 +412,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         port: &mut impl PlatformPort<B>,
     ) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
-        // Without its body the subtask cannot be made anew.
+        // Without its body the subtask cannot be replaced.
         let cost = match &body {
             Some(_) => self.cost_of_fault(vertex),
             None => FaultCost::Dag,
@@ -426,7 +422,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             if let Some(mut body) = body {
                 body.replace();
                 self.placement.replace(vertex, body);
-                // Before it may start again, as the next job may reuse the places of older ones.
+                // Before the subtask may start again, as the next job may reuse the places of older
+                // jobs.
                 self.discard_late();
             }
             return cost;
@@ -447,9 +444,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         cost
     }
 
-    /// Finds what a core without an instance does next, at an instant. An instance to start has
-    /// started, and is written down; a resumption is [written down](Self::note) by the caller, who
-    /// knows when.
+    /// Finds the next work of a core without an instance, at an instant. A returned start is
+    /// already recorded; a resumption is [recorded](Self::note) by the caller, who knows the time.
     #[inline]
     pub fn next(
         &mut self,
@@ -461,7 +457,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             let instance = self.scheduler.instance_of(*vertex);
             body.set_job(instance.job);
             let subject = body.subject();
-            // A port that reads the clock does so as late as it can, right before the call.
+            // A port that reads the clock reads it as late as possible, right before the call.
             let start_ns = port.start(core, body, now_ns);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
         } else if let NextWork::Proceed(vertex, body) = &mut next {
@@ -470,7 +466,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         next
     }
 
-    /// Has a core go on with an instance that has waited. Apart, as most sets have none.
+    /// Makes a core go on with an instance after its wait. Out of line, as most sets have no waits.
     #[cold]
     #[inline(never)]
     fn proceed(
@@ -486,8 +482,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
     }
 
-    /// Takes a core's instance away, if it has one, and returns the core that has been waiting for
-    /// it.
+    /// Takes a core's instance away, if the core has one, and returns the core waiting for the
+    /// instance.
     pub fn suspend(&mut self, core: CoreId, now_ns: u64, parked: P) -> Option<CoreId> {
         let vertex = self.placement.detach(core.index())?;
         self.note(EventKind::Suspend, core, vertex, now_ns);
@@ -524,19 +520,18 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 
     /// Discards the inputs of cancelled instances as soon as their bodies rest: before the places
-    /// of
-    /// these inputs are used again, as jobs end in their order.
+    /// of the inputs are used again, as jobs end in their order.
     #[cold]
     #[inline(never)]
     fn discard_late(&mut self) {
         self.undiscarded.retain(|&(vertex, job)| {
-            // A body that runs, or whose context is parked, still reads its inputs.
+            // A running body, or a body with a parked context, still reads its inputs.
             if let Some(body) = self.placement.resting(vertex) {
                 body.discard(job);
                 return false;
             }
             let dag = self.scheduler.instance_of(vertex).dag;
-            // An ended DAG starts nothing any more, so its inputs are in nobody's way.
+            // An ended DAG starts nothing any more, so no later job needs the places of its inputs.
             !self.scheduler.is_ended(dag)
         });
         // The short way would start the next instance without looking here.
@@ -552,14 +547,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         for decision in decisions {
             let (core, instance) = (decision.core, decision.instance);
             port.retarget(core);
-            // The next decision names the same core, and what it gets instead.
+            // The next decision names the same core with its new instance.
             if decision.what == EventKind::Suspend {
                 self.placement.set_target(core, None);
                 preempted = Some(core);
             } else {
                 let vertex = self.task_set.vertex(instance);
                 self.placement.set_target(core, Some(vertex));
-                // Where an interrupt has to arrive first, the journal tells when it was asked for.
+                // Where an interrupt has to arrive first, the journal records the time of the
+                // request.
                 if C::SUSPENDS_LATER && preempted == Some(core) {
                     log.on_core(core, EventKind::Request, port.now_ns(), instance);
                 }
@@ -568,41 +564,41 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 }
 
-/// The code of one subtask, as the engine handles it. There is one for each subtask, which has one
+/// The code of one subtask, as seen by the engine. Each subtask has one body, because it has one
 /// started instance at a time (R2).
 pub trait SubtaskBody {
-    /// A function that would take over after a fault.
+    /// A function to take over after a fault.
     type Alternate: Alternate;
 
-    /// Begins with another job.
+    /// Begins another job.
     fn set_job(&mut self, job: u64);
 
-    /// Returns its instance as events are written of it.
+    /// Returns the present instance as the subject of events.
     fn subject(&self) -> EventSubject;
 
-    /// Gives up the inputs that have arrived for a job which it will not run, or what is left of
-    /// one in which it has waited.
+    /// Gives up the arrived inputs of a job that the body will not run, or the remaining inputs of
+    /// a job in which it has waited.
     fn discard(&mut self, job: u64);
 
-    /// Learns, before its instance goes on, whether the wait has ended by its limit.
+    /// Called before the instance goes on after a wait: tells whether the limit has ended the wait.
     fn wake(&mut self, _has_timed_out: bool) {}
 
-    /// Reports whether a completion has effects besides the scheduler's.
+    /// Reports whether a completion has effects outside the scheduler.
     fn has_effects(&self) -> bool;
 
-    /// Publishes these effects, and passes on the requests of the function; or returns for how long
-    /// the instance waits, if its turn has ended in a wait. The time is that of the clock which
-    /// functions read.
+    /// Publishes the effects of a completion, and passes on the function's requests. If the turn
+    /// has ended in a wait, returns the limit of the wait. `finish_ns` is on the clock read by
+    /// functions.
     fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit>;
 
     /// Returns the alternate that takes over if a fault ends the function.
     fn alternate(&self) -> Option<Self::Alternate>;
 
-    /// Makes it go on with that, after a fault.
+    /// Makes the body go on with the alternate, after a fault.
     fn replace(&mut self);
 }
 
-/// A way to a body, such as a box, is one.
+/// A pointer to a body, such as a box, is a body.
 impl<D: DerefMut<Target: SubtaskBody>> SubtaskBody for D {
     type Alternate = <D::Target as SubtaskBody>::Alternate;
 
@@ -643,16 +639,16 @@ impl<D: DerefMut<Target: SubtaskBody>> SubtaskBody for D {
     }
 }
 
-/// Which function takes over after a fault; it can be asked while the body runs.
+/// The function to take over after a fault; it can be queried while the body runs.
 pub trait Alternate {
-    /// Reports whether there is one at present.
+    /// Reports whether there is such a function at present.
     fn is_there(&self) -> bool;
 
-    /// Reports whether it is the one to fall back on, by which the DAG is degraded.
+    /// Reports whether the function is the fallback, which degrades the DAG.
     fn is_fallback(&self) -> bool;
 }
 
-/// One that is made anew each time.
+/// An alternate that is made anew each time.
 impl Alternate for () {
     fn is_there(&self) -> bool {
         true
@@ -663,44 +659,44 @@ impl Alternate for () {
     }
 }
 
-/// The part of a platform that the engine calls while it takes a step.
+/// The part of a platform called by the engine during a step.
 ///
-/// All else a step returns: whoever takes it holds the lock around the engine, and wakes and
-/// suspends cores by the platform's own means, mostly after the lock.
+/// A step returns everything else: the platform's code taking the step holds the lock around the
+/// engine, and wakes and suspends cores by its own means, mostly after the lock.
 pub trait PlatformPort<B> {
-    /// The kinds of events that the platform acts on itself.
+    /// The kinds of events the platform itself acts on.
     const HEARS: &'static [EventKind] = &[];
 
-    /// Whether a core gives up what it runs some time after it was asked to.
+    /// Whether a core gives up its instance some time after the request.
     const SUSPENDS_LATER: bool = true;
 
-    /// Whether a wait may have its answer at the instant at which it begins: then the instant is
-    /// not over by that.
+    /// Whether a wait may be answered at the instant at which it begins: then the wait does not end
+    /// the instant.
     const ANSWERS_AT_ONCE: bool = false;
 
     /// Returns the time, in nanoseconds since the run's epoch.
     fn now_ns(&self) -> u64;
 
-    /// Converts a time of the run to one on the clock that functions read.
+    /// Converts a time of the run to a time on the clock read by functions.
     fn on_clock(&self, time_ns: u64) -> u64 {
         time_ns
     }
 
-    /// A core begins with a body as soon as the engine's lock is free. Returns when, on the run's
-    /// time: at the step's instant, or by a later reading of the clock.
+    /// Called when a core begins with a body as soon as the engine's lock is free. Returns the
+    /// start on the run's time: the step's instant, or a later reading of the clock.
     fn start(&mut self, core: CoreId, body: &mut B, instant_ns: u64) -> u64;
 
-    /// The instance of a body gives its core up and begins a wait: a turn of it has ended then.
+    /// Called when the instance of a body gives its core up and begins a wait, which ends a turn.
     fn wait(&mut self, _core: CoreId, _body: &mut B, _ended_ns: u64) {}
 
-    /// A core goes on with a body whose wait has ended, as it [starts](Self::start) one. Returns
-    /// when.
+    /// Called when a core goes on with a body after its wait, like [`start`](Self::start). Returns
+    /// the time.
     fn proceed(&mut self, core: CoreId, body: &mut B, instant_ns: u64) -> u64 {
         self.start(core, body, instant_ns)
     }
 
-    /// Forwards a request to the other clusters that it concerns, and reports whether it does not
-    /// concern this one.
+    /// Forwards a request to the other clusters concerned, and reports whether it does not concern
+    /// this cluster.
     fn forward(&mut self, _request: Request) -> bool {
         false
     }
@@ -710,15 +706,15 @@ pub trait PlatformPort<B> {
         false
     }
 
-    /// Returns them, if there may be any, and takes note that they are read.
+    /// Returns the letters, if there may be any, and takes note that they are read.
     fn take_letters(&mut self) -> Option<&Mailboxes> {
         None
     }
 
-    /// A core may have to do something else than it does.
+    /// Called when the target of a core may have changed.
     fn retarget(&mut self, _core: CoreId) {}
 
-    /// An event of a kind that it [hears](Self::HEARS) of was written down.
+    /// Called when an event of a [heard](Self::HEARS) kind was recorded.
     fn hear(&mut self, _notice: &DriverNotice) {}
 }
 
@@ -726,15 +722,15 @@ pub trait PlatformPort<B> {
 #[derive(Debug, PartialEq, Eq)]
 #[must_use]
 pub enum NextAction<B> {
-    /// It runs this at once, and nothing else changes.
+    /// Runs this body at once; nothing else changes.
     Run(B),
-    /// It may have a target; nothing changes for other cores.
+    /// Looks for a target; nothing changes for other cores.
     Look {
         /// Whether the time of the next event may have changed.
         is_rescheduled: bool,
     },
-    /// A step has to be taken first: one in which this turn ends, or else one that goes on with the
-    /// instant in hand.
+    /// Takes a step first: a step in which this turn ends, or else a step that goes on with the
+    /// open instant.
     Step(Option<TurnEnd>),
 }
 
@@ -743,14 +739,14 @@ pub enum NextAction<B> {
 pub enum FaultCost {
     /// The DAG is ended.
     Dag,
-    /// The job is lost, and the subtask goes on with a function that was made anew.
+    /// The job is lost, and the subtask goes on with a newly made function.
     Job,
-    /// The job is lost, and the subtask goes on with the function to fall back on.
+    /// The job is lost, and the subtask goes on with the fallback function.
     Degraded,
 }
 
 impl FaultCost {
-    /// Returns its word in machine lines.
+    /// Returns the cost's word in machine lines.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Dag => "dag",

@@ -1,4 +1,4 @@
-//! A run that has ended: its model, its times, its counts, on whatever platform.
+//! A run that has ended: its model, its times, its counts, on any platform.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -43,27 +43,28 @@ pub struct Run {
     counts: RunCounts,
 }
 
-/// The response times that a commit has proven.
+/// The response times proven by a commit.
 ///
 /// See [`Run`].
 #[derive(Clone, Debug, Default)]
 pub struct ProvenBounds {
     /// By DAG.
     pub bounds_ns: Vec<Option<u64>>,
-    /// By DAG, of its sinks, in the order of [`Dag::sinks`](crate::Dag::sinks).
+    /// By DAG, the bounds of its sinks, in the order of [`Dag::sinks`](crate::Dag::sinks).
     pub sink_bounds_ns: Vec<Vec<Option<u64>>>,
 }
 
-/// The numbers of a run that its platform knows.
+/// The numbers of a run known to its platform.
 ///
 /// See [`Run`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunCounts {
-    /// The instant from which releases count, on the clock that functions read.
+    /// The origin of release times, on the clock read by functions.
     pub epoch_ns: u64,
-    /// How often anything allocated memory between the start of the run and its last completion.
+    /// The number of memory allocations between the start of the run and its last completion.
     pub allocations: u64,
-    /// How often the schedulers' locks were taken meanwhile, modulo 2^32; 0 where nobody counts.
+    /// The number of acquisitions of the schedulers' locks in that time, modulo 2^32; 0 where
+    /// nobody counts.
     pub lock_acquisitions: u32,
 }
 
@@ -85,7 +86,7 @@ impl DagCounts {
 }
 
 impl Run {
-    /// Takes it out of an engine that has come to its end, on so many cores in all.
+    /// Takes a run out of a finished engine, on `cores` cores in all.
     #[must_use]
     pub fn from_engine<B: SubtaskBody, P>(
         engine: &mut Engine<B, P>,
@@ -96,13 +97,13 @@ impl Run {
         Self::so_far(engine, journal, cores).with_proven(proven)
     }
 
-    /// Returns the same with what the commit has proven.
+    /// Returns the run with the response times proven by the commit.
     #[must_use]
     pub fn with_proven(self, proven: ProvenBounds) -> Self {
         Self { proven, ..self }
     }
 
-    /// Makes one of an engine that may go on, and of a copy of its journal.
+    /// Makes a run from an engine that may go on, and from a copy of its journal.
     pub(crate) fn so_far<B: SubtaskBody, P>(
         engine: &Engine<B, P>,
         journal: Journal,
@@ -126,52 +127,52 @@ impl Run {
         }
     }
 
-    /// Takes over what the engine of another cluster has of the same run.
+    /// Takes over the data of another cluster's engine about the same run.
     pub fn absorb<B: SubtaskBody, P>(&mut self, other: &mut Engine<B, P>) {
         let journal = core::mem::take(&mut other.scheduler.log.journal);
         self.add(other, journal);
     }
 
-    /// Takes over the same of an engine that may go on, and of a copy of its journal.
+    /// Likewise from an engine that may go on, and from a copy of its journal.
     pub(crate) fn add<B: SubtaskBody, P>(&mut self, other: &Engine<B, P>, journal: Journal) {
         let (task_set, cluster) = (&self.task_set, other.cluster);
         let ids = (0..).map(DagId).zip(&mut self.dags);
-        // To each scheduler the DAGs of other clusters are ended from the start: it knows its own
-        // only.
+        // Each scheduler treats the DAGs of other clusters as ended from the start, so its data
+        // covers only its own.
         for (dag, of_dag) in ids.filter(|(dag, _)| task_set.dag(*dag).cluster() == cluster) {
             *of_dag = DagCounts::new(&other.scheduler, dag);
         }
         let first_core = task_set.cores_of(cluster, self.options.cores).start;
-        // A cluster's scheduler counts its cores from 0, the run counts those of the machine.
+        // A cluster's scheduler counts its cores from 0, the run counts the cores of the machine.
         self.journal.absorb(journal, cluster, first_core);
     }
 
-    /// Adds what the platform has counted.
+    /// Adds the platform's counts.
     #[must_use]
     pub fn with_counts(self, counts: RunCounts) -> Self {
         Self { counts, ..self }
     }
 
-    /// Returns the model that was run.
+    /// Returns the model of the run.
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
     }
 
-    /// Returns the times of all jobs and instances, in nanoseconds from the instant from which
-    /// releases count; of the latest whole jobs if there was no memory for all events.
+    /// Returns the times of all jobs and instances, in nanoseconds from the origin of release
+    /// times. If there was no memory for all events, only the latest whole jobs.
     ///
-    /// Computed from the journal when it is asked for first.
+    /// Computed from the journal at the first call.
     ///
     /// # Panics
     ///
-    /// If there is no memory for it.
+    /// If there is no memory for the times.
     pub fn record(&self) -> &RunRecord {
         let record = self.try_record();
         record.expect("there is no memory for the times of so many jobs; give the machine more")
     }
 
-    /// Returns the times of all jobs, as [`record`](Self::record) does; `None` if there is no memory
-    /// for them, as after an overload, in which each job that waits counts.
+    /// Returns the times of all jobs, like [`record`](Self::record). Returns `None` if there is no
+    /// memory for them, as after an overload, in which each waiting job counts.
     pub fn try_record(&self) -> Option<&RunRecord> {
         let record = self.record.get_or_init(|| {
             let (is_whole, events) = (self.journal.is_whole(), self.journal.events());
@@ -180,8 +181,8 @@ impl Run {
         record.as_ref()
     }
 
-    /// Returns the response times of a DAG's complete jobs, in nanoseconds; of the latest jobs if
-    /// there was no memory for all events.
+    /// Returns the response times of a DAG's complete jobs, in nanoseconds. If there was no memory
+    /// for all events, only the latest jobs.
     ///
     /// # Panics
     ///
@@ -195,26 +196,25 @@ impl Run {
         })
     }
 
-    /// Returns the statistics of all jobs and instances, those included whose events made way for
-    /// later ones; `None` if some were not recorded, because of `trace_events=0` or the console's
-    /// `trace off`.
+    /// Returns the statistics of all jobs and instances, including jobs whose events made way for
+    /// later ones. Returns `None` if some events were not recorded, because of `trace_events=0` or
+    /// the console's `trace off`.
     pub fn times(&self) -> Option<&RunTally> {
         let tally = || self.journal.statistics(&self.task_set, FINEST);
         self.times.get_or_init(tally).as_ref()
     }
 
-    /// Returns counts and maxima of all times, as [`times`](Self::times) does, in less memory.
+    /// Returns counts and maxima of all times, like [`times`](Self::times), in less memory.
     pub fn coarse_times(&self) -> Option<RunTally> {
         self.journal.statistics(&self.task_set, 0)
     }
 
-    /// Returns the journal: what has happened, in its order.
+    /// Returns the journal: the events of the run, in their order.
     pub const fn journal(&self) -> &Journal {
         &self.journal
     }
 
-    /// Returns the instant from which releases count, in nanoseconds on the clock that functions
-    /// read.
+    /// Returns the origin of release times, in nanoseconds on the clock read by functions.
     pub const fn epoch_ns(&self) -> u64 {
         self.counts.epoch_ns
     }
@@ -229,7 +229,7 @@ impl Run {
         &self.snapshot(dag).statistics
     }
 
-    /// Returns how a DAG has ended.
+    /// Returns the final state of a DAG.
     ///
     /// # Panics
     ///
@@ -239,7 +239,7 @@ impl Run {
         &self.dags[self.task_set.find(dag).index()].snapshot
     }
 
-    /// Returns how many jobs a sink has missed its deadline in, those included that were not
+    /// Returns the number of jobs in which a sink has missed its deadline, including jobs not
     /// released in time.
     ///
     /// # Panics
@@ -253,18 +253,18 @@ impl Run {
         self.dags[dag.index()].misses[place]
     }
 
-    /// Returns how the scheduler was told to work.
+    /// Returns the scheduler's options.
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
 
-    /// Returns the response time that the commit has proven of a DAG, if it has.
+    /// Returns the response time proven by the commit for a DAG, in nanoseconds, if any.
     #[track_caller]
     pub fn bound_ns(&self, dag: impl DagKey) -> Option<u64> {
         *self.proven.bounds_ns.get(self.task_set.find(dag).index())?
     }
 
-    /// Returns the response time that the commit has proven of a sink, if it has.
+    /// Returns the response time proven by the commit for a sink, in nanoseconds, if any.
     #[track_caller]
     pub fn sink_bound_ns(&self, dag: impl DagKey, sink: impl SubtaskKey) -> Option<u64> {
         let (dag, sink) = self.find(dag, sink);
@@ -282,15 +282,15 @@ impl Run {
         self.task_set.dag(dag).sinks().binary_search(&sink).ok()
     }
 
-    /// Returns every breach of the model's rules R1 to R4, and whether each instance had one life
-    /// and each core one instance at a time. However long something takes is right, for that is
-    /// the machine's affair.
+    /// Returns every breach of the model's rules R1 to R4, of the order of each instance's events,
+    /// and of one instance at a time on each core. Durations are never breaches, for they depend on
+    /// the machine.
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         self.judge(&mut |_| ()).into_iter()
     }
 
-    /// Works like [`violations`](Self::violations), and tells of its progress: how many events it
-    /// has come to, at each of them.
+    /// Works like [`violations`](Self::violations), and reports progress: calls `tell` at each
+    /// event with the number of events so far.
     #[inline(never)]
     pub fn judge(&self, tell: &mut dyn FnMut(u64)) -> Vec<Violation> {
         let mut count = 0;
@@ -301,8 +301,9 @@ impl Run {
         law::violations(&self.task_set, self.terms(u64::MAX), events)
     }
 
-    /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
-    /// `bound_ns`: a decision takes effect when a core has changed over. `None` if events are lost.
+    /// Returns every breach of R5 (did the right instances run?) lasting longer than `bound_ns`,
+    /// because a decision takes effect only when a core has changed over. Returns `None` if events
+    /// are lost.
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
         let (task_set, events) = (&self.task_set, self.journal.events());
@@ -318,20 +319,20 @@ impl Run {
         }
     }
 
-    /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
-    /// and how long it takes to react; of the latest jobs if events are lost.
+    /// Measures one of the commit's chains across DAGs: the age of its outputs, and its reaction
+    /// time. If events are lost, only the latest jobs count.
     pub fn latencies(&self, chain: &Chain) -> ChainLatencies {
         chain.latencies(&self.task_set, self.journal.events())
     }
 
-    /// Returns how often anything allocated memory between the start of the run and its last
+    /// Returns the number of memory allocations between the start of the run and its last
     /// completion.
     pub const fn allocations(&self) -> u64 {
         self.counts.allocations
     }
 
-    /// Returns how often the schedulers' locks were taken between the start of the run and its
-    /// last completion, modulo 2^32; 0 where nobody counts.
+    /// Returns the number of acquisitions of the schedulers' locks between the start of the run and
+    /// its last completion, modulo 2^32; 0 where nobody counts.
     pub const fn lock_acquisitions(&self) -> u32 {
         self.counts.lock_acquisitions
     }

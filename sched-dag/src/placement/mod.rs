@@ -1,70 +1,68 @@
-//! Where instances really are, and where the scheduler wants them.
+//! The actual places of instances, and the scheduler's targets.
 //!
-//! The scheduler decides at one instant what each core runs: its *target*. The
-//! cores follow a little later, when their interrupt arrives: what a core has
-//! with it is its *current* instance. In between, anything may happen: the
-//! current instance finishes before it could be preempted; it is wanted on
-//! another core before it has left this one; the target changes again. So each
-//! core compares the two whenever it can, and the one truth about an instance is
-//! its *place*.
+//! The scheduler decides at one instant what each core runs: its *target*. The cores follow a
+//! little later, when their interrupt arrives: the instance a core actually has is its *current*
+//! instance. In between, anything may happen: the current instance finishes before it could be
+//! preempted; another core wants the instance before the first core has given it up; the target
+//! changes again. So each core compares target and current instance whenever possible, and only the
+//! *place* of an instance is authoritative.
 //!
-//! A subtask has at most one started instance at a time (R2), so places are kept
-//! by subtask, and a subtask's [`Vertex`] says which instance is meant: its body
-//! rests in the table, or is with a core, or lies on the stack of a suspended
-//! context.
+//! A subtask has at most one started instance at a time (R2), so places are kept by subtask, and a
+//! subtask's [`Vertex`] identifies the instance. The body rests in the table, or is with a core, or
+//! lies on the stack of a suspended context.
 //!
-//! Drivers whose cores follow later share it, under their one lock: the kernel and Linux.
+//! Drivers whose cores follow later share the placement, under their one lock: the kernel and
+//! Linux.
 
 use alloc::boxed::Box;
 
 use crate::ids::{CoreId, Vertex};
 
-/// Where a subtask's body is.
+/// The place of a subtask's body.
 #[derive(Debug)]
 enum BodyState<Body, Parked> {
     /// In the table: no instance of the subtask has started.
     Resting(Body),
-    /// With the core whose current instance it is.
+    /// With the core currently running the body's instance.
     Running,
-    /// In the table: its instance waits, or is in line again, and needs no context.
+    /// In the table: the instance waits, or is in line again, and needs no context.
     Waiting(Body),
-    /// On the stack of a context that does not run.
+    /// On the stack of a context not running.
     Suspended(Parked),
-    /// Not here: its instance was ended, or another scheduler has it.
+    /// Not here: the instance was ended, or another scheduler has the body.
     Lost,
 }
 
 /// The next work of a core without a current instance.
 #[derive(Debug, PartialEq, Eq)]
 pub enum NextWork<Body, Parked> {
-    /// Nothing is there for it to do.
+    /// There is nothing for the core to do.
     Nothing,
-    /// It starts an instance of this subtask.
+    /// The core starts an instance of a subtask.
     Start(Vertex, Body),
-    /// It goes on with the instance of this subtask, whose wait has ended.
+    /// The core goes on with the instance of a subtask, whose wait has ended.
     Proceed(Vertex, Body),
-    /// It goes on with this context.
+    /// The core goes on with a context.
     Continue(Parked),
 }
 
-/// The places of all subtasks, and what each core has and should have.
+/// The places of all subtasks, and the current and target instances of each core.
 #[derive(Debug)]
 pub struct Placement<Body, Parked> {
     places: Box<[BodyState<Body, Parked>]>,
     seats: Box<[CoreSlot]>,
 }
 
-/// The vertex that one core has, and the one that it should have: [`NOTHING`], or a vertex.
+/// A core's current and target vertex: [`NOTHING`], or a vertex.
 ///
-/// Not options, which would be two words each: a seat changes twice with each
-/// instance.
+/// Options would take two words each, and a seat changes twice with each instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct CoreSlot {
     current: Vertex,
     target: Vertex,
 }
 
-/// Stands where there is no vertex; no task set has that many subtasks.
+/// The mark for no vertex; no task set has so many subtasks.
 const NOTHING: Vertex = Vertex(u32::MAX);
 
 const EMPTY_SEAT: CoreSlot = CoreSlot {
@@ -77,8 +75,8 @@ fn some(vertex: Vertex) -> Option<Vertex> {
 }
 
 impl<Body, Parked> Placement<Body, Parked> {
-    /// Makes the places of so many vertices, all without a body until one
-    /// [is put there](Self::replace).
+    /// Makes the places of so many vertices, all without a body until a body [is put
+    /// there](Self::replace).
     pub fn empty(vertices: usize, cores: usize) -> Self {
         Self {
             places: (0..vertices).map(|_| BodyState::Lost).collect(),
@@ -86,7 +84,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Notes what the scheduler wants a core to run.
+    /// Notes the target of a core.
     pub fn set_target(&mut self, core: CoreId, target: Option<Vertex>) {
         self.seats[core.index()].target = target.unwrap_or(NOTHING);
     }
@@ -99,7 +97,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.forget_target(core, vertex);
     }
 
-    /// Notes that an instance waits, which was the current one of core `core` or has been parked.
+    /// Notes that an instance waits: the current instance of core `core`, or a parked instance.
     pub fn wait(&mut self, core: usize, vertex: Vertex, body: Body) {
         if self.seats[core].current == vertex {
             self.seats[core].current = NOTHING;
@@ -108,7 +106,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.forget_target(core, vertex);
     }
 
-    /// Notes that the instance which waits, if the subtask has one, was cancelled.
+    /// Notes that the waiting instance, if the subtask has one, was cancelled.
     pub fn cancel_wait(&mut self, vertex: Vertex) {
         let place = self.body_state(vertex);
         if let BodyState::Waiting(_) = place
@@ -118,17 +116,17 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Puts the body of an instance that has run to rest.
+    /// Puts the body of an instance back into the table after its run.
     #[inline]
     fn put(&mut self, vertex: Vertex, body: Body) {
         let running = core::mem::replace(self.body_state(vertex), BodyState::Resting(body));
         debug_assert!(matches!(running, BodyState::Running));
-        // `Running` holds nothing: this skips the check whether there is something to drop.
+        // `Running` holds nothing: `forget` skips the check for something to drop.
         core::mem::forget(running);
     }
 
-    /// Notes that core `core`'s current instance was ended, and returns its
-    /// vertex. Its body stays on the stack of a context that is never resumed.
+    /// Notes that core `core`'s current instance was ended, and returns its vertex. The body stays
+    /// on the stack of a context never resumed.
     pub fn lose(&mut self, core: usize) -> Option<Vertex> {
         let vertex = self.detach(core)?;
         *self.body_state(vertex) = BodyState::Lost;
@@ -136,18 +134,17 @@ impl<Body, Parked> Placement<Body, Parked> {
         Some(vertex)
     }
 
-    /// Puts a body to rest where there is none: in the place of one that was
-    /// [lost](Self::lose), or at first.
+    /// Puts a body to rest where there is none: at first, or after the body was [lost](Self::lose).
     pub fn replace(&mut self, vertex: Vertex, body: Body) {
         *self.body_state(vertex) = BodyState::Resting(body);
     }
 
-    /// Takes the body of a subtask out, if no instance of it has started.
+    /// Takes the body of a subtask out, if no instance of the subtask has started.
     pub fn take(&mut self, vertex: Vertex) -> Option<Body> {
         let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Lost) {
             BodyState::Resting(body) => Some(body),
-            // The place was emptied to look into it, and gets back what it had.
+            // The place was emptied for the check, and gets its content back.
             other => {
                 *place = other;
                 None
@@ -155,24 +152,24 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Takes note that an instance has finished that no core has: on a driver where a
-    /// parked one may still be executed.
+    /// Takes note that an instance has finished without a core: for drivers where a parked instance
+    /// may still execute.
     pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {
         *self.body_state(vertex) = BodyState::Resting(body);
         self.forget_target(0, vertex);
     }
 
-    /// Takes note that such an instance was ended, and its body stays on a stack that goes on with
-    /// nothing.
+    /// Takes note that a parked instance was ended. The body stays on a stack never resumed.
     pub fn lose_parked(&mut self, vertex: Vertex) {
         *self.body_state(vertex) = BodyState::Lost;
         self.forget_target(0, vertex);
     }
 
-    /// The scheduler knows that the instance has ended: nobody is to run it.
+    /// Clears the target: the scheduler knows of the end, so no core is to run the instance.
     fn forget_target(&mut self, core: usize, vertex: Vertex) {
         let wants_it = |seat: &CoreSlot| seat.target == vertex;
-        // Nearly always the core that ran it; another one if it was about to move.
+        // Nearly always the core that ran the instance; another core if the instance was about to
+        // move.
         let seat = match wants_it(&self.seats[core]) {
             true => Some(&mut self.seats[core]),
             false => self.seats.iter_mut().find(|seat| wants_it(seat)),
@@ -182,40 +179,40 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Reports whether core `core` has an instance that it should give up.
+    /// Reports whether core `core` has an instance to give up.
     pub fn must_suspend(&self, core: usize) -> bool {
         let CoreSlot { current, target } = self.seats[core];
         current != NOTHING && current != target
     }
 
-    /// Reports whether core `core` has nothing and should have something.
+    /// Reports whether core `core` has no current instance, but a target.
     pub fn is_wanted(&self, core: usize) -> bool {
         let CoreSlot { current, target } = self.seats[core];
         current == NOTHING && target != NOTHING
     }
 
-    /// Takes core `core`'s current instance away from it, if it has one. To be
-    /// followed by [`suspend`](Self::suspend), as soon as its context is known.
+    /// Takes core `core`'s current instance away, if there is one. To be followed by
+    /// [`suspend`](Self::suspend), as soon as the context is known.
     pub fn detach(&mut self, core: usize) -> Option<Vertex> {
         some(core::mem::replace(&mut self.seats[core].current, NOTHING))
     }
 
-    /// Notes that `context` holds a detached instance. Returns the core
-    /// that has been waiting for it, if there is one.
+    /// Notes that `context` holds a detached instance. Returns the core waiting for the instance,
+    /// if there is one.
     pub fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
         *self.body_state(vertex) = BodyState::Suspended(context);
         let mut seats = (0..).map(CoreId).zip(&self.seats);
-        // The scheduler may have given it to another core before its context was known.
+        // The scheduler may have given the instance to another core before its context was known.
         seats.find_map(|(core, seat)| (seat.target == vertex).then_some(core))
     }
 
-    /// Gives core `core`, which has no current instance, what it should have, if
-    /// that is suspended.
+    /// Gives core `core`, without a current instance, its target if the target is suspended.
     pub fn take_suspended(&mut self, core: usize) -> Option<Parked> {
         let vertex = some(self.seats[core].target)?;
         let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Running) {
-            // Only if that has arrived: the core that it left may still be saving its registers.
+            // Only if the context has arrived: the core the instance left may still be saving its
+            // registers.
             BodyState::Suspended(context) => {
                 self.seats[core].current = vertex;
                 Some(context)
@@ -227,7 +224,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Gives core `core`, which has no current instance, what it should have.
+    /// Gives core `core`, without a current instance, its target.
     pub fn next(&mut self, core: usize) -> NextWork<Body, Parked> {
         let Some(vertex) = some(self.seats[core].target) else {
             return NextWork::Nothing;
@@ -237,7 +234,7 @@ impl<Body, Parked> Placement<Body, Parked> {
             BodyState::Resting(body) => NextWork::Start(vertex, body),
             BodyState::Waiting(body) => NextWork::Proceed(vertex, body),
             BodyState::Suspended(context) => NextWork::Continue(context),
-            // The core that still has it will say when it no longer has.
+            // The core still running the instance will report when it has given the instance up.
             BodyState::Running => return NextWork::Nothing,
             // The subtask of an ended DAG: nothing of it is to run.
             BodyState::Lost => {
@@ -249,8 +246,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         next
     }
 
-    /// Gives a core, which has no current instance, one of this subtask to
-    /// start. `None`, and nothing is changed, if it is suspended.
+    /// Gives a core without a current instance an instance of subtask `vertex` to start. Returns
+    /// `None`, with nothing changed, if the instance is suspended.
     #[inline]
     pub fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
         let place = self.body_state(vertex);
@@ -269,9 +266,9 @@ impl<Body, Parked> Placement<Body, Parked> {
         }
     }
 
-    /// Notes that a core has finished its current instance, which was its target, and
-    /// should have one of subtask `next`; gives it that to start. `None` if that is
-    /// suspended: then the core has nothing yet.
+    /// Notes that a core has finished the instance it was meant to run, and makes subtask `next`
+    /// its target. Returns the body to start. Returns `None` if the next instance is suspended:
+    /// then the core has nothing yet.
     #[inline]
     pub fn exchange(
         &mut self,
@@ -283,7 +280,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.put(finished, body);
         let started = self.start(core, next);
         // The next instance is suspended, and its context may not be here yet: the core looks for
-        // it as any other.
+        // the instance in the usual way.
         if started.is_none() {
             self.seats[core.index()] = CoreSlot {
                 current: NOTHING,
@@ -298,7 +295,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         some(self.seats[core].current)
     }
 
-    /// Returns the body of a subtask of which no instance has started.
+    /// Returns the body of a subtask without a started instance.
     pub fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
         match self.body_state(vertex) {
             BodyState::Resting(body) => Some(body),

@@ -1,4 +1,4 @@
-//! The earliest absolute deadline first: that of the most urgent sink that follows.
+//! Earliest absolute deadline first: the deadline of the most urgent following sink.
 
 use super::PolicyRule;
 

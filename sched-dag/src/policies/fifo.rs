@@ -1,4 +1,4 @@
-//! First in, first out: the job that is released first goes first.
+//! First in, first out: the job with the earliest release goes first.
 
 use super::PolicyRule;
 

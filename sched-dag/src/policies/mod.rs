@@ -1,11 +1,11 @@
-//! Policies: the orders in which ready instances go (R5). Each is a file next to this one and a row of
-//! the table at the end.
+//! Policies: the orders of ready instances (R5). Each policy is a file next to this file and a row
+//! of the table at the end.
 //!
 //! A policy gives each subtask of a DAG a *number* and says whether the job's nominal release is
-//! added to it. The smallest sum goes first; of equal ones DAG, job and subtask decide. So the place
-//! of an instance is fixed at the release of its job. Scheduler, law, analysis and witness know no
-//! more of a policy than that; options, scenarios, recordings and pages have its word and its row
-//! from the table.
+//! added to it. The smallest sum goes first; among equal sums DAG, job and subtask decide. So the
+//! place of an instance is fixed at the release of its job. Scheduler, law, analysis and witness
+//! know nothing else of a policy; options, scenarios, recordings and pages take its word and its
+//! row from the table.
 //!
 //! An order is no policy in this sense if it changes while an instance waits (least laxity at each
 //! instant, time slices), or depends on the job's number.
@@ -15,12 +15,12 @@ use alloc::vec::Vec;
 use crate::policy::Preemption;
 use crate::task_set::Dag;
 
-/// All that is to be known of a policy.
+/// All properties of a policy.
 struct PolicyRule {
-    /// Its word in options, scenarios and traces.
+    /// The policy's word in options, scenarios and traces.
     word: &'static str,
-    /// Returns the number of each subtask of a DAG. Where the release is added, a number above the
-    /// relative deadline counts as that.
+    /// Returns the number of each subtask of a DAG. If the release is added, a number is capped at
+    /// the relative deadline.
     numbers: fn(&Dag) -> Vec<u64>,
     /// Whether the job's nominal release is added.
     adds_release: bool,
@@ -34,16 +34,16 @@ impl Policy {
         Self::WORDS[self as usize]
     }
 
-    /// Returns the policy of a word.
+    /// Returns the policy with this word.
     pub fn of_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|policy| policy.word() == word)
     }
 
-    /// Returns the number of each subtask of a DAG; the smaller one goes first.
+    /// Returns the number of each subtask of a DAG; the smaller number goes first.
     pub fn numbers(self, dag: &Dag) -> Vec<u64> {
         let mut numbers = (Self::RULES[self as usize].numbers)(dag);
         if self.adds_release() {
-            // Then the sum is a time, as each deadline is.
+            // Capped, so that the sum is a valid time, like each deadline.
             let most_ns = dag.relative_deadline_ns();
             numbers
                 .iter_mut()
@@ -63,13 +63,13 @@ impl Policy {
     }
 }
 
-/// How a scheduler orders instances, and for how many cores.
+/// The scheduler's order of instances, and the number of cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SchedulerOptions {
-    /// How the ready instances are ordered.
+    /// The order of the ready instances.
     pub policy: Policy,
-    /// Whether a started instance may lose its core. With
-    /// [`Preemption::Enabled`], non-preemptive subtasks still keep theirs.
+    /// Whether a started instance may lose its core. With [`Preemption::Enabled`], non-preemptive
+    /// subtasks still keep theirs.
     pub preemption: Preemption,
     /// The number of cores, at least 1.
     pub cores: u32,
@@ -80,7 +80,7 @@ macro_rules! policies {
     ($($(#[doc = $doc:literal])+ $Name:ident = $module:ident;)+) => {
         $(mod $module;)+
 
-        /// How the ready instances are ordered.
+        /// The order of the ready instances.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[non_exhaustive]
         pub enum Policy {
@@ -90,7 +90,7 @@ macro_rules! policies {
         impl Policy {
             const RULES: &[PolicyRule] = &[$($module::RULE),+];
 
-            /// All policies. Recordings have their places in this list, so a new one comes last.
+            /// All policies. Recordings store places in this list, so a new policy comes last.
             pub const ALL: [Self; Self::WORDS.len()] = [$(Self::$Name),+];
 
             /// The words of all policies.
@@ -137,8 +137,8 @@ mod tests {
         }
     }
 
-    /// Runs a job of each DAG on two cores, released together, with WCETs. Returns the last finish, and
-    /// the DAGs that are late.
+    /// Runs a job of each DAG on two cores, released together, with WCETs. Returns the last finish,
+    /// and the late DAGs.
     pub(super) fn run(word: &str, specs: &[DagSpec]) -> (u64, Vec<u32>) {
         let policy = Policy::of_word(word).unwrap();
         let options = CommitOptions::new(policy, 2);

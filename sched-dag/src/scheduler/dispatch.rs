@@ -167,8 +167,8 @@ pub enum HandOff {
     To(Vertex, Decision),
     /// The core is idle, and nothing else changes.
     Idle,
-    /// The core is idle, and the instant is not over: begin it again at the same
-    /// time, and end it with a dispatch.
+    /// The core is idle, and the instant is not over: begin it again at the same time, and end it
+    /// with a dispatch.
     Open,
 }
 
@@ -201,6 +201,7 @@ impl Scheduler {
         let is_here = ending.phase == InstancePhase::Running(core);
         // A due deadline or release has to come first, by the whole step.
         let is_quiet = self.log.now_ns < self.quiet_until_ns;
+        // A dispatch is owed, or the core is to run another instance: the whole step has to decide.
         if self.fresh != 0 || !is_here {
             return (self.end_later(now_ns, core, vertex), Unwritten::Nothing);
         }
@@ -365,6 +366,7 @@ impl Scheduler {
     #[inline(never)]
     fn give_first_apart(&mut self, core: CoreId, ended: u32) -> Option<(u32, EventKind)> {
         self.ready.lists.end(core, ended);
+        // The list first: entries precede all lines (T1).
         if let Some(entry) = self.follow(core) {
             return Some((entry, self.give_to_entry(core, entry).what));
         }

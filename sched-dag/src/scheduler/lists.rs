@@ -1,8 +1,8 @@
 //! The lists of the cores in tables (T1 to T3 of [`table`](crate::table)).
 //!
-//! Each such core has its list, the *position* of the next entry, and the entries begun there and
-//! not finished, of which the *innermost* runs. An instance of a table's DAG never enters a line:
-//! the phase of its vertex is all that its entry needs. So the next entry, its vertex's phase and a
+//! Each such core has a list, the *position* of the next entry, and the entries begun there and not
+//! finished. The *innermost* of them runs. An instance of a table's DAG never enters a line: for
+//! its entry, the phase of the vertex is enough. So the next entry, the phase of its vertex and a
 //! depth decide the core's action, however many instances are ready.
 //!
 //! # When a core is looked at
@@ -15,8 +15,8 @@
 //! # Begun for a moment
 //!
 //! An entry may start while the entry following it may start on top of it at the same instant. The
-//! first entry has then begun in its place and is still ready: its start comes when it gets the
-//! core. Until then a cut of its job cancels it.
+//! first entry has then begun in its place and is still ready: the start comes with the core. Until
+//! then a cut of the job cancels the entry's instance.
 //!
 //! # Laps without work
 //!
@@ -171,7 +171,7 @@ impl ListTable {
         }
     }
 
-    /// Reports whether any core is touched other than this one, which is looked at next.
+    /// Reports whether any core is touched other than this core, the next to be looked at.
     #[inline]
     pub(super) fn touches_others(&mut self, core: CoreId) -> bool {
         self.touched.remove(core.index());
@@ -251,7 +251,7 @@ impl ListState {
         Some((*entry, entry.job_in(self.lap)))
     }
 
-    /// Begins the next entry, on top of the innermost one.
+    /// Begins the next entry, on top of the innermost entry.
     fn begin(&mut self, entry: ListEntry) {
         if self.open > 0 {
             self.below[self.open as usize - 1] = self.innermost;
@@ -327,6 +327,7 @@ impl Scheduler {
             match (running, self.cores.running(core)) {
                 (Some(running), _) if running == entry => continue,
                 (Some(running), Some(key)) => {
+                    // An entry enters no line, so only the vertex of its key counts.
                     let key = match key == DispatchKey::ENTRY {
                         true => DispatchKey::of_rank(0, running),
                         false => key,
@@ -335,6 +336,7 @@ impl Scheduler {
                     // A member back in line may be for another core (T4).
                     self.fresh += 1;
                 }
+                // The core was idle: no other line may take it for idle any more.
                 _ => _ = self.cores.take_idle_of(&[core]),
             }
             let decision = self.give_to_entry(core, entry);
@@ -369,6 +371,7 @@ impl Scheduler {
         let is_here = |vertex: &u32| vertices.get(*vertex).phase == InstancePhase::Running(core);
         let member = cores.running(core).filter(|key| *key != DispatchKey::ENTRY);
         let member = member.map(DispatchKey::vertex).filter(is_here);
+        // A member that keeps its core keeps the core from entries, too (T4).
         let mut top = (list.open > 0).then_some(list.innermost).or(member);
         let mut passed = 0;
         while top.is_none_or(|top| vertices.get(top).is_preemptible)

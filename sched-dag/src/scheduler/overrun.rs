@@ -151,10 +151,12 @@ impl Scheduler {
 
     #[inline]
     fn make_room(&mut self, dag: DagId) {
+        // W4: waits ending at this instant end first; an abort would cancel their instances (W6).
         self.time_out_due();
         let jobs = &self.dags[dag.index()].jobs;
         let sequence = jobs.oldest_uncut();
         let job = sequence.map_or(jobs.first_waiting, |sequence| jobs.job(sequence).number);
+        // Rule 4: at its deadline the job is a miss, too; once cut or skipped it could not be.
         self.judge_given_up(dag, job);
         // All jobs in flight are cut already, so room is on its way: aborting more would cost jobs
         // without gaining room.

@@ -455,8 +455,8 @@ impl SurvivedFaults {
 }
 
 impl Scheduler {
-    /// Reports whether a DAG would survive a fault in a job now, if the driver has another
-    /// function for the subtask (D1).
+    /// Reports whether a DAG would survive a fault in a job now, if the driver has another function
+    /// for the subtask (D1).
     ///
     /// # Panics
     ///

@@ -279,7 +279,7 @@ impl ReleaseLane {
 }
 
 impl Hash for Timers {
-    /// By the times alone: lanes and the order of a heap decide no more than the order of DAGs within
+    /// Hashes the times alone: lanes and the order of a heap decide only the order of DAGs within
     /// an instant.
     fn hash<H: Hasher>(&self, state: &mut H) {
         for timer in 0..self.first_lane {

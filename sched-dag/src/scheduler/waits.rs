@@ -7,8 +7,8 @@
 //! - **W1, waiting.** From the end of a segment to the end of its wait the instance is not eligible
 //!   and holds no core. Waits do not queue: each instance has a timer and a limit of its own.
 //! - **W2, the end.** A wait ends with its answer, and at its limit at the latest; an answer at the
-//!   instant of the limit still counts. At that instant the instance is eligible again, with its
-//!   old key, on any core of its cluster.
+//!   instant of the limit still counts. At that instant the instance is eligible again, with the
+//!   old key, on any core of the cluster.
 //! - **W3, not a finish.** A wait releases no edge, completes no job, and the subtask's next
 //!   instance stays behind the waiting instance (R2 to R4).
 //! - **W4, one instant.** At one instant the ending segments come first, then the ending waits,
@@ -17,7 +17,7 @@
 //!   segment. A wait, even a wait of 0, gives up the core.
 //! - **W6, cut jobs.** No instance of a cut job waits: the instance is cancelled when the job is
 //!   cut, or where the instance would begin to wait.
-//! - **W7, late answers.** An answer names its wait; any other wait ignores the answer.
+//! - **W7, late answers.** An answer names a wait; any other wait ignores the answer.
 //!
 //! The begin of a wait costs the DAG's timers one step of a heap, and so does its end.
 
@@ -43,7 +43,7 @@ pub(super) struct WaitTable {
 struct LatestWait {
     /// The job of the wait; `u64::MAX` for none.
     job: u64,
-    /// Its number among the waits of its instance, from 0 on.
+    /// The number among the waits of the instance, from 0 on.
     number: u32,
     has_timed_out: bool,
 }
@@ -181,7 +181,7 @@ impl Scheduler {
         self.waits.len() > 0
     }
 
-    /// Ends the wait with the earliest limit, if the limit has come by `now_ns`, and gives its
+    /// Ends the wait with the earliest limit, if the limit has come by `now_ns`, and gives the
     /// instance an idle core. Returns `None` if more is to be decided at this instant, even if the
     /// wait has been ended already: then the driver takes the step the usual way. No request may be
     /// pending.
@@ -198,6 +198,7 @@ impl Scheduler {
         }
         (self.log.now_ns, self.log.here) = (self.log.now_ns.max(now_ns), here);
         self.end_wait(place, true);
+        // Another limit, a release or a deadline is due at this instant: the whole step serves all.
         if self.log.now_ns >= self.quiet_until_ns {
             return None;
         }
@@ -218,16 +219,18 @@ impl Scheduler {
     pub(super) fn answer(&mut self, wait: WaitId) {
         let number = self.vertex(wait.instance).0;
         let vertex = self.vertices.get(number);
+        // W7: the limit was first, or the job was cut; the subtask may do another job by now.
         if vertex.phase != InstancePhase::Waiting || vertex.job != wait.instance.job {
             return;
         }
         let place = self.waits.place(number);
+        // The instance may wait again by now: the answer to an earlier wait must not end this wait.
         if self.waits.latest[place].number == wait.number {
             self.end_wait(place, false);
         }
     }
 
-    /// Ends the wait whose limit has come. `timer` is its number, behind the timers of the DAGs.
+    /// Ends the wait whose limit has come. `timer` is a number behind the timers of the DAGs.
     #[cold]
     #[inline]
     pub(super) fn time_out(&mut self, timer: usize) {
