@@ -299,6 +299,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             true => (self.scheduler).wait_shortly(ended_ns, core, vertex, limit_ns),
             false => None,
         };
+        // A wait of no time, and nothing more urgent: only body and journal learn of it.
         if let Some(HandOff::To(next, _)) = done
             && next == vertex
         {

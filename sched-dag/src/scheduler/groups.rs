@@ -283,6 +283,7 @@ impl ReadyLines {
     #[inline(never)]
     fn concern_others_apart(&mut self, count: u32, core: CoreId, kept: bool) -> bool {
         let line = self.latest;
+        // An instance of a table concerns only the core of its entry, touched if it may start.
         if line.is_table() {
             return self.lists.touches_others(core);
         }

@@ -47,7 +47,7 @@ use crate::task_set::TaskSet;
 /// ```
 ///
 /// 1. The job is released, and all predecessors and the subtask's instance in the job before have
-///    ended (R2). The instance goes into the ready queue.
+///    ended (R2). The instance enters the ready queue, or is reported to the list of its core.
 /// 2. Likewise, but the core that has just finished takes the instance at once, past the queue
 ///    (`Scheduler::pass`, [`VertexTable::hand_over`]).
 /// 3. A dispatch starts the instance ([`Vertex::run`]).
