@@ -272,8 +272,8 @@ impl Dag {
         self.on_fault
     }
 
-    /// Returns the longest time between the nominal releases of two jobs of a periodic DAG with only
-    /// lost jobs in between, while the DAG is not paused. Jobs are lost by survived faults.
+    /// Returns the longest time between the nominal releases of two jobs of a periodic DAG with
+    /// only lost jobs in between, while the DAG is not paused. Jobs are lost by survived faults.
     pub fn renewal_ns(&self) -> u64 {
         let lost_in_a_row = match self.on_fault {
             OnFault::EndDag => 0,

@@ -6,9 +6,9 @@
 /// parentheses; then `of` names the source of its code.
 ///
 /// If the texts need more than the fields, brackets behind the enum's name declare the additional
-/// argument, and `words` takes it. Such a table may also declare a type, in parentheses, for the
-/// columns of a row next to its code; `columns` returns them. The caller writes the `Display` of
-/// such a table. The doc comment of a variant is its meaning in `MEANINGS`, and so an output.
+/// argument, and `words` takes it. Such a table may declare a type, in parentheses, for the columns
+/// of a row next to its code; `columns` returns them. The caller writes the `Display` of such a
+/// table. The doc comment of a variant is its meaning in `MEANINGS`, and so an output.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! worded {

@@ -1,8 +1,8 @@
 //! The least slack at the release: the earliest latest start first.
 //!
 //! If a subtask starts later than its deadline less the longest path from it, itself included, the
-//! job is late whatever follows. Unlike the laxity of LLF, the latest start is fixed at the
-//! release. Without WCETs the policy is EDF.
+//! job is late whatever follows. Unlike the laxity of LLF, the slack is fixed at the release.
+//! Without WCETs the policy is EDF.
 
 use alloc::vec::Vec;
 
