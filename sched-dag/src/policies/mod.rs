@@ -1,5 +1,5 @@
-//! Policies: the orders of ready instances (R5). Each policy is a file next to this file and a row
-//! of the table at the end.
+//! Policies: the orders of ready instances (R5). Each policy is a file of the folder and a row of
+//! the table at the end.
 //!
 //! A policy gives each subtask of a DAG a *number* and says whether the job's nominal release is
 //! added to it. The smallest sum goes first; among equal sums DAG, job and subtask decide. So the
