@@ -130,7 +130,7 @@ pub struct LockUse {
 impl LockUse {
     /// Returns the longest wait for a section, in nanoseconds, on a machine of so many cores, which
     /// take turns.
-    pub(crate) fn turn_ns(&self, cores: u32) -> u64 {
+    pub(crate) fn longest_wait_ns(&self, cores: u32) -> u64 {
         let others = u64::from(cores.saturating_sub(1)) * u64::from(self.is_shared);
         self.longest_ns.unwrap_or(u64::MAX).saturating_mul(others)
     }

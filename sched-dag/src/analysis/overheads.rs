@@ -180,14 +180,13 @@ impl Overheads {
     /// start, and once when it goes on after a preemption, paid for by the preempting instance. An
     /// instance preempted while waiting for a section gives up its turn and waits anew.
     /// `docs/proving.md` has the argument.
-    /// argument.
     pub fn among(self, dags: &mut dyn Iterator<Item = &Dag>, cores: u32) -> Self {
-        let (mut longest_ns, mut turn_ns) = (0, 0);
+        let (mut longest_ns, mut longest_wait_ns) = (0, 0);
         for of in dags.flat_map(Dag::locks) {
             longest_ns = of.longest_ns.unwrap_or(u64::MAX).max(longest_ns);
-            turn_ns = of.turn_ns(cores).max(turn_ns);
+            longest_wait_ns = of.longest_wait_ns(cores).max(longest_wait_ns);
         }
-        let sections_ns = longest_ns.saturating_mul(2).saturating_add(turn_ns);
+        let sections_ns = longest_ns.saturating_mul(2).saturating_add(longest_wait_ns);
         Self {
             interrupt_ns: self.interrupt_ns.saturating_add(sections_ns),
             ..self

@@ -23,7 +23,7 @@ mod costs;
 mod dispatch;
 mod distribution;
 mod facts;
-mod replay;
+mod lives;
 pub mod sweep;
 mod tables;
 mod tally;
@@ -35,7 +35,7 @@ use core::ops::Range;
 pub use costs::MeasuredCosts;
 pub use dispatch::{DispatchReport, dispatch_violations, judge_dispatch};
 pub use distribution::{Distribution, Histogram};
-pub use replay::{ReplayVerdict, judge, violations};
+pub use lives::{LifeVerdict, judge, violations};
 pub use tally::{DagTally, RunTally, SubtaskTally};
 pub use violation::{Rule, Violation};
 

@@ -31,7 +31,7 @@ use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::tables::{CoreLists, TableReplay};
+use super::tables::{CoreLists, TableProgress};
 use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::Event;
@@ -197,7 +197,7 @@ pub(super) struct DispatchSweep<'m> {
     unstarted: BTreeSet<Key>,
     wrong: Vec<DispatchBreach>,
     waits: &'m mut WaitCounts,
-    tables: TableReplay<'m>,
+    tables: TableProgress<'m>,
 }
 
 impl<'m> DispatchSweep<'m> {
@@ -223,7 +223,7 @@ impl<'m> DispatchSweep<'m> {
             unstarted: BTreeSet::new(),
             wrong: Vec::new(),
             waits,
-            tables: TableReplay::new(model.task_set, &model.lists, terms.is_whole),
+            tables: TableProgress::new(model.task_set, &model.lists, terms.is_whole),
         }
     }
 

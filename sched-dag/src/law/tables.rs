@@ -85,7 +85,7 @@ impl<'m> CoreLists<'m> {
 ///
 /// An entry that never starts is treated as void: other rules check that all instances of a job
 /// run.
-pub(super) struct TableReplay<'m> {
+pub(super) struct TableProgress<'m> {
     task_set: &'m TaskSet,
     lists: &'m CoreLists<'m>,
     cores: BTreeMap<CoreId, ListPosition>,
@@ -104,7 +104,7 @@ struct ListPosition {
     unstarted: BTreeSet<(u32, u64)>,
 }
 
-impl<'m> TableReplay<'m> {
+impl<'m> TableProgress<'m> {
     /// Begins at the start of a journal, which may be whole or not.
     pub(super) fn new(task_set: &'m TaskSet, lists: &'m CoreLists<'m>, is_whole: bool) -> Self {
         let of_core = |core: &CoreId| {

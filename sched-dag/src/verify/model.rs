@@ -50,7 +50,9 @@ pub(super) fn build(
         dag.locks = locks(spec, findings.specs);
         for of in &dag.locks {
             let wait_ns = &mut dag.subtasks[of.subtask].lock_wait_ns;
-            let all_ns = of.turn_ns(options.cores).saturating_mul(of.sections.into());
+            let all_ns = of
+                .longest_wait_ns(options.cores)
+                .saturating_mul(of.sections.into());
             *wait_ns = wait_ns.saturating_add(all_ns);
         }
         dag

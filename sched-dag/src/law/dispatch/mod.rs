@@ -5,7 +5,7 @@ use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::replay::{stage_after, stage_before};
+use super::lives::{stage_after, stage_before};
 use super::sweep::{DispatchModel, DispatchState, DispatchSweep, Place, WaitCounts};
 use super::tables::CoreLists;
 use super::{JudgeOptions, Violation};

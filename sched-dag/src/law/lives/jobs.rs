@@ -36,7 +36,7 @@
 
 use alloc::vec::Vec;
 
-use super::{DagReplay, InstanceLife, JournalReplay, StepTime};
+use super::{DagHistory, InstanceLife, LifeJudge, StepTime};
 use crate::ids::{DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::law::sweep::DispatchState;
@@ -118,7 +118,7 @@ impl JobState {
     }
 }
 
-impl DagReplay {
+impl DagHistory {
     /// Forgets the jobs before a complete job, as long as they are over themselves.
     fn forget_before(&mut self, job: u64) {
         while let Some(first) = self.jobs.first_entry()
@@ -133,7 +133,7 @@ impl DagReplay {
     }
 }
 
-impl JournalReplay<'_> {
+impl LifeJudge<'_> {
     /// Judges the release, queueing or skipping of a job.
     pub(super) fn release(&mut self, event: &Event) {
         let event = *event;
@@ -430,7 +430,7 @@ impl SinkDeadline {
     }
 }
 
-impl JournalReplay<'_> {
+impl LifeJudge<'_> {
     /// Returns the deadlines of a job's sinks, or `None` if the job's release is not known.
     fn dues(&self, dag: DagId, known: &JobState) -> Option<Vec<SinkDeadline>> {
         let release_ns = known.release_ns?;
@@ -550,7 +550,7 @@ struct InstanceCondition {
     may_be_lost: bool,
 }
 
-impl JournalReplay<'_> {
+impl LifeJudge<'_> {
     /// Judges the readiness of an instance, or its start without a readiness.
     pub(super) fn join(&mut self, event: &Event, instance: Instance, moment: StepTime) {
         let too_early = self.before_release(event, instance);

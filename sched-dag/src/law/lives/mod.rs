@@ -1,9 +1,9 @@
-//! Replays a journal: R1 to R4, one life of each instance, one instance on each core.
+//! Judges a journal by R1 to R4, one life of each instance, one instance on each core.
 //!
-//! The replay takes the events in their order, where each event comes after all its causes, and
+//! The judge takes the events in their order, where each event comes after all its causes, and
 //! compares each event with the state known so far. An event not yet seen has not happened,
 //! whatever time it carries. Complete jobs are forgotten once nothing waits for them any more, and
-//! jobs that are due and waiting are kept as runs ([`backlog`]). So the replay needs memory for the
+//! jobs that are due and waiting are kept as runs ([`backlog`]). So the judge needs memory for the
 //! jobs in flight only.
 //!
 //! Words. A *step* of the scheduler is identified by its core and by the core's last machine event
@@ -46,7 +46,7 @@ use jobs::JobState;
 
 /// The findings about R1 to R4, waits, lives of instances, and cores in a journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReplayVerdict {
+pub struct LifeVerdict {
     /// Every breach, in the order of discovery.
     pub violations: Vec<Violation>,
     /// The longest time from the finish an instance waited for last to the instance's readiness.
@@ -62,14 +62,14 @@ pub fn judge(
     task_set: &TaskSet,
     terms: JudgeOptions,
     events: impl IntoIterator<Item = Event>,
-) -> ReplayVerdict {
-    let mut replay = JournalReplay {
+) -> LifeVerdict {
+    let mut lives = LifeJudge {
         task_set,
         terms,
         dags: task_set
             .dags()
             .iter()
-            .map(|_| DagReplay::default())
+            .map(|_| DagHistory::default())
             .collect(),
         cores: Vec::new(),
         first_ns: None,
@@ -78,12 +78,12 @@ pub fn judge(
         finish_to_ready_max_ns: 0,
     };
     for event in events {
-        replay.judge_event(&event);
+        lives.judge_event(&event);
     }
-    replay.finish();
-    ReplayVerdict {
-        violations: replay.found,
-        finish_to_ready_max_ns: replay.finish_to_ready_max_ns,
+    lives.finish();
+    LifeVerdict {
+        violations: lives.found,
+        finish_to_ready_max_ns: lives.finish_to_ready_max_ns,
     }
 }
 
@@ -97,11 +97,11 @@ pub fn violations(
     judge(task_set, terms, events).violations
 }
 
-struct JournalReplay<'a> {
+struct LifeJudge<'a> {
     task_set: &'a TaskSet,
     terms: JudgeOptions,
-    dags: Vec<DagReplay>,
-    cores: Vec<CoreReplay>,
+    dags: Vec<DagHistory>,
+    cores: Vec<CoreHistory>,
     /// When the first event was written.
     first_ns: Option<u64>,
     /// The latest time so far.
@@ -111,7 +111,7 @@ struct JournalReplay<'a> {
 }
 
 #[derive(Default)]
-struct DagReplay {
+struct DagHistory {
     /// The jobs that are released or partial, and not forgotten.
     jobs: BTreeMap<u64, JobState>,
     /// The jobs that are due and not released.
@@ -137,7 +137,7 @@ struct DagReplay {
 }
 
 #[derive(Clone, Default)]
-struct CoreReplay {
+struct CoreHistory {
     /// Counts the core's machine events.
     step: u64,
     /// The instance running on the core.
@@ -158,7 +158,7 @@ impl StepTime {
     }
 }
 
-impl JournalReplay<'_> {
+impl LifeJudge<'_> {
     fn judge_event(&mut self, event: &Event) {
         // A finish or a due release may carry an earlier time than lost events.
         if !matches!(event.what, EventKind::Finish | EventKind::Due) {
@@ -178,13 +178,13 @@ impl JournalReplay<'_> {
         }
     }
 
-    fn dag(&mut self, dag: DagId) -> &mut DagReplay {
+    fn dag(&mut self, dag: DagId) -> &mut DagHistory {
         &mut self.dags[dag.index()]
     }
 
-    fn core(&mut self, core: CoreId) -> &mut CoreReplay {
+    fn core(&mut self, core: CoreId) -> &mut CoreHistory {
         if self.cores.len() <= core.index() {
-            self.cores.resize(core.index() + 1, CoreReplay::default());
+            self.cores.resize(core.index() + 1, CoreHistory::default());
         }
         &mut self.cores[core.index()]
     }
@@ -375,7 +375,7 @@ pub(super) const fn stage_before(event: &Event) -> DispatchState {
     }
 }
 
-impl JournalReplay<'_> {
+impl LifeJudge<'_> {
     /// Judges an event of an instance.
     fn instance(&mut self, event: &Event) {
         let Some(instance) = event.instance() else {
