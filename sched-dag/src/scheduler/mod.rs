@@ -36,7 +36,9 @@
 mod bits;
 mod dispatch;
 mod groups;
+mod heap;
 mod instances;
+mod job_heap;
 mod jobs;
 mod key;
 mod lists;

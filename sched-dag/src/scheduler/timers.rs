@@ -21,8 +21,8 @@ use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
 
 use super::bits::BitSet;
+use super::heap::IndexedHeap;
 use super::jobs::TimerKind;
-use super::ready_queue::IndexedHeap;
 use crate::ids::{ClusterId, to_u32};
 use crate::order::sorted_by_key;
 use crate::task_set::TaskSet;
