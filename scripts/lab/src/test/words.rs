@@ -24,6 +24,9 @@ const PAGES: &str = "docs/*.md";
 /// The pages that a user reads first, which are rooms of their own.
 const FIRST_PAGES: [&str; 3] = ["README.md", "docs/guide.md", "docs/commands.md"];
 
+/// The row of all other pages of `docs/`.
+const OTHER_PAGES: &str = "docs/others";
+
 /// The words that stand for nouns and are counted.
 const COUNTED: [&str; 5] = ["what", "that", "which", "it", "one"];
 
@@ -138,29 +141,31 @@ pub(super) fn check_rooms(sources: &[SourceFile], list: Option<&Path>) -> Result
     none_of(over.collect())
 }
 
-/// Counts the pronouns in 1,000 words of the documentation of each top folder and of the first
-/// pages, and the words of all pages of `docs/`.
+/// Counts the pronouns in 1,000 words of the documentation of each top folder, of each crate of the
+/// kernel, of the first pages and of all others, and the words of all pages of `docs/`.
 fn rooms(sources: &[SourceFile]) -> BTreeMap<String, usize> {
     let mut counts = BTreeMap::<String, [usize; 2]>::new();
     let mut words = 0;
     for SourceFile { name, text } in sources {
         let is_page = name.ends_with(".md");
         let below_docs = name.strip_prefix("docs/");
-        if is_page && below_docs.is_some_and(|page| !page.contains('/')) {
-            words += text.split_whitespace().count();
-        }
+        let is_in_docs = is_page && below_docs.is_some_and(|page| !page.contains('/'));
+        words += text.split_whitespace().count() * usize::from(is_in_docs);
         let is_first = FIRST_PAGES.contains(&&**name);
+        if is_first || is_in_docs {
+            let room = if is_first { name } else { OTHER_PAGES };
+            count(text.lines(), counts.entry(room.into()).or_default());
+        }
         let is_code =
             name.ends_with(".rs") && !name.contains("/tests") && !name.ends_with("tests.rs");
-        let Some((top, _)) = name.split_once('/').filter(|_| is_code && !is_first) else {
-            if is_first {
-                count(text.lines(), counts.entry(name.clone()).or_default());
-            }
-            continue;
-        };
         let docs = text.lines().map(str::trim_start);
         let docs = docs.filter_map(|line| line.strip_prefix("///").or(line.strip_prefix("//!")));
-        count(docs, counts.entry(top.into()).or_default());
+        // The kernel's crates are rooms of their own, and of the kernel.
+        let ends = name.match_indices('/').map(|(end, _)| &name[..end]);
+        let deepest = 1 + usize::from(name.starts_with("kernel/"));
+        for room in ends.take(deepest * usize::from(is_code)) {
+            count(docs.clone(), counts.entry(room.into()).or_default());
+        }
     }
     let rate = |(room, [pronouns, all]): (String, [usize; 2])| {
         (room, (pronouns * 1000).div_ceil(all.max(1)))
@@ -235,12 +240,17 @@ mod tests {
                 "It runs, `that one` too.\n```\nwhat\n```\n",
             ),
             file("docs/decisions/1.md", "It.\n"),
+            file("docs/linux.md", "It runs.\n"),
+            file("kernel/net/src/a.rs", "@/ The frame.\n"),
         ]);
         let row = |room: &str, count: usize| (room.to_owned(), count);
         let expected = [
-            row("docs/*.md", 8),
+            row("docs/*.md", 10),
             row("docs/guide.md", 334),
+            row("docs/others", 500),
             row("fass", 250),
+            row("kernel", 0),
+            row("kernel/net", 0),
         ];
         assert_eq!(counted, expected.into());
     }
