@@ -1,6 +1,6 @@
 //! Close stamps make a set.
 //!
-//! Each topic has a [ring](Ring) of messages in order of arrival. A *search*
+//! Each topic has a [ring](TopicRing) of messages in order of arrival. A *search*
 //! walks through them by advancing cursors, always that of the earliest head. The
 //! fronts of all rings may be a *candidate*: the best set that was found so far,
 //! from its earliest to its latest stamp. The *pivot* is the topic that was latest
