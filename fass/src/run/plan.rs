@@ -496,7 +496,7 @@ impl SubtaskCode {
 
 impl core::fmt::Debug for SubtaskCode {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Body")
+        f.debug_struct("SubtaskCode")
             .field("has_effects", &self.has_effects())
             .finish_non_exhaustive()
     }

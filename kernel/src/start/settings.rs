@@ -19,6 +19,8 @@
 //!   0.
 //! - `from=DAG/JOB`: the replay begins with that job, or with the last job before it whose states
 //!   are all recorded. Default: all jobs.
+//! - `input=N`: the last N bytes of the loader's module are a script of bytes that arrive on wires.
+//!   Default: 0.
 //! - `trace_events=N`: the most events kept by a run's journal; 0: none. Default: as many as the
 //!   run needs, or as fit into a quarter of the free memory.
 //! - `bounds=judge|observe`: whether exceeding a proven bound makes a run fail. Default: `judge`.

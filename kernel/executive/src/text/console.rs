@@ -1,7 +1,7 @@
 //! Text on the serial line, without disturbing measurements.
 //!
 //! The printing context makes the text outside every lock (`TextPieces`), and copies it in pieces
-//! into a bounded buffer (`buffer`); the lock is held for the copy of one piece. Outside a run the
+//! into a bounded buffer (`OutputRing`); the lock is held for the copy of one piece. Outside a run the
 //! text is sent at once. During a run the text stays in the buffer until an idle core sends it,
 //! byte by byte, so that no subtask ever waits for a serial port; excess text is dropped and
 //! counted, never silently. A part of the buffer is reserved for the kernel's own machine lines, so
@@ -10,7 +10,7 @@
 //! Text and machine lines are distinct: only [`front::json`] can print a line beginning with `{`.
 //!
 //! With `console=on` on the command line a person can talk to the kernel during a run;
-//! `background`'s module `session` does this.
+//! the shell of `front` does this.
 //!
 //! # The last words of a dying kernel, straight to the port
 //!
