@@ -438,7 +438,7 @@ impl AbstractionSet {
         ends.try_for_each(|end| self.transitions(&end, bounds, each))
     }
 
-    /// Returns the next job of each vertex with all predecessors dispatched.
+    /// Returns the next job of each vertex, if all its predecessors have been dispatched.
     fn candidates(&self, state: &AbstractState) -> Vec<Candidate> {
         let mut candidates = Vec::new();
         for (position, vertex) in self.vertices.iter().enumerate() {
@@ -572,7 +572,7 @@ impl AbstractionSet {
         self.normal(next)
     }
 
-    /// Drops everything invisible to later starts, and counts from the present hyperperiod.
+    /// Drops everything that no later start can see, and counts from the present hyperperiod.
     pub(super) fn normal(&self, mut state: AbstractState) -> AbstractState {
         let counts = &state.counts;
         state.finishes.retain(|of| {

@@ -1,5 +1,5 @@
-//! The commit's own clusters: heavy DAGs own cores and lend the rest, or each DAG that needs
-//! several cores gets cores of its own and the others share single cores.
+//! The commit's own clusters: heavy DAGs own cores and lend the time left there, or each DAG that
+//! needs several cores gets cores of its own and the others share single cores.
 //!
 //! Under static priorities the cores are divided by [`lend`](super::lend()) if the result proves
 //! all DAGs. Otherwise this is federated scheduling (papers below). Under other policies federated
@@ -184,7 +184,8 @@ fn lend_cores(
     let terms = LendingTerms {
         bursts,
         entry_limit: if is_delayed { 0 } else { ENTRY_LIMIT },
-        // Members are ranked by deadline, a ranking no release-dependent order provides.
+        // Members are ranked by deadline, and an order that depends on releases does not rank them
+        // so.
         has_members: !settings.policy.adds_release(),
     };
     let LendingAnswer { plan, failed } = terms.lend(&tasks, settings.cores)?;
@@ -204,7 +205,7 @@ fn federate(
     tasks: &[Task],
     settings: &AnalysisSettings,
 ) -> Result<(), NotAssigned> {
-    // The number of cores of each cluster, and the place of each DAG.
+    // The number of cores of each cluster, and the cluster of each DAG.
     let mut sizes = Vec::new();
     let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
     let (mut tables, mut left) = (Vec::new(), settings.cores);

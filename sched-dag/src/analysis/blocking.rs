@@ -18,7 +18,7 @@
 //!
 //! Trap: the published LP-max bound (M. A. Serrano et al., "Response-Time Analysis of DAG Tasks
 //! under Fixed Priority Scheduling with Limited Preemptions", DATE 2016) counts blocking after the
-//! first subtask only for preemptions by higher-priority work. But serial phases of a DAG leave
+//! first subtask only for preemptions by higher-priority work. But a DAG's own serial phases leave
 //! cores idle, and idle cores admit new lower-priority subtasks without any preemption. In the unit
 //! test below the published bound gives 10, while 11 is observed.
 //!

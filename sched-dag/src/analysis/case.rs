@@ -50,7 +50,7 @@ pub(super) fn with_case(
     work(&case, verdict, reasons);
 }
 
-/// The places of execution of a commit's DAGs, as far as they are in one cluster.
+/// Where the DAGs of a commit execute, as far as they are in one cluster.
 struct CorePlaces<'a> {
     all: &'a [Dag],
     tables: &'a [&'a Table],
@@ -131,8 +131,8 @@ pub(super) struct AnalysisInput<'a> {
     places: CorePlaces<'a>,
     /// The positions of all DAGs on these cores, analysable or not.
     own: &'a [usize],
-    /// The positions of this case's DAGs; all other fields refer to a DAG by its position in this
-    /// list.
+    /// The positions of this case's DAGs in the commit. In the fields below, a DAG is a position in
+    /// this list.
     pub(super) members: &'a [usize],
     pub(super) tasks: &'a [&'a Task],
     pub(super) settings: &'a AnalysisSettings,
@@ -203,7 +203,7 @@ impl<'a> AnalysisInput<'a> {
                 has_bound[dag] &= bound.is_some();
             }
             let bursts = self.bursts(|dag| !has_bound[dag]);
-            // Bounds only disappear from round to round, so the loop ends.
+            // Bounds only disappear from round to round, never return, so the loop ends.
             let is_settled = bursts == self.set.bursts;
             self.set.bursts = bursts;
             if let Some(place) = self.set.bursts.endless {
@@ -241,7 +241,8 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Returns the schedule-abstraction graph of all DAGs, or an error if it cannot have some DAG.
+    /// Returns the schedule-abstraction graph of all DAGs, or an error if a graph does not cover
+    /// some DAG.
     pub(super) fn graph(&self) -> Result<AbstractionSet, NotClosed> {
         if self.members.len() < self.own.len() || self.tells_cores() {
             return Err(NotClosed::NotCovered);

@@ -37,7 +37,7 @@ pub(super) fn lateness_ns(settings: &AnalysisSettings, bursts: &WorkloadBursts) 
     bursts.late_ns.max(charge_ns.unwrap_or(u64::MAX))
 }
 
-/// Reports whether an instance may end within its WCET, if the WCET was observed.
+/// Reports whether a budget may end an instance before it has executed its WCET.
 fn is_cut(of: &Subtask) -> bool {
     of.budget_ns
         .is_some_and(|budget_ns| of.wcet_ns.is_none_or(|wcet_ns| budget_ns < wcet_ns))

@@ -8,8 +8,8 @@
 //! Up to [`STEPS`] the covers are exact. Chains that may pass through subtasks are the paths of a
 //! flow in which each subtask pays its WCET once. A heaviest augmenting path makes the flow larger
 //! by one chain (R. K. Ahuja, T. L. Magnanti, J. B. Orlin, "Network Flows", 1993, section 9.7).
-//! Sweeps along the topological order and back find the weights; a few sweeps are enough until
-//! nothing changes. Beyond [`STEPS`], chains are peeled off one by one, a longest path at a time.
+//! Sweeps along the topological order and back, until nothing changes, find the weights; a few
+//! sweeps are enough. Beyond [`STEPS`], chains are peeled off one by one, a longest path at a time.
 //! The resulting covers are too small, and therefore safe wherever a cover is subtracted.
 
 use alloc::vec;
@@ -273,8 +273,7 @@ impl<'a> ChainFlow<'a> {
 
     /// Takes the flow apart into its chains.
     fn into_chains(mut self) -> Vec<CoverChain> {
-        // The chains beginning at a subtask are the chains through it, less the chains arriving
-        // along an edge.
+        // As many chains begin at a subtask as lead through it without arriving along an edge.
         let through = self.taken.iter().zip(&self.passed);
         let mut begin: Vec<u32> = through.map(|(&t, &p)| u32::from(t) + p).collect();
         for v in 0..begin.len() {

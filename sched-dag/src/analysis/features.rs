@@ -1,11 +1,11 @@
-//! Features of the model: used by DAGs, and covered by the proof of a test.
+//! Features of the model: those a DAG uses, and those the proof of a test covers.
 //!
 //! A test is asked about a DAG only if the test covers *every* feature entering the DAG: the
 //! features of the machine, of the DAG itself, and of all DAGs that may delay it, directly or
 //! through others. A test covers nothing but the features it names. So a new feature silences all
-//! tests, until somebody has read the proofs one by one and named the feature where covered. Where
-//! one of several values must hold (an order, one core or several, preemption), each value is a
-//! feature, the plain value included, because a proof may need any of them.
+//! tests, until somebody has read the proofs one by one and named the feature in each test that
+//! covers it. Where one of several values must hold (an order, one core or several, preemption),
+//! each value is a feature, the plain value included, because a proof may need any of them.
 
 use alloc::vec::Vec;
 

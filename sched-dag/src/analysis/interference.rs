@@ -106,7 +106,7 @@ impl InterferingDag {
             limit(all)
         };
         let by_cores = |volume_ns: u64| {
-            // Beyond the most cores of one job, overlapping jobs may use all cores.
+            // Once the count reaches the most cores of one job, overlapping jobs may use all cores.
             let of_all = |count| {
                 if count < shape.parallelism {
                     count

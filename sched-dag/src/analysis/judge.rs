@@ -1,9 +1,9 @@
 //! The verdict at commit: the findings of the tests, or the reason for a missing bound.
 //!
 //! [`answer`] asks the [tests](super::schedulability) about the jobs of each cluster, and then
-//! about their sinks. A DAG is not proven if one of its sinks has no bound within its own deadline.
-//! Certain findings (missing WCETs, a path longer than the deadline, a subtask longer than the
-//! period, more work than cores) take precedence over the tests' reasons.
+//! about their sinks. A DAG is not proven if one of its sinks has no bound within the sink's own
+//! deadline. Certain findings (missing WCETs, a path longer than the deadline, a subtask longer
+//! than the period, more work than cores) take precedence over the tests' reasons.
 
 use alloc::string::String;
 use alloc::vec;
@@ -51,7 +51,7 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         },
     );
     answer.reasons = reasons;
-    // The first failing DAG must have no bound in the end, and its final reason.
+    // The first failing DAG must be one without a bound in the end, named with its final reason.
     let all: Vec<usize> = (0..dags.len()).collect();
     let first = answer.first_failing.map(|failing| failing.dag.index());
     answer.first_failing = (first.and_then(|dag| first_own(&[dag], &answer.reasons)))
@@ -137,8 +137,8 @@ impl AnalysisResult {
 }
 
 impl AnalysisInput<'_> {
-    /// Answers for the jobs of this case's DAGs. Bounds are by position in the case; the first
-    /// failing DAG has its position in the commit.
+    /// Answers for the jobs of this case's DAGs. Bounds and reasons are by position in the case,
+    /// but DAGs named in them have their position in the commit.
     pub(super) fn verdict(&self) -> AnalysisResult {
         let JobBounds {
             bounds,
@@ -147,7 +147,7 @@ impl AnalysisInput<'_> {
             ..
         } = bound_jobs(self);
         if reasons.iter().any(Option::is_some) {
-            // A certain miss helps the user more than the failure of a test.
+            // A certain miss tells the user more than the failure of a test.
             for (dag, reason) in self.certain().into_iter().rev() {
                 if bounds[dag].is_none() {
                     reasons[dag] = Some(reason);
@@ -173,8 +173,8 @@ impl AnalysisInput<'_> {
         !self.dag(dag).is_sporadic()
     }
 
-    /// Finds the DAGs that cannot keep up at WCETs: by urgency, first those that cannot even alone,
-    /// then the first DAG to overload the cores.
+    /// Finds the DAGs that cannot keep up at WCETs: by urgency, first those that could not even
+    /// alone, then the first DAG with which the cores do not suffice.
     fn certain(&self) -> Vec<(usize, NotProvenReason)> {
         let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
@@ -212,7 +212,7 @@ impl AnalysisInput<'_> {
     }
 }
 
-/// Returns the first DAG at the positions `among` without a bound for a reason of its own.
+/// Returns the first DAG at the positions `among` that has no bound for a reason of its own.
 fn first_own(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<NotProven> {
     let own = |reason: &NotProvenReason| !matches!(reason, NotProvenReason::DelayedBy { .. });
     let mut failing = among.iter().filter_map(|&dag| {
@@ -224,7 +224,7 @@ fn first_own(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<Not
 }
 
 /// Fills in the bounds of the sinks of each DAG, in order, based on the bounds of jobs. A DAG is
-/// not proven if one of its sinks has no bound within its own deadline.
+/// not proven if one of its sinks has no bound within the sink's own deadline.
 fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
@@ -287,7 +287,7 @@ fn within_deadlines(
     late
 }
 
-/// Returns the first sink with a longest path beyond its deadline, and the path's length in
+/// Returns the first sink whose longest path is longer than its deadline, and the path's length in
 /// nanoseconds.
 fn too_far(task: &Task, model: &Dag) -> Option<(SubtaskId, u64)> {
     let mut sinks = model.sinks().iter().copied().zip(lengths_ns(task, model));

@@ -11,23 +11,23 @@
 //!   by its deadline. A DAG left with too few cores is *late*.
 //! - *Members*: the late DAGs and then the light DAGs are placed one by one. A DAG goes to the
 //!   first core on which it is proven together with all DAGs already there; otherwise to the first
-//!   such group of several cores; otherwise to the fewest cores that are enough for a proof,
-//!   outside any group and the least busy first.
+//!   such group of several cores; otherwise to the fewest cores that are enough for a proof, taken
+//!   from those in no group yet, the least busy first.
 //!
 //! Two of the four squeeze the owners' lists before placing members. In the last two attempts as
 //! many periodic DAGs as fit into a lap form a *family*, with one table (`table_making`). Heavy
 //! DAGs outside the family are owners, on the last cores, and all others are members. The family
 //! gives up cores only if members find no place otherwise, and as few as possible.
 //!
-//! A new member lowers nobody's bound outside its own group. Bounds in a group depend only on its
+//! A new member lengthens no bound outside its own group. Bounds in a group depend only on its
 //! members and on the supplies of its cores ([`CoreSupply`]).
 //!
 //! Guaranteed: every job of every DAG responds within its bound if the plan is enforced, with
 //! tables by rules T1 to T3, and members on the cores of their group by deadline (ties by
 //! position), below the entries of tables. See `docs/bounds.md`, "Tables".
 //!
-//! Not guaranteed: an unproven set need not miss a deadline, and some other division might prove
-//! the set. DAGs with waits are not covered.
+//! Not guaranteed: that an unproven set misses a deadline, or that no other division would prove
+//! it. DAGs with waits are not covered.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -55,13 +55,13 @@ pub struct CoreOwner {
     pub first_core: usize,
     /// The number of cores. Some of them may have no list.
     pub cores: usize,
-    /// The table. Its core numbers count from 0 of all cores.
+    /// The table. Its cores are numbered from 0 among all cores.
     pub table: Table,
     /// The number of tries needed to make the table.
     pub tries: u32,
 }
 
-/// Cores shared by DAGs, as far as owners leave time there.
+/// Cores shared by DAGs, in the time that owners leave there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LentGroup {
     /// The cores; a group of several but not all cores lists the least busy core first.
@@ -457,8 +457,8 @@ fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.within_ns()
 }
 
-/// Returns how late an owner's subtasks may be, and the latest end of its lists to make up for the
-/// lateness; both in nanoseconds.
+/// Returns how late an owner's subtasks are at most, and the latest end of its lists to make up for
+/// the lateness; both in nanoseconds.
 pub(super) fn late_and_limit_ns(bursts: &WorkloadBursts, task: &Task) -> (u64, u64) {
     let within_ns = task.within_ns();
     let late_ns = u64::try_from(bursts.during(within_ns.into())).unwrap_or(u64::MAX);
@@ -537,8 +537,8 @@ impl<'a> MemberPlacing<'a> {
         })
     }
 
-    /// Places a DAG on the fewest cores on which it is proven, outside any group and the least busy
-    /// first.
+    /// Places a DAG on the fewest cores on which it is proven, taken from those in no group, the
+    /// least busy first.
     fn place_in_new_group(&mut self, dag: usize) -> bool {
         let task = self.members[dag].task;
         let (deadline_ns, length_ns) = (task.within_ns(), task.length_ns());
@@ -579,7 +579,7 @@ impl<'a> MemberPlacing<'a> {
         group.members.insert(place, (dag, 0));
         let cores = group.cores.iter().map(|&core| &self.supplies[core]);
         let cores: Vec<&CoreSupply> = cores.collect();
-        // More urgent members keep their bounds: new members rank below and cannot delay them.
+        // More urgent members keep their bounds: the new member ranks below and cannot delay them.
         let (above, changed) = group.members.split_at_mut(place);
         let above = above.iter().map(|&(other, ns)| (&members[other], ns));
         let mut above: Vec<(&MemberTask<'_>, u64)> = above.collect();

@@ -1,21 +1,21 @@
 //! Lent cores: the time a table takes from its cores, and response times in the rest.
 //!
 //! On the cores of a table nothing wins over its entries. The time left is *lent* to a *group*:
-//! some cores, and DAGs as *members*, ordered by deadline, the more urgent first. A group's core
-//! executes ready subtasks of members while no entry executes there. This is a summary;
+//! some cores, and DAGs as *members*, ordered by deadline, the more urgent first. Each core of a
+//! group executes ready subtasks of its members while no entry executes there. This is a summary;
 //! `docs/bounds.md`, "Tables", has the proofs.
 //!
 //! *Busy time.* Let a stretch without idle time in the table begin at `t`. Take the entries with a
 //! start at `t` or later: suppose all entries released by `t` are there at once, and the others
-//! arrive at their releases. `busy(r)` is the most work, over all `t`, that a core never idle with
-//! work pending executes of these entries in the `r` after `t`. The table executes no more in any
-//! window of length `r`. Its own idle times would give no bound, because an entry that ends early
-//! brings later entries forward. So `r - busy(r)` is the core's supply bound function (I. Shin, I.
-//! Lee, RTSS 2003).
+//! arrive at their releases. `busy(r)` is the most work of these entries, over all `t`, that a core
+//! executes in the `r` after `t` if it never idles with work pending. The table executes no more in
+//! any window of length `r`. The times in the table would give no bound, because an entry that ends
+//! early brings later entries forward. So `r - busy(r)` is the core's supply bound function (I.
+//! Shin, I. Lee, RTSS 2003).
 //!
-//! *One core.* There a member is one sequence with its volume. Its response time is the least `r`
-//! with `r >= volume + sum of (r / T_h) volume_h (ceiling) + busy(r)`, over the more urgent members
-//! h.
+//! *One core.* There a member executes as one sequence of its volume. Its response time is the
+//! least `r` with `r >= volume + sum of (r / T_h) volume_h (ceiling) + busy(r)`, over the more
+//! urgent members h.
 //!
 //! *Several cores.* The form of `multi_path` applies, and each core of the group adds its table as
 //! interference on one core at a time. `r` is proven on `q` cores if for some `j < q`
@@ -58,8 +58,8 @@ pub struct CoreSupply {
     ramps: Vec<(u64, u64)>,
     /// The number of entries in a lap.
     starts: usize,
-    /// The longest time from an entry's release to its start, with its charge and lateness, in
-    /// nanoseconds.
+    /// The longest time from an entry's release to its start, plus its WCET (which includes its
+    /// charge) and the lateness, in nanoseconds.
     waiting_ns: u64,
 }
 

@@ -3,7 +3,7 @@
 //! Let each subtask execute for its WCET. At each completion, look at the *ready* subtasks in the
 //! order of their ranks, the longest remaining path first, ties by position. Each subtask goes to
 //! the first idle core on which it ends by the core's *limit*. Without such a core the subtask
-//! stays ready. Nothing is preempted.
+//! stays ready. No subtask is preempted.
 //!
 //! A run keeps to these times if it keeps to the lists: each subtask executes on its core only,
 //! after the subtask before it, and nothing wins over it. Then each subtask ends at its time after
@@ -14,7 +14,7 @@
 //! Limits make some cores end early. [`ListSchedule::squeezed`] lowers the limits as far as it
 //! finds schedules. The first cores are then full up to the deadline, and the last cores end early.
 //!
-//! Not guaranteed: an existing schedule within the limits may not be found.
+//! Not guaranteed: that a schedule within the limits is found whenever one exists.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -29,7 +29,7 @@ use crate::table::{CoreList, Table, TableEntry};
 const SQUEEZES: usize = 256;
 
 /// The most pairs of subtasks visited to squeeze one schedule. A schedule of n subtasks counts as
-/// n^2, since subtasks refused by all cores are visited again at each completion. Graphs of less
+/// n^2, since subtasks refused by all cores are visited again at each completion. Graphs of fewer
 /// than 45 subtasks on 16 cores never reach the limit.
 const SQUEEZE_STEPS: usize = 1 << 23;
 

@@ -1,7 +1,8 @@
 //! Analysis at commit: will every job meet its deadline?
 //!
-//! [`answer()`] gives each DAG of a commit a *bound*: the longest time from a job's nominal release
-//! to its last finish, for any offsets and any execution times up to the WCETs. All tests here are
+//! [`answer()`] gives each DAG of a commit a *bound*: no job ever takes longer from its nominal
+//! release to its last finish, with any execution times up to the WCETs, whatever the offsets (only
+//! the tests of tables and of certificates rely on the offsets stated). All tests here are
 //! *sufficient*: a DAG without a bound is "not proven", not "infeasible". The app decides whether
 //! to refuse unproven DAGs.
 //!
@@ -31,10 +32,11 @@
 //! | `certificate` | closed state lists of such graphs, carried along with a set | |
 //! | `witness` | all data needed to check the bounds | |
 //!
-//! A sporadic DAG is analysed at its minimum inter-arrival time. Only the test of tables relies on
-//! a grid of releases. The papers behind the other tests assume sporadic tasks, and the equations
-//! count the jobs that fit into a window at that distance. For a sporadic DAG the analysis calls a
-//! miss *certain* only when a path is longer than the deadline, because signals may stay away.
+//! A sporadic DAG is analysed as if its period were its minimum inter-arrival time. Only the tests
+//! of tables and of certificates rely on a grid of releases. The papers behind the other tests
+//! assume sporadic tasks, and the equations count the jobs that fit into a window at that distance.
+//! For a sporadic DAG the analysis calls a miss *certain* only when a path is longer than the
+//! deadline, because signals may stay away.
 //!
 //! Each module cites its paper and states its assumptions and the traps avoided. The functions for
 //! single tests take [`Task`]s in priority order and can be used on their own; [`answer()`] knows
@@ -48,8 +50,8 @@
 //!
 //! # Guarantees
 //!
-//! - *Integers only*: times have 64 bits, products 128. Divisions round to the safe side, and an
-//!   overflow is an error or "not proven".
+//! - *Integers only*: times have 64 bits, products 128. Divisions round so that the result stays a
+//!   bound, and an overflow is an error or "not proven".
 //! - *No recursion*, and every loop has a limit. A limit reached means "not proven"
 //!   ([`NotProvenReason::Limit`]), never a guess. Run time is nearly linear in subtasks and edges
 //!   for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and quadratic in the number of DAGs.
@@ -217,13 +219,14 @@ texts! {
         Windows = "windows of segments on one core";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
-        /// Widths that fit the cores: nobody waits for a core, and the longest path is the bound.
+        /// Widths that fit the cores: no instance waits for a core, so the longest path is the
+        /// bound.
         Widths = "widths that fit the cores";
         /// The times of the DAG's entries in a table: nothing else can delay them.
         Table = "its entries in a table";
         /// A certificate of the schedule-abstraction graph.
         Graph = "a certificate of its schedule-abstraction graph (Nasri et al. 2019)";
-        /// The time left by tables on its cores, under fixed priorities.
+        /// Fixed priorities, in the time that tables leave on the DAG's cores.
         Member = "what tables leave of its cores";
         /// The multi-path bound on the cores of its group.
         InGroup = "multiple paths on a group of cores";
@@ -262,7 +265,7 @@ texts! {
         SubtaskBeyondPeriod { subtask: SubtaskId } =
             "subtask {} alone takes more than a period; split it or lengthen the period", subtask.0;
         /// Certain to fall behind at WCETs: in order of urgency, the DAGs up to and including this
-        /// DAG need more than all cores.
+        /// DAG need more time than all cores have.
         Overload =
             "up to it, the DAGs need more time than all cores have; add cores, lengthen periods or \
              shorten subtasks";
@@ -302,7 +305,7 @@ texts! {
             "in its table subtask {} ends up to {:?} after the release, which is too late; start it \
              earlier in its list, or relax the deadline",
             subtask.0, Duration::from_nanos(*bound_ns);
-        /// Its table holds several DAGs, and entries suffer a delay without a charge.
+        /// Its table holds several DAGs, and something delays their entries without being charged.
         TableOverheads =
             "its table is of several DAGs, and no bound covers long steps, interrupts of a device or \
              sections of locks there; give each DAG a table of its own, or leave the lists out";

@@ -13,14 +13,14 @@
 //!
 //! `W_i` counts at most `m - j` cores. With `j = 0` the first form is the form of Melani et al.
 //! 2015, and without other DAGs Graham's. With chains of greedy long paths it is the form of He et
-//! al. 2022. So none of them can be better, except for the rounding: here divisions round up, since
-//! preemptions need not happen at whole nanoseconds.
+//! al. 2022. So none of those can be better, except for the rounding: here divisions round up,
+//! since preemptions need not happen at whole nanoseconds.
 //!
-//! For cores kept by long steps (bursts, in `workload`), `m - j` times the lost time is added to
+//! Where long steps may keep cores (bursts, in `workload`), `m - j` times the lost time is added to
 //! the right side.
 //!
-//! Assumes: no core idles while a subtask is ready; `R <= T`, so only one job of the DAG executes
-//! at a time, a limit on each solution. Any order inside the DAG.
+//! Assumes: no core idles while a subtask is ready; `R <= T`, that is, one job of the DAG at a time
+//! (each solution is limited to `T`). Any order inside the DAG.
 //!
 //! Trap: without `max(1, ..)` the second form "proves" `r = length` whenever `B_j = 0`, because the
 //! clip then counts nothing.
@@ -169,7 +169,7 @@ impl MultiPathEquations<'_> {
                 busy: WorkloadSegment { value, ..sum },
             }
         };
-        // With waits and blocking together, only the first form is proven.
+        // With waits and blocking together, only the first form with `j = 0` is proven.
         let count = left_and_blocking.map_or(self.left.len(), |_| 1);
         let sums = plain.into_iter().zip(clipped).enumerate().take(count);
         sums.flat_map(move |(j, (plain, clipped))| {

@@ -3,7 +3,8 @@
 //! The relation depends on the policy's numbers and on the preemptibility of subtasks, not on any
 //! execution time. So the relation is known even for DAGs that cannot be analysed. A DAG *outranks*
 //! another if one of its instances may win a core over an instance of the other. A DAG *delays*
-//! another also by merely keeping a core. `docs/bounds.md` proves the tests based on this relation.
+//! another also by merely keeping a core. `schedulability::multiple_paths` says why each case is
+//! sound.
 
 use alloc::vec::Vec;
 
@@ -67,8 +68,8 @@ impl RankRelation {
         }
     }
 
-    /// Returns the relation between some of the DAGs, by their positions here. The other DAGs are
-    /// still on the machine, so the preemption mix stays.
+    /// Returns the relation between some of its DAGs, given by their positions in it. The other
+    /// DAGs are still on the machine, so the preemption mix stays.
     pub(super) fn among(&self, members: &[usize]) -> Self {
         Self {
             numbers: members.iter().map(|&dag| self.numbers[dag]).collect(),
@@ -97,8 +98,8 @@ impl RankRelation {
         all.clone().any(|a| all.clone().any(|b| both(a, b)))
     }
 
-    /// Returns the smallest and the largest number of a DAG, each with its position; the smaller
-    /// wins.
+    /// Returns the smallest and the largest number of a DAG, each with the DAG's position; the
+    /// smaller pair wins.
     pub(super) fn ranks(&self, dag: usize) -> [(u64, usize); 2] {
         self.numbers[dag].map(|number| (number, dag))
     }

@@ -2,14 +2,14 @@
 //!
 //! DAG `i` *may outrank* DAG `k` if some instance of `i` may win a core for which an instance of
 //! `k` waits. The bound of `k` then depends on the bound of `i`. If priorities do not interleave,
-//! the dependency goes one way, from the highest priority down. If they do, or under EDF, there are
-//! circles. Both cases have the same solution: start from the bounds of jobs alone, and raise one
-//! DAG's bound after the other until nothing changes. All functions are monotone, so the iteration
-//! ends in the least solution.
+//! the dependency goes one way, from the highest priority down. If they do, or under EDF, it goes
+//! round in circles. Both cases are solved alike: start from the bounds of jobs alone, and raise
+//! one DAG's bound after the other until nothing changes. All functions are monotone, so the
+//! iteration ends in the least solution.
 //!
-//! Why circles are sound: look at the first job ever to exceed its bound, at the instant of excess.
-//! Until then every job kept to its bound, and the workloads in the job's equation assume no more.
-//! So the equation holds, and the job did not exceed its bound: a contradiction.
+//! Why circles are sound: look at the first job ever to exceed its bound, at the instant when it
+//! does. Until then every job kept to its bound, and the workloads in the job's equation assume no
+//! more. So the equation holds, and the job did not exceed its bound: a contradiction.
 //!
 //! A failing DAG makes every DAG fail that it may outrank, because their workloads would rest on a
 //! missing bound. Other DAGs keep their bounds.
@@ -46,7 +46,7 @@ pub(super) struct EquationSet<'a> {
     pub(super) rounding: Rounding,
     /// Whether the equations have the forms for waiting subtasks; see [`Self::has_waits`].
     pub(super) is_of_waits: bool,
-    /// By DAG, whether waits enter its equations; empty: no DAG's.
+    /// By DAG, whether waits enter its equations; empty: for no DAG.
     with_waits: Vec<bool>,
 }
 
@@ -202,7 +202,7 @@ impl<'a> EquationSet<'a> {
     }
 
     /// Returns the least response time of a DAG among others, searching from `start_ns` upwards, or
-    /// the failure in the way.
+    /// the failure that prevents one.
     fn respond(
         &self,
         dag: usize,
@@ -372,7 +372,7 @@ impl<'a> EquationSet<'a> {
 }
 
 /// The number of evaluations of equations left. A DAG takes shared steps first and then its own, so
-/// a DAG with slow convergence takes away no other's bound.
+/// a DAG that converges slowly takes away no other DAG's bound.
 pub(super) struct EvaluationBudget {
     shared: u64,
     /// By DAG.
@@ -387,10 +387,10 @@ impl EvaluationBudget {
         }
     }
 
-    /// Lets a DAG spend its available steps.
+    /// Lets `work` spend the steps available to a DAG.
     pub(super) fn spend<T>(&mut self, dag: usize, work: impl FnOnce(&mut u64) -> T) -> T {
         let own = self.own[dag];
-        // Steps of its own for each DAG: a DAG with slow equations leaves the others theirs.
+        // Each DAG has steps of its own, so a DAG with slow equations leaves the others theirs.
         let mut left = self.shared + own;
         let result = work(&mut left);
         // The shared steps are spent first.

@@ -11,7 +11,8 @@
 //! each entry:
 //!
 //! - it starts no earlier than its release, and no earlier than the entry before;
-//! - its length covers the WCETs of its family, and ends before the entry after the family starts;
+//! - its length covers the WCETs of its family, and ends by the start of the entry after the
+//!   family;
 //! - nothing is nested in a subtask that keeps its core;
 //! - its predecessors, and the same subtask of the job before, start before it and end by its
 //!   start.
@@ -32,7 +33,7 @@ pub struct TableDag<'a> {
     pub id: DagId,
     /// The DAG's WCETs, with all charges, and its edges.
     pub task: &'a Task,
-    /// The release of job 0 in nanoseconds; 0 without another DAG.
+    /// The release of job 0 in nanoseconds; 0 for a DAG alone in its table.
     pub offset_ns: u64,
     /// By subtask, whether it keeps its core once started.
     pub keeps_core: Vec<bool>,
@@ -73,11 +74,11 @@ texts! {
         InOrder = "starts after the next entry of its core";
         /// A length covers the WCETs of a family.
         Long = "has less time than the WCETs of it and of all nested in it, with their charges, take";
-        /// A family ends before the next entry starts.
+        /// A family ends by the start of the next entry.
         Apart = "ends after the next entry of its core that is not nested in it starts";
         /// Nothing is nested in a subtask that keeps its core.
         Kept = "keeps its core, and the next entry is nested in it";
-        /// An entry starts only after the end of everything waited for.
+        /// Everything an entry waits for ends by its start.
         Ready = "starts before the end of a predecessor, or of the job before";
         /// An entry belongs to the lap's own job.
         OwnLap = "is of another lap's job, though its DAG is sporadic or steps of the scheduler are long";

@@ -3,17 +3,17 @@
 //! The instance with the least latest start goes first. The latest start is the deadline, less the
 //! WCETs of the longest path after the instance, less its own WCET, and less a *boost* of its DAG,
 //! 0 at first. The instance takes an idle core, preferably a core where a predecessor has just
-//! ended. Without an idle core it is *nested*: it preempts a less urgent instance and starts on
-//! top, on the core with the most slack. A begun instance never changes its core. If an instance is
-//! late, its DAG is boosted by as much, and the next *try* begins. The *lazy* method preempts only
-//! when waiting for a core would take too long.
+//! ended. Without an idle core it is *nested*: it preempts a less urgent instance and starts on top
+//! of it, on the core with the most slack. An instance that has begun never changes its core. If an
+//! instance is late, its DAG is boosted by as much, and the next *try* begins. The *lazy* method
+//! preempts only when waiting for a core would take too long.
 //!
 //! A lap *closes* if it leaves no more to the next lap than was assumed at its own beginning: cores
 //! held at first, and subtasks with unfinished instances of the last jobs. If it leaves more, the
 //! lap is simulated again with the new assumption.
 //!
-//! Guaranteed: a finished table is right (`docs/bounds.md`, "Tables"). Not guaranteed: where no
-//! table is made, there may still be one.
+//! Guaranteed: a finished table is right (`docs/bounds.md`, "Tables"). Not guaranteed: that a table
+//! is found whenever one exists.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -186,8 +186,8 @@ impl<'a> TableFamily<'a> {
                 method,
             };
             match self.close(&by, cores) {
-                // More tries would not help: the boosts change only after a late entry.
                 Ok(lap) => return Ok((self.table(&lap), tried)),
+                // More tries would not help: the boosts change only after a late entry.
                 Err(LapFailure::Open) => break,
                 Err(LapFailure::Late(place, by_ns)) => {
                     first_late.get_or_insert(self.dags[place]);
@@ -342,7 +342,7 @@ impl<'a> TableFamily<'a> {
     /// Returns the core with the most slack among those where an entry may preempt.
     fn preempted_core(&self, lap: &Lap, by: &LapOrder, entry: usize, now_ns: i64) -> Option<usize> {
         let soonest_ns = lap.running().map(|(_, top)| lap.left_ns[top]).min()?;
-        // Some core becomes free by the latest start, so nobody has to be preempted.
+        // Some core becomes free by the latest start, so no preemption is needed.
         if by.method == LendingAttempt::Lazy && now_ns + soonest_ns <= by.keys_ns[entry] {
             return None;
         }
@@ -435,7 +435,7 @@ struct LapCore {
     held_until_ns: i64,
     /// The entries that have begun and not finished.
     stack: Vec<usize>,
-    /// All begun entries, in that order.
+    /// All entries that have begun, in the order of their starts.
     begun: Vec<usize>,
     /// The entry that ended last.
     last: Option<usize>,

@@ -279,7 +279,8 @@ impl Task {
         self.least_deadline_ns
     }
 
-    /// Returns the time by which a job must complete: its deadline, or the next release if earlier.
+    /// Returns the time after its release by which a job must complete so as not to overlap the
+    /// next: its deadline, or the next release if earlier.
     pub(super) fn within_ns(&self) -> u64 {
         self.relative_deadline_ns.min(self.period_ns)
     }
@@ -384,8 +385,8 @@ impl Task {
         self.descend(&self.graph.levels(weights), self.sources())
     }
 
-    /// Returns the path that starts at the highest level of `first` and always continues at the
-    /// highest level.
+    /// Returns the path that begins with the subtask of the highest level among `first` and always
+    /// goes on with the successor of the highest level.
     fn descend<W: Copy + Ord>(
         &self,
         levels: &[W],

@@ -6,10 +6,11 @@
 //! "Subtasks that wait", proves the forms here; this is a summary.
 //!
 //! Follow a job back from the last segment to end. Each segment became eligible by the release, by
-//! the end of its latest predecessor, or by the end of its own wait. The result is a path `P`. At
-//! each instant of the response, `P` executes (`c(P)` in all), or waits (`s(P)` at most), or has an
-//! eligible segment that does not execute. Let `X` be the time of the third kind. During `X` all
-//! `m` cores execute something else. So waits enter the bound through `P` only:
+//! the end of its latest predecessor, or by the end of its own wait. Followed to the release, these
+//! causes form a path `P`. At each instant of the response, `P` executes (`c(P)` in all), or waits
+//! (`s(P)` at most), or has an eligible segment that does not execute. Let `X` be the time of the
+//! third kind. During `X` all `m` cores execute something else. So waits enter the bound through
+//! `P` only:
 //!
 //! - *One path*: `m X <= volume - c(P)`.
 //! - *Reserved chains*: let `U` be `j` disjoint chains. During `X` at most `j` cores execute `U`,
@@ -20,8 +21,8 @@
 //!
 //! Interference and blocking add to the work of the cores during `X`. The workloads of `workload`
 //! and `interference` are valid for DAGs with waits, with the DAGs' own bounds as `R`: a wait only
-//! takes work away from instants. All forms use one currency, the work left beside the span, which
-//! `(m - j) x` must reach, with `x = r - span`. For the first two forms this work contains `m - j`
+//! takes work away from instants. All forms use one currency, the work left beside the span: `(m -
+//! j) x` must reach it, with `x = r - span`. For the first two forms this work contains `m - j`
 //! times the excess of `P` over the span.
 //!
 //! *Blocking.* Where segments keep their cores, an eligible segment may find as many lower-ranked
@@ -29,6 +30,7 @@
 //! a wait no predecessor has just left a core. So the path pays `Delta(m)` at the release and after
 //! each wait, and `Delta(m - 1)` after each predecessor. `Delta(q)` is the sum of the `q` longest
 //! segments.
+//!
 //! Assumes: `R <= T` for each DAG in the equations, so jobs of one DAG do not overlap; and no core
 //! idles while a segment is eligible. All forms are sustainable: no bound falls when executions or
 //! waits get longer, so shorter executions and waits are covered.

@@ -74,7 +74,7 @@ fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<Equ
     };
     for ((task, shape), figures) in (tasks.iter()).zip(&mut set.shapes).zip(&mut set.figures) {
         figures.allow_in_flight(1);
-        // Only covers round up, so here they count as almost one unit a core more.
+        // Only covers round up: with `free - 1` added, the division that rounds down does so, too.
         let by_covers = shape.left.iter_mut();
         (1..=u64::from(cores))
             .rev()

@@ -1,9 +1,9 @@
 //! Witnesses: all data needed to check bounds without solving anything.
 //!
 //! [`witness()`] writes a text of lines of words. The text begins with the commit in the analysis's
-//! own terms, and a hash. A few certificates of each graph follow, and for each bound the proving
-//! inequality with every term. `./scripts/check-witness` computes each term again from the others;
-//! its own text lists the requirements on each line.
+//! own terms, and a hash of it. A few certificates of each graph follow, and for each bound the
+//! proving inequality with every term. `./scripts/check-witness` computes each term again from the
+//! others; its own text lists the requirements on each line.
 //!
 //! ```text
 //! machine CORES ORDER OVERHEAD_NS             static: by the numbers of subtasks; edf: by deadlines; any

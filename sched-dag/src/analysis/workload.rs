@@ -20,7 +20,7 @@
 //!
 //! If sinks have deadlines of their own, `D` is the least of them and may be less than `R`: a job
 //! counts as a whole as soon as any of its subtasks may win. The job before the `N` whole jobs then
-//! ends `R - D` after its least deadline. The same expression covers the case, with a negative
+//! ends `R - D` after its least deadline. The same expression covers this case, with a negative
 //! `D - R`.
 //!
 //! The paper has `p = m`. A smaller `p`, the width of the DAG or the number of cores counted, is
@@ -35,9 +35,9 @@
 //! # Bursts: long steps of the scheduler, with many instances becoming ready
 //!
 //! Each instance is charged for a step with few instances becoming ready (`overheads`). Each
-//! further instance makes a step longer by `ready` at most, and a long step may keep the cores from
-//! any instance, even a more urgent instance. So in a window of length `L` the time in which any
-//! core is lost, beyond the charges, is at most
+//! instance that becomes ready makes its step longer by `ready` at most, and as long as a step
+//! lasts it may keep the cores from any instance, even a more urgent one. So in a window of length
+//! `L` the time in which some core is lost, beyond the charges, is at most
 //!
 //! `E(L) = sum over all DAGs on them of ((L + late + carry) / T + 1) burst` (floor)
 //!
@@ -204,7 +204,7 @@ impl WorkloadSegment {
         Self { value, slope, span }
     }
 
-    /// Returns the smaller of two pieces, as far as certain to remain the smaller.
+    /// Returns the smaller of two pieces, for as long as it is certain to stay the smaller.
     pub(super) fn least(self, other: Self) -> Self {
         if self.value <= other.value {
             self.below(other)
@@ -251,7 +251,7 @@ impl WorkloadSegment {
         }
     }
 
-    /// Returns this piece as far as certain to stay below a higher piece.
+    /// Returns this piece for as long as it is certain to stay below a higher piece.
     fn below(self, higher: Self) -> Self {
         self.until(higher).or_one_flat_step()
     }

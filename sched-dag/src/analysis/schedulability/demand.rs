@@ -1,16 +1,15 @@
 //! Processor demand on one core under EDF: proves that each subtask finishes by its deadline, or
 //! nothing.
 //!
-//! S. K. Baruah, L. E. Rosier, R. R. Howell, Real-Time Systems 2, 1990; L. George, N. Rivierre,
-//! M. Spuri, INRIA RR-2966, 1996, for work that keeps its core. Say a subtask is not finished at
-//! its deadline, and let `t` be the time to the deadline from the last earlier instant without
-//! pending work due by the deadline. In between, the core executes only such work, released since,
-//! and at most one non-preemptible subtask that is due later and so has a relative deadline above
-//! `t`. So `t < demand(t) + blocking(t)`, where `demand(t)` sums `(t - D) / T + 1` times the WCET
-//! (floor) over all subtasks with their own `D`. If this is false for all `t` up to the longest
-//! busy stretch of the core, every deadline is met. The test checks only those `t` where the
-//! condition may be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last
-//! down.
+//! S. K. Baruah, L. E. Rosier, R. R. Howell, Real-Time Systems 2, 1990; L. George, N. Rivierre, M.
+//! Spuri, INRIA RR-2966, 1996, for work that keeps its core. Say a subtask is not finished at its
+//! deadline, and let `t` be the time to the deadline from the last earlier instant without pending
+//! work due by the deadline. In between, the core executes only such work, released since, and at
+//! most one non-preemptible subtask that is due later and so has a relative deadline above `t`. So
+//! `t < demand(t) + blocking(t)`, where `demand(t)` sums `(t - D) / T + 1` times the WCET (floor)
+//! over all subtasks with their own `D`. If the inequality is false for all `t` up to the longest
+//! busy stretch of the core, every deadline is met. The test checks only those `t` for which the
+//! inequality may hold (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last down.
 //!
 //! The time taken from the core by long steps and by a device's interrupts (bursts, in `workload`)
 //! is added: in the stretch, and in each `t`, as much as falls into it.
@@ -81,7 +80,7 @@ fn certificate(case: &AnalysisInput<'_>, bounds: &[Option<DagBound>], text: &mut
     }
 }
 
-/// The part of a DAG's jobs with the same deadline, under EDF.
+/// The part of each job of a DAG with the same relative deadline, under EDF.
 struct DueDemand {
     deadline_ns: u64,
     period_ns: u64,

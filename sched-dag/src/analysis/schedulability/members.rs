@@ -1,4 +1,4 @@
-//! Response times of members: DAGs that run when tables leave their cores idle.
+//! Response times of members: DAGs that run in the time tables leave on their cores.
 //!
 //! A DAG without a table is a *member* of the group of its cores, with all other DAGs on the same
 //! cores. It executes while no entry of a core's table has begun

@@ -3,7 +3,7 @@
 //!
 //! The tests run in the order of the table, each for the DAGs covered by its proof (see
 //! [`features`](super::features)). Only this module calls the tests, for jobs, for sinks and for
-//! witnesses, and a test's computations are private to its file: so there is no other way to its
+//! witnesses, and a test's computations are private to its file, so there is no other way to its
 //! answer. Of several bounds the smallest counts.
 
 use alloc::vec;
@@ -51,14 +51,14 @@ impl BoundTest {
     }
 }
 
-/// The part of a test for writing its terms. It is separate, so a program that writes no witness
+/// The part of a test that writes its terms. It is separate, so a program that writes no witness
 /// need not contain it.
 struct BoundWitness {
     /// Writes the lines needed once before all bounds.
     certificate: fn(&AnalysisInput<'_>, &[Option<DagBound>], &mut WitnessText),
     /// Writes the terms of a DAG's bound.
     job: fn(&AnalysisInput<'_>, Responses<'_>, usize, u64, &mut WitnessText),
-    /// Writes the terms of a DAG's sinks with smaller bounds than their job.
+    /// Writes the terms of those sinks of a DAG whose bounds are below their job's.
     sinks: fn(&AnalysisInput<'_>, Responses<'_>, usize, u64, &mut WitnessText),
 }
 
@@ -109,7 +109,7 @@ impl JobBounds {
     }
 }
 
-/// The bounds of sinks, by DAG and the sink's position in the DAG.
+/// The bounds of sinks, by DAG and the sink's position among the DAG's sinks.
 pub(super) struct SinkBounds {
     bounds_ns: Vec<Vec<Option<u64>>>,
     asked: Vec<bool>,
@@ -187,7 +187,7 @@ pub(super) fn bound_by_each(case: &AnalysisInput<'_>) -> Vec<Vec<DagBound>> {
     by_test
 }
 
-/// Returns the bounds of the sinks of a case, by DAG and the sink's position in the DAG.
+/// Returns the bounds of the sinks of a case, by DAG and the sink's position among the DAG's sinks.
 pub(super) fn bound_sinks(
     case: &AnalysisInput<'_>,
     responses: Responses<'_>,

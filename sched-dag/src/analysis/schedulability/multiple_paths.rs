@@ -6,7 +6,7 @@
 //!   least urgent subtask of `k` (with equal priorities, the DAG committed first wins). Priorities
 //!   may thus interleave: then two DAGs may outrank each other, and each counts in full for the
 //!   other. This is safe: while a subtask of `k` waits, any work on the cores belongs to `k` or
-//!   wins over the waiting subtask, so its DAG counts.
+//!   wins over the waiting subtask, so the DAG of that work counts.
 //! - *EDF.* Every DAG may outrank every other. For two DAGs without overlapping jobs, only jobs
 //!   with a deadline no later are counted: a waiting subtask is due no later than its job, so work
 //!   that wins over the subtask is, too. Where sinks have deadlines of their own, a job counts as
@@ -15,8 +15,9 @@
 //!   that already count in full.
 //! - *Any other order.* Every other DAG counts in full.
 //! - *Preemption for some subtasks and not for others.* A subtask preempted again and again may
-//!   find other non-preemptible subtasks each time, not covered by the blocking term. Then every
-//!   other DAG counts in full, in whatever order, as is true of any work-conserving scheduler.
+//!   find other non-preemptible subtasks each time, and the blocking term does not cover them. Then
+//!   every other DAG counts in full, whatever the order: this bound holds for any work-conserving
+//!   scheduler.
 //!
 //! If a younger job may win over an older job of the same DAG (unequal priorities inside, or no
 //! preemption), the equation counts younger jobs, too. A response time beyond `in_flight` periods
@@ -86,7 +87,7 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
         match solution.responses[dag] {
             Some(bound_ns) => found.offer(dag, bound_ns, form(case, dag, bound_ns)),
             None => {
-                // If only numbers overflow, no equation has failed.
+                // If numbers overflowed, no equation has failed.
                 let limit = BoundFailure::Own(SolverFailure::Limit);
                 let failure = solution.failures[dag].unwrap_or(limit);
                 found.reasons[dag] = Some(reason(case, dag, failure, &solution.responses));

@@ -11,11 +11,12 @@
 //!
 //! `X = blocking + own(a) + C + sum over S of min(ceil(max(0, X - first) / T), most) work`
 //!
-//! with own(a) the DAG's earlier work, C the job's work up to the subtask, and `R = max over a of X
-//! - a`. Candidates for `a` are the multiples of the own period and, under EDF, the instants at
-//!   which another job joins S. A subtask that keeps its core only has to *start*: its equation
-//!   leaves out its own WCET, and also counts work released at its start, if nothing blocks. A
-//!   blocking subtask has started before the stretch, so it ends before its WCET has passed.
+//! with own(a) the DAG's earlier work and C the job's work up to the subtask. The response time is
+//! `R = max over a of X - a`. Candidates for `a` are the multiples of the own period and, under
+//! EDF, the instants at which another job joins S. A subtask that keeps its core only has to
+//! *start*: its equation leaves out its own WCET, and also counts work released at its start, if
+//! nothing blocks. A blocking subtask has started before the stretch, so it ends before its WCET
+//! has passed.
 //!
 //! M. Joseph, P. Pandya, The Computer Journal 29(5), 1986; J. P. Lehoczky, RTSS 1990; L. George,
 //! N. Rivierre, M. Spuri, INRIA RR-2966, 1996; R. Davis et al., Real-Time Systems 35, 2007;
@@ -24,8 +25,8 @@
 //!
 //! Where static priorities interleave, S is the DAG and all DAGs that may outrank it, directly or
 //! through others; where priorities differ within the DAG, its younger jobs count, too. Then the
-//! result is a bound, but no run need attain it. The time taken from the core in the stretch by
-//! long steps and by a device's interrupts (bursts, in `workload`) is added; then all subtasks
+//! result is a bound, but perhaps attained by no run. The time taken from the core in the stretch
+//! by long steps and by a device's interrupts (bursts, in `workload`) is added; then all subtasks
 //! count as if they could be preempted.
 //!
 //! Assumes: releases at least `T` apart; WCETs above 0; no job waits for room, so under EDF all
@@ -137,7 +138,8 @@ fn write_sinks(
     }
 }
 
-/// The part of a DAG's jobs with the same deadline; under static priorities the whole job.
+/// The part of each job of a DAG with the same relative deadline; under static priorities the whole
+/// job.
 struct LevelDemand {
     dag: usize,
     due_ns: i128,
@@ -300,7 +302,8 @@ impl<'a> CoreDemand<'a> {
         (0..order.len()).filter(is_last).map(|place| order[place]).collect()
     }
 
-    /// Returns the response time of a DAG's jobs if within the limit and found within `steps`.
+    /// Returns the response time of a DAG's jobs, if it is within the limit and found within
+    /// `steps`.
     fn response(&self, dag: usize, steps: &mut u64) -> Option<u64> {
         let (busy, limit_ns) = (self.busy(dag, steps)?, self.case.set.figures[dag].limit_ns());
         let (mut most, mut left) = (0, RELEASE_LIMIT);
@@ -310,7 +313,8 @@ impl<'a> CoreDemand<'a> {
         Some(most)
     }
 
-    /// Returns the response times of a DAG's sinks, as far as known, in their order.
+    /// Returns the response times of a DAG's sinks, as far as they are known, in the order of the
+    /// sinks.
     fn of_sinks(
         &self,
         dag: usize,
@@ -367,7 +371,7 @@ impl<'a> CoreDemand<'a> {
         self.fixed_point([blocking_ns.max(1), u64::MAX], (blocking_ns, &released, false), steps)
     }
 
-    /// Returns the longest WCET that keeps the core, among DAGs not counting for a DAG.
+    /// Returns the longest WCET that keeps the core, among the DAGs that do not count for a DAG.
     fn blocked_below(&self, dag: usize) -> u64 {
         let below = self.levels.iter().filter(|level| !self.counts(level.dag, dag));
         below.map(|level| level.keeps_ns).max().unwrap_or(0)
@@ -394,8 +398,7 @@ impl<'a> CoreDemand<'a> {
                 let of = (target, after, blocker);
                 let finish_ns = self.finish(of, range_ns, &mut released, steps)?;
                 most = most.max(finish_ns.saturating_sub(after));
-                // For a later job all counting work is more, except for a blocking subtask under
-                // EDF.
+                // For a later job no less work counts, except for a blocking subtask under EDF.
                 if !self.by_deadline {
                     known_ns = finish_ns - target.wcet_ns;
                 }

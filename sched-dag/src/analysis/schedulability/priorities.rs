@@ -1,4 +1,5 @@
-//! Bounds a DAG by its subtasks' priorities if nothing delays the DAG and no bound is shorter.
+//! Bounds a DAG by its subtasks' priorities if nothing can delay the DAG and no other bound of it
+//! is shorter.
 
 use super::{BoundTest, BoundWitness, JobBounds};
 use crate::analysis::case::AnalysisInput;

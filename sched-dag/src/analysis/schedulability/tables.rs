@@ -7,8 +7,8 @@
 //! A table of one DAG begins a lap with each job. Where no entry belongs to another lap's job, the
 //! DAG may be sporadic. Then long steps and a device's interrupts (bursts, in `workload`) are
 //! covered, too, as long as the job ends by its deadline and the next release: each entry is late
-//! by the same time. In a table of several DAGs lateness would be handed on from lap to lap, so the
-//! DAGs have no bound then.
+//! by no more than they take. In a table of several DAGs lateness would be handed on from lap to
+//! lap, so the DAGs have no bound then.
 //!
 //! Assumes subtasks that do not wait, and preemptible members on the table's cores. As many jobs
 //! may be in flight as the bounds need.
@@ -98,8 +98,8 @@ fn latest(finishes_ns: &[u64]) -> (u64, SubtaskId) {
     latest.unwrap_or((0, SubtaskId(0)))
 }
 
-/// The latest finish of each subtask of a table after its release, by DAG and subtask. The error
-/// gives the reason why the table has no bounds, and the DAG to blame, unless all are.
+/// The latest finish after the release of each subtask of a table, by DAG and subtask. The error
+/// says why the table has no bounds, and which DAG is to blame, unless all are.
 pub(super) type TableFinishes = Result<Vec<Vec<u64>>, (Option<usize>, NotProvenReason)>;
 
 /// Computes the finishes of a table.

@@ -18,8 +18,8 @@
 //!
 //! If the last segment keeps its core, the equation bounds its *start*, and its WCET is added. The
 //! blocking is by a DAG below; or a segment of the own DAG has kept more urgent work waiting, but
-//! has ended by the window's begin and is subtracted again. The best of all groupings into windows
-//! counts. A job with any other graph is one window, with the waits of a path.
+//! that segment has ended by the window's begin and is subtracted again. The best of all groupings
+//! into windows counts. A job with any other graph is one window, with the waits of a path.
 //!
 //! DAGs above without waits thus need no jitter, unlike in `multiple_paths`, where they count as
 //! carried-in work. The bound by `multiple_paths` may still be smaller, if a long segment of the
