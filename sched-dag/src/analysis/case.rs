@@ -203,7 +203,7 @@ impl<'a> AnalysisInput<'a> {
                 has_bound[dag] &= bound.is_some();
             }
             let bursts = self.bursts(|dag| !has_bound[dag]);
-            // Bounds only disappear from round to round, never return, so the loop ends.
+            // From round to round bounds only disappear and never return, so the loop ends.
             let is_settled = bursts == self.set.bursts;
             self.set.bursts = bursts;
             if let Some(place) = self.set.bursts.endless {

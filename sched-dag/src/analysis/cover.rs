@@ -43,7 +43,7 @@ pub(super) fn parallelism_covers_and_parts(task: &Task, cores: u32) -> (u64, Vec
     (parallelism as u64, covers, parts)
 }
 
-/// Returns the width, or `None` if the graph is too large for finding it.
+/// Returns the width, or `None` if the graph is too large to find it.
 pub fn width(task: &Task) -> Option<u64> {
     Some(exact(task, usize::MAX)?.len() as u64)
 }

@@ -13,9 +13,9 @@
 //! member goes on at once. No instance is charged for a move; the bounds in `lent_cores` have a
 //! term instead.
 //!
-//! These charges are for a step with few instances becoming ready. Each instance that becomes ready
-//! makes its step longer by `ready`, and any instance may be delayed; `workload` has this term of
-//! the bounds.
+//! These charges are for a step in which few instances become ready. Each instance that becomes
+//! ready makes its step longer by `ready`, and any instance may be delayed; `workload` has this
+//! term of the bounds.
 //!
 //! A *device* interrupts one core, and its driver keeps the device from interrupting again too
 //! soon. No instance is charged for device interrupts; `workload` has their term, too.

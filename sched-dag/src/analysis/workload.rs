@@ -34,7 +34,7 @@
 //!
 //! # Bursts: long steps of the scheduler, with many instances becoming ready
 //!
-//! Each instance is charged for a step with few instances becoming ready (`overheads`). Each
+//! Each instance is charged for a step in which few instances become ready (`overheads`). Each
 //! instance that becomes ready makes its step longer by `ready` at most, and as long as a step
 //! lasts it may keep the cores from any instance, even a more urgent one. So in a window of length
 //! `L` the time in which some core is lost, beyond the charges, is at most

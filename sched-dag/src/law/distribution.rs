@@ -3,8 +3,8 @@
 //! A [`Distribution`] has its values in ascending order, each with the number of its samples. The
 //! values are either exact, or come from the *buckets* of a [`Histogram`]: then each value is the
 //! upper end of a bucket, and no sample in the bucket is larger. Ranks are nearest ranks: the value
-//! for a number of thousandths is the smallest value not exceeded by at least that part of the
-//! samples.
+//! for a number of thousandths is the smallest one that at least so large a part of the samples
+//! does not exceed.
 //!
 //! A [`Histogram`] counts values in *buckets*, in a fixed amount of memory. Values below 2^b are
 //! exact; above, each doubling of the value is divided into 2^b buckets of equal width. So a bucket
@@ -100,8 +100,8 @@ impl Distribution {
         self.values.iter().copied()
     }
 
-    /// Returns the smallest value not exceeded by at least so many thousandths of the samples
-    /// (nearest rank); 0 without samples.
+    /// Returns the smallest value that at least `thousandths` thousandths of the samples do not
+    /// exceed (nearest rank); 0 without samples.
     ///
     /// ```
     /// use sched_dag::law::Distribution;
@@ -130,7 +130,7 @@ impl Distribution {
         self.per_mille(500)
     }
 
-    /// Returns the 99th percentile, or 0.
+    /// Returns the 99th percentile, or 0 without samples.
     pub fn p99(&self) -> u64 {
         self.per_mille(990)
     }
@@ -207,7 +207,7 @@ impl Histogram {
     #[allow(clippy::cast_possible_truncation, reason = "buckets are few")]
     fn bucket(&self, value: u64) -> usize {
         let value = value.min((1 << LAST_BIT) - 1);
-        // The logarithm of the bucket's width.
+        // The binary logarithm of the bucket's width.
         let shift = (u64::BITS - value.leading_zeros()).saturating_sub(self.bits + 1);
         ((u64::from(shift) << self.bits) + (value >> shift)) as usize
     }
@@ -230,7 +230,7 @@ impl Histogram {
             false => (self.top(bucket).min(self.max), count.into()),
         });
         let mut distribution = Distribution::counted(self.min, values.collect());
-        // The counters of a bucket saturate, so their sum may be too small.
+        // The counters of buckets saturate, so their sum may be too small.
         distribution.count = self.count;
         distribution
     }

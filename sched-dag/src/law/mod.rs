@@ -83,7 +83,7 @@ pub struct JobRecord {
 }
 
 impl JobRecord {
-    /// Returns the time from the nominal release to the end, or `None` without both.
+    /// Returns the time from the nominal release to the end, or `None` unless both are known.
     pub fn response_time_ns(&self) -> Option<u64> {
         Some(self.ended_ns?.saturating_sub(self.release_ns?))
     }
@@ -173,8 +173,8 @@ impl RunRecord {
         &self.dags[dag.index()].jobs
     }
 
-    /// Returns the number of the first recorded job of a DAG. Not the DAG's own first job if the
-    /// memory did not hold all jobs.
+    /// Returns the number of the first recorded job of a DAG. This is not the DAG's own first job
+    /// if the memory did not hold all jobs.
     ///
     /// # Panics
     ///
@@ -268,7 +268,7 @@ impl DagRecord {
     }
 }
 
-/// Returns so many default values, or `None` if there is no memory for them.
+/// Returns `count` default values, or `None` if there is no memory for them.
 fn filled<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;

@@ -67,7 +67,7 @@ pub(super) enum Place<'a> {
 
 impl<'a> DispatchModel<'a> {
     /// Returns the key of an instance: (the policy's number, plus the job's release if the policy
-    /// adds the release, DAG, job, subtask).
+    /// adds it, DAG, job, subtask).
     pub(super) fn key(&self, instance: Instance) -> Key {
         let Instance { dag, job, subtask } = instance;
         let model = self.task_set.dag(dag);
@@ -181,7 +181,7 @@ pub(super) struct DispatchSweep<'m> {
     model: &'m DispatchModel<'m>,
     bound_ns: u64,
     now_ns: u64,
-    /// The cores whose state is known.
+    /// The cores known to be busy or idle.
     pub(super) known_cores: BTreeSet<CoreId>,
     /// The number of events so far.
     events: u64,
@@ -190,7 +190,7 @@ pub(super) struct DispatchSweep<'m> {
     running: BTreeMap<Key, CoreId>,
     ended_dags: BTreeSet<DagId>,
     owed: BTreeMap<Key, OwedDispatch>,
-    /// The instances that became ready at this instant.
+    /// The instances that became ready at this instant; below, those that started.
     fresh: Vec<Key>,
     started: Vec<(Key, CoreId, u64)>,
     /// Keys of instances that have not started yet.

@@ -96,9 +96,9 @@ pub(super) struct TableProgress<'m> {
 
 #[derive(Default)]
 struct ListPosition {
-    /// The first place neither begun nor passed; `None` if the events to know it are lost.
+    /// The first place neither begun nor passed; `None` if the events that tell it are lost.
     next: Option<u64>,
-    /// The depths and places of entries begun and not finished.
+    /// The depths and places of entries that have begun and not finished.
     begun: BTreeSet<(u32, u64)>,
     /// The subset of `begun` that gave way before starting.
     unstarted: BTreeSet<(u32, u64)>,
@@ -128,7 +128,8 @@ impl<'m> TableProgress<'m> {
         }
     }
 
-    /// Returns the instance of the table that a core should run, if ready or begun.
+    /// Returns the instance of its table that a core should run, if the instance is ready or has
+    /// begun.
     pub(super) fn due(
         &self,
         core: CoreId,

@@ -12,7 +12,7 @@
 //! - *Execution time*, of a subtask's instances: from the start to the finish, without suspensions
 //!   and waits. Execution times above the WCET are counted, too.
 //!
-//! Only complete jobs count in a DAG's response time, and no jobs that were cut.
+//! Only complete jobs count in a DAG's response time; a job that was cut does not.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -222,7 +222,7 @@ impl DagTally {
         let places = self.open.len();
         let first = usize::try_from(event.job % places as u64).unwrap_or(0);
         let mut order = (first..places).chain(0..first);
-        // There is always a free place, for no more jobs are in flight than places exist.
+        // There is always a free place, for no more jobs are in flight than there are places.
         let free = order.find(|&place| self.open[place].number == 0);
         let place = free.unwrap_or(first);
         self.open[place] = JobInFlight {

@@ -1,7 +1,7 @@
 //! Violations visible in a journal: the rules, and one row for each kind of breach.
 //!
-//! A row has the breach's code, its rule, the time or event showing the breach, and the text: the
-//! fact, its place, and the reason against it. The documentation of a row begins with the rule.
+//! A row has the breach's code, its rule, the time or event showing the breach, and the text: what
+//! happened, where, and why it must not happen. The documentation of a row begins with the rule.
 //!
 //! The module also has the phrases for the texts of violations: names of DAGs and subtasks, and all
 //! words depending on the kind of breach.
@@ -72,7 +72,7 @@ worded! {
         /// R1: an event belongs to an unreleased job; later events of the job are not judged.
         NotReleased { event: Event } = "not_released", (Release, By(event)),
             " although its job was never released";
-        /// R1: an event belongs to a job already over, and a later job is over, too.
+        /// R1: an event belongs to a job that is already over, as is a later job.
         Forgotten { event: Event } = "forgotten", (Release, By(event)),
             " although its job is over, and a later one, too";
         /// R1: no event says when a sporadic job was due.
@@ -369,7 +369,7 @@ pub(super) fn comes(event: &Event, awaited: Instance, over: Option<(u64, CoreId)
     })
 }
 
-/// Returns the words for an instance over too late, or not over.
+/// Returns the words for an instance that is over too late, or not over.
 pub(super) fn over(over_ns: Option<u64>) -> impl Display {
     fmt::from_fn(move |f| match over_ns {
         Some(over_ns) => write!(f, "over only at {over_ns} ns"),

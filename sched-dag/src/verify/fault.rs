@@ -1,5 +1,5 @@
-//! Reasons for the rejection of a commit, one row per kind; and oddities that prevent nothing, but
-//! that the author may not have intended.
+//! Reasons for rejecting a commit, one row per kind; and oddities that its author may not have
+//! meant, but that prevent nothing.
 //!
 //! A fault names everything needed by a message or a tool: the DAG, the subtasks, the topic, the
 //! numbers. Its text states the fact, the offender and the remedy in one line. Times are printed

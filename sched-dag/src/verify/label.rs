@@ -89,7 +89,7 @@ impl fmt::Display for SubtaskLabel {
     }
 }
 
-/// The maximum number of subtasks listed in a message.
+/// The maximum number of subtasks listed in a message, before it only counts the rest.
 const LISTED: usize = 8;
 
 /// Returns a time in the form printed by messages.
@@ -149,12 +149,12 @@ pub(super) fn own_input(topic: Option<&String>) -> impl Display {
     })
 }
 
-/// Returns the range of valid clusters.
+/// Returns words for the clusters that can be stated; `clusters` is their number.
 pub(super) fn one_up_to(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| write!(f, "state one up to cluster {}", clusters.saturating_sub(1)))
 }
 
-/// Returns the range of valid cores in a cluster.
+/// Returns words for the cores that can be stated in a cluster of `cores` cores.
 pub(super) fn counted_from_0(cores: u32) -> impl Display {
     fmt::from_fn(move |f| {
         write!(

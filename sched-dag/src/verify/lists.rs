@@ -31,7 +31,7 @@ use crate::table::{CoreList, ENTRY_LIMIT, Table, TableEntry};
 use crate::table_times::first_in_lap;
 use crate::task_set::TaskSet;
 
-/// The longest lap, 9 years: finding times runs some laps.
+/// The longest lap, 9 years, since some laps are run to find times.
 const LONGEST_LAP_NS: u64 = 1 << 58;
 
 /// The maximum number of laps from a job's release to its entry.

@@ -1,8 +1,8 @@
 //! The verification of DAGs at commit.
 //!
-//! After the verification nothing can be added, and the holder of the [`TaskSet`] may rely on its
-//! statements. All faults of all DAGs are reported at once, so an app's author needs one run to see
-//! them. Warnings are reported separately and prevent nothing.
+//! After the verification nothing can be added, and the holder of the [`TaskSet`] may rely on
+//! everything it states. All faults of all DAGs are reported at once, so an app's author needs one
+//! run to see them. Warnings are reported separately and prevent nothing.
 //!
 //! After a fault, each check goes on with the author's most likely intention. So one slip is one
 //! fault and hides no other. The whole verification takes time linear in subtasks, ports and edges,
@@ -43,7 +43,7 @@ pub const MAX_ARITY: usize = 16;
 pub struct VerifiedDags {
     /// The model for the scheduler.
     pub task_set: TaskSet,
-    /// Oddities, perhaps not intended by the apps' authors.
+    /// Oddities that the apps' authors may not have meant.
     pub warnings: Vec<Warning>,
 }
 
@@ -101,7 +101,7 @@ impl RejectedDags {
         &self.faults
     }
 
-    /// Returns the warnings: oddities, perhaps not intended by the apps' authors.
+    /// Returns the warnings: oddities that the apps' authors may not have meant.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
@@ -245,7 +245,7 @@ pub struct CommitOptions {
     /// The lists of cores, one text for each, such as `core 0: dag.a dag.b#1`; `docs/dag-file.md`
     /// describes the notation.
     pub lists: Vec<String>,
-    /// The wanted shapes of graph.
+    /// The shapes of graph to accept.
     pub construction: ConstructionPolicy,
     /// The maximum number of instances for the jobs in flight of all DAGs: the sum over the DAGs of
     /// jobs in flight times subtasks. This bounds the memory of the scheduler and of the edges'

@@ -1,4 +1,4 @@
-//! Makes the model from specs without fault.
+//! Makes the model from specs without faults.
 //!
 //! A DAG without priorities gets priorities derived from its graph. A subtask's *remaining path* is
 //! the longest path from its start to the end of the DAG, including its own WCET. The subtask with
@@ -34,7 +34,7 @@ use crate::wcets::{WcetSource, graph_hash};
 ///
 /// # Panics
 ///
-/// If the specs have a fault already found by an earlier check.
+/// If the specs have a fault that an earlier check finds.
 pub(super) fn build(
     options: &CommitOptions,
     shapes: Vec<(Graph, Vec<StatePrecedence>)>,

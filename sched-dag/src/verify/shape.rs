@@ -3,7 +3,7 @@
 //! # One shortest cycle for each knot of a graph
 //!
 //! A *knot* is a strongly connected component of two or more subtasks: a set in which each subtask
-//! precedes each other. Knots are found by Kosaraju's two walks (Sharir, Computers and Mathematics
+//! precedes every other. Knots are found by Kosaraju's two walks (Sharir, Computers and Mathematics
 //! 7, 1981), without recursion. Each knot gets a single report, because the number of cycles may be
 //! exponential. The report shows the shortest cycle, because that is the easiest to read.
 //!
@@ -121,9 +121,9 @@ fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFindin
     }
 }
 
-/// Checks the sinks. A topic without a reader is a fault, but at an accepted sink only a value
-/// nobody uses. If the policy wants one sink and a subtask without outputs fits, then other ends of
-/// the graph are not sinks but writers of unread topics, most likely misspelt.
+/// Checks the sinks. A topic without a reader is a fault, but at an accepted sink it is only a
+/// value nobody uses. If the policy wants one sink and a subtask without outputs fits, then other
+/// ends of the graph are not sinks but writers of unread topics, most likely misspelt.
 #[inline(never)]
 fn check_sinks(
     graph: &Graph,
@@ -136,7 +136,7 @@ fn check_sinks(
     for &(writer, _) in unread {
         writes_unread[writer] = true;
     }
-    // An end writing an unread topic is perhaps no sink, but a misspelt topic.
+    // An end that writes an unread topic may be no sink: the topic may be misspelt.
     let silent = ends.iter().filter(|end| !writes_unread[end.index()]);
     let silent: Vec<SubtaskId> = silent.copied().collect();
     let wants_one = policy.sinks == CountLimit::One;

@@ -101,7 +101,7 @@ pub(super) fn check<'a>(
         let first = ends[0];
         let of_dags = || ends.chunk_by(|one, other| one.dag == other.dag);
         let is_shared = ends.iter().any(|end| end.dag != first.dag);
-        // Reported once, at the first DAG, with all DAGs naming the topic.
+        // Reported once, at the first DAG, with all DAGs that name the topic.
         if is_shared {
             let dags = of_dags().map(|ends| findings.label(ends[0].dag)).collect();
             let topic = first.port.topic.clone();

@@ -1,4 +1,4 @@
-//! Judges R5, and T1 to T4, in a journal: turns its events into changes of the dispatch, cluster by
+//! Judges a journal by R5, and T1 to T4: turns its events into changes of the dispatch, cluster by
 //! cluster.
 
 use alloc::collections::{BTreeMap, BTreeSet};
@@ -24,7 +24,8 @@ pub struct DispatchReport {
     pub waits: WaitCounts,
 }
 
-/// Checks a journal against R5: no instance is owed a core for longer than tolerated.
+/// Checks a journal against R5, and T1 to T4: no instance is owed a core for longer than `terms`
+/// tolerate.
 ///
 /// The events must be in their order; an event with an earlier time than its predecessor counts at
 /// the predecessor's time. If the oldest events are lost, a core takes part from its first known
@@ -121,8 +122,8 @@ pub fn dispatch_violations(
     judge_dispatch(task_set, options, terms, events).violations
 }
 
-/// Returns the state before the first event: the cores busy then (or idle, if their first event
-/// ends an instance elsewhere), and the state of each instance.
+/// Returns the state before the first event: the cores that were busy, or idle with the end of
+/// another core's instance as their first event; and the state of each instance.
 fn before(
     cores: Range<u32>,
     events: impl Iterator<Item = Event>,

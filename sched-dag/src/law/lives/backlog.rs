@@ -1,9 +1,9 @@
 //! The jobs of one DAG that are due and not released, as runs of consecutive numbers.
 //!
-//! Under overload any number of jobs waits, and most of them share the same known events: queued,
-//! missed, or skipped. So jobs with consecutive numbers and the same events form one *run*, with
-//! the moments of the job that joined the run last. The number of runs stays near the number of
-//! kinds of events, however many jobs wait.
+//! Under overload any number of jobs waits, and for most of them the same events are known: they
+//! were queued, missed their deadlines, or were skipped. So jobs with consecutive numbers and the
+//! same events form one *run*, with the moments of the job that joined the run last. The number of
+//! runs stays near the number of kinds of events, however many jobs wait.
 
 use alloc::collections::BTreeMap;
 

@@ -8,8 +8,8 @@
 //!
 //! R4: a job is complete with the last of its instances: all instances must be over, and the
 //! completion belongs to the scheduler step in which the last instance ends, within the tolerance.
-//! The same is true for a job aborted, or cut short by the end of its DAG. The next section says
-//! whether a job is late.
+//! The same is true of a job that was aborted, or cut short by the end of its DAG. The next section
+//! says whether a job is late.
 //!
 //! # R4: when a job is late
 //!
@@ -18,7 +18,7 @@
 //! beyond the tolerance. Where times are exact, a miss is noticed at once: with several sinks,
 //! right after the first deadline not met by its sink.
 //!
-//! Lateness is not judged for a job aborted, or cut short by the end of its DAG.
+//! Lateness is not judged for a job that was aborted, or cut short by the end of its DAG.
 //!
 //! # R2 and R3: what an instance waits for, and what makes it ready
 //!

@@ -1,4 +1,5 @@
-//! Judges a journal by R1 to R4, one life of each instance, one instance on each core.
+//! Judges a journal by the rules R1 to R4, by one life of each instance, and by one instance on
+//! each core.
 //!
 //! The judge takes the events in their order, where each event comes after all its causes, and
 //! compares each event with the state known so far. An event not yet seen has not happened,
@@ -53,8 +54,8 @@ pub struct LifeVerdict {
     pub finish_to_ready_max_ns: u64,
 }
 
-/// Checks a journal against the rules R1 to R4, and each instance and each core against the limits
-/// of any machine.
+/// Checks a journal against the rules R1 to R4, and each instance and each core against the rules
+/// of every machine: one life, and one instance on a core at a time.
 ///
 /// [`dispatch_violations`](super::dispatch_violations) judges which instance should have run.
 #[must_use]
@@ -138,7 +139,7 @@ struct DagHistory {
 
 #[derive(Clone, Default)]
 struct CoreHistory {
-    /// Counts the core's machine events.
+    /// The number of the core's machine events so far.
     step: u64,
     /// The instance running on the core.
     occupant: Option<Instance>,
