@@ -54,7 +54,7 @@ pub fn parallelism(task: &Task, cores: u32) -> u64 {
     parallelism_covers_and_parts(task, cores).0
 }
 
-/// Returns the covers, if found within the limit.
+/// Returns the covers, if they can be found within the limit.
 fn exact(task: &Task, most: usize) -> Option<Vec<u64>> {
     let mut flow = ChainFlow::none(task);
     let mut covers: Vec<u64> = Vec::new();

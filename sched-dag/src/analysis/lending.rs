@@ -78,7 +78,8 @@ pub struct LendingPlan {
     pub attempt: LendingAttempt,
     /// The owners, in the order of their cores.
     pub owners: Vec<CoreOwner>,
-    /// The groups, in the order of creation; each DAG is an owner or in one of the groups.
+    /// The groups, in the order in which they were made; each DAG is an owner or in one of the
+    /// groups.
     pub groups: Vec<LentGroup>,
 }
 
@@ -227,7 +228,7 @@ pub(super) struct LendingTerms<'b> {
 /// Divides cores among DAGs by the analysis of tables in `docs/bounds.md`. A table of several DAGs
 /// has at most `entry_limit` entries; a commit passes [`ENTRY_LIMIT`](crate::ENTRY_LIMIT).
 ///
-/// Returns `None` if the analysis does not apply: without cores, or with waiting subtasks.
+/// Returns `None` if the analysis does not apply: there are no cores, or a subtask waits.
 #[must_use]
 pub fn lend(tasks: &[&Task], cores: u32, entry_limit: usize) -> Option<LendingAnswer> {
     let terms = LendingTerms {

@@ -54,7 +54,7 @@ pub struct ListSchedule {
 impl ListSchedule {
     /// Schedules the WCETs on as many cores as there are limits, in nanoseconds after the release.
     ///
-    /// Returns `None` if no core may take some subtask, and without cores.
+    /// Returns `None` if no core may take some subtask, or there are no cores.
     #[must_use]
     pub fn within(task: &Task, limits_ns: &[u64]) -> Option<Self> {
         let latest_ns = *limits_ns.iter().max()?;

@@ -22,13 +22,13 @@
 //! | `ratio` | sums of utilisations | |
 //! | `ranks` | which DAG may delay which | |
 //! | `case`, `overheads` | the analysable DAGs of a cluster, and their charges | |
-//! | `features`, `schedulability` | a DAG's features; tests covering them | Joseph 1986; Baruah 1990 |
+//! | `features`, `schedulability` | features; tests covering them | Joseph 1986; Baruah 1990 |
 //! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `list_schedule` | orders of a DAG on some cores | Graham 1969 |
 //! | `lending`, `lent_cores` | tables of DAGs, and the time left to others | derived here |
-//! | `table_making`, `table_check` | tables of several DAGs; the check of their times | derived here |
-//! | `abstraction`, `explore` | state graphs of periodic DAGs keeping cores; a search | Nasri 2019 |
+//! | `table_making`, `table_check` | tables of several DAGs; the check of times | derived here |
+//! | `abstraction`, `explore` | graphs of periodic DAGs keeping cores; search | Nasri 2019 |
 //! | `certificate` | closed state lists of such graphs, carried along with a set | |
 //! | `witness` | all data needed to check the bounds | |
 //!

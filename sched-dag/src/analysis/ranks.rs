@@ -23,7 +23,7 @@ pub(super) struct RankRelation {
     pub(super) ranks_sinks: bool,
 }
 
-/// The order of instances as far as known to proofs, whatever the policy's name.
+/// The order of instances, as far as proofs know it, whatever the policy's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum InstanceOrder {
     /// By numbers equal for every job, like static priorities.

@@ -407,8 +407,8 @@ pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
 }
 
 /// Bounds the response times under global fixed priorities, also of overlapping jobs. The DAGs come
-/// from the highest priority to the lowest. Returns `None` without cores, or if a DAG has no bound
-/// within its deadline.
+/// from the highest priority to the lowest. Returns `None` if there are no cores, or if a DAG has
+/// no bound within its deadline.
 #[must_use]
 pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
     let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
@@ -421,7 +421,7 @@ pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Op
 
 /// Bounds the response times under global EDF, in the order given. The iteration goes down from the
 /// deadlines and therefore accepts a little less than [`answer()`](super::answer()). Returns `None`
-/// without cores, or if a DAG has `D > T` or no bound within its deadline.
+/// if there are no cores, or if a DAG has `D > T` or no bound within its deadline.
 #[must_use]
 pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
     let mut set = constrained(tasks, cores).then(|| EquationSet::new(tasks, cores))?;

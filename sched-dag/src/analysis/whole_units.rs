@@ -48,8 +48,8 @@ pub enum WaitingForm {
 }
 
 /// Bounds the response times under global fixed priorities, in whole units of time, with the DAGs
-/// from the highest priority to the lowest. Returns `None` without cores, or if a DAG has no bound
-/// within its deadline and its period.
+/// from the highest priority to the lowest. Returns `None` if there are no cores, or if a DAG has
+/// no bound within its deadline and its period.
 #[must_use]
 pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
     in_units(tasks, cores, form)?.in_order()

@@ -173,8 +173,8 @@ impl<'a> JobWindows<'a> {
         self.window([task.volume_ns().into(), longest], last_ns, steps)
     }
 
-    /// Returns a subtask's segments, if known: the limit of the wait before (or 0), the WCET with
-    /// its charge, and the part of this WCET keeping the core.
+    /// Returns a subtask's segments, if they are known: the limit of the wait before (or 0), the
+    /// WCET with its charge, and the part of this WCET keeping the core.
     fn segments(&self, subtask: usize) -> Option<Vec<[u64; 3]>> {
         let (case, settings) = (self.case, self.case.settings);
         let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption)?;
@@ -196,7 +196,7 @@ impl<'a> JobWindows<'a> {
         u128::from(limit_ns) + u128::from(kept_ns)
     }
 
-    /// Returns the segments of a DAG with all subtasks on one path, if known.
+    /// Returns the segments of a DAG whose subtasks are all on one path, if the segments are known.
     fn chain(&self) -> Option<Vec<[u64; 3]>> {
         let task = self.case.tasks[self.dag];
         let is_path = task.most_subtasks_on_a_path() == task.subtask_count() as u64;

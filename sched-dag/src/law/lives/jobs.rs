@@ -70,7 +70,7 @@ impl JobState {
         }
     }
 
-    /// Returns the life of an instance, as far as known.
+    /// Returns the life of an instance, as far as it is known.
     pub(super) fn life(&self, subtask: SubtaskId) -> Option<&InstanceLife> {
         self.lives.get(subtask.index())?.as_ref()
     }

@@ -48,7 +48,7 @@ use jobs::JobState;
 /// The findings about R1 to R4, waits, lives of instances, and cores in a journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LifeVerdict {
-    /// Every breach, in the order of discovery.
+    /// Every breach, in the order in which they were found.
     pub violations: Vec<Violation>,
     /// The longest time from the finish an instance waited for last to the instance's readiness.
     pub finish_to_ready_max_ns: u64,
