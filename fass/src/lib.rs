@@ -77,8 +77,8 @@
 //!   distance of releases.
 //! - A function declares every influence on the run, too: pausing DAGs ([`Switch`](shared::Switch))
 //!   and ending the run ([`Shutdown`](shared::Shutdown)).
-//! - While DAGs run, data enters and leaves only through a [`Wire`](shared::Wire) or a
-//!   [`Parameter`](shared::Parameter).
+//! - While DAGs run, data from and to the outside passes a [`Wire`](shared::Wire), a
+//!   [`Device`](shared::Device) or a [`Parameter`](shared::Parameter).
 //! - A function may be async and wait before returning. The subtask declares the number of waits,
 //!   and a time limit for each. The function can wait for a time, a [`Device`](shared::Device) or a
 //!   [`Wire`](shared::Wire), and has no core meanwhile.
@@ -122,13 +122,13 @@ pub mod shared {
     //! |---|---|---|
     //! | [`State`] | subtasks of a DAG, from job to job | [`Dag::state`](crate::Dag::state) |
     //! | [`Latest`] value | DAGs | [`Dag::latest`](crate::Dag::latest) |
-    //! | [`Signal`] | a raiser, and the released DAG | [`Dag::sporadic`](crate::Dag::sporadic) |
+    //! | [`Signal`] | a subtask or a driver, and a DAG | [`Dag::sporadic`](crate::Dag::sporadic) |
     //! | [`Wire`] | DAGs and the outside: bytes in packets | [`Wire::new`] |
     //! | [`Device`] | an asking subtask, and a driver | [`create_device`] |
     //! | [`Lock`]ed data | subtasks without a common edge | [`Lock::new`] |
     //! | [`Parameter`] | DAGs and people who tune them | [`Parameter::new`] |
     //! | [`WallClock`] | DAGs and the world's time | [`WallClock::new`] |
-    //! | [`Switch`] | a DAG, and subtasks pausing it | [`Dag::switching`](crate::Dag::switching) |
+    //! | [`Switch`] | subtasks and a DAG they switch | [`Dag::switching`](crate::Dag::switching) |
     //! | [`Modes`] | groups of DAGs, with one group running at a time | [`Modes::new`] |
     //! | [`Shutdown`] | all: when the run ends | [`shutting_down`] |
     //!

@@ -50,7 +50,7 @@ pub fn create_dag() -> Dag {
 /// # Panics
 ///
 /// Every method panics, at its caller's line, after the DAG's commit. The verified graph is the
-/// graph that runs, and a later addition, silently ignored, would be a mistake in the program.
+/// graph that runs, so a later addition would silently not run: a mistake in the program.
 #[derive(Clone)]
 pub struct Dag {
     pub(crate) draft: Rc<RefCell<DagDraft>>,

@@ -14,8 +14,8 @@
 //!   before, and then as a whole.
 //! - *Never backwards.* Successive samples of one subtask come from ever later jobs, or from the
 //!   same job again. During an instance its sample does not change.
-//! - *Visible staleness.* A [`Sample`] contains the writer's job and the time of that job's
-//!   completion. The greatest age of a value follows from the writer's bound
+//! - *Visible staleness.* A [`Sample`] contains the writer's job and the completion time of the
+//!   writer's instance. The greatest age of a value follows from the writer's bound
 //!   ([`Commit::staleness`](crate::commit::Commit::staleness)).
 //!
 //! # Limits
@@ -87,7 +87,7 @@ pub struct Latest<T> {
 pub struct LatestUse<T>(Latest<T>);
 
 /// A sampled value: the value of the writer's latest complete instance when the sampling subtask
-/// started. The function gets `None` instead while no instance of the writer has been complete.
+/// started. The function gets `None` instead if no instance of the writer was complete by then.
 ///
 /// ```
 /// use fass::shared::Sample;

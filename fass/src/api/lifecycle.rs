@@ -202,8 +202,8 @@ impl Dag {
     }
 }
 
-/// Adds the code serving lifecycle requests to the plan. Only statements in this file refer to the
-/// code, so an app without such statements does not contain it.
+/// Adds the code serving lifecycle requests to the plan. Only the declarations in this file refer
+/// to the code, so an app that makes none of them does not contain it.
 fn plan_lifecycle(drafts: &Drafts, plan: &mut Plan) {
     let dags = || (0..).map(DagId).zip(drafts);
     let paused = dags().filter(|(_, draft)| draft.borrow().has::<Paused>());

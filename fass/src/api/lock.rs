@@ -13,8 +13,8 @@
 //!
 //! # Guarantees
 //!
-//! - An instance fails before entering a section if its subtask does not declare the lock, or has
-//!   used up the declared sections.
+//! - An instance fails before entering a section if its subtask does not declare the lock, or if
+//!   the instance has used up the declared sections.
 //! - While a lock has no longest section, no DAG on the cores of its users has a bound.
 //! - The [log](mod@crate::log) reports a section longer than declared: the bounds do not hold then.
 //!   A section longer than [`LONGEST_SECTION`] is preempted.
@@ -156,9 +156,9 @@ impl<T> Lock<T> {
     ///
     /// # Panics
     ///
-    /// If the caller is an instance whose subtask does not declare the lock, or has entered all
-    /// declared sections; if the caller is no instance while a run goes on; if the caller is in a
-    /// section already; or if a fault has ended a section of this lock.
+    /// If the caller is an instance whose subtask does not declare the lock, or an instance that
+    /// has entered all declared sections already; if the caller is no instance while a run goes on;
+    /// if the caller is in a section already; or if a fault has ended a section of this lock.
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         let (platform, name) = (expect_installed(), self.name);

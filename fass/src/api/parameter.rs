@@ -10,7 +10,7 @@
 //! - A job's value is the last one set before its source started. The value does not change during
 //!   the job: in each DAG one source reads the parameter, and other subtasks get the value along
 //!   edges.
-//! - A value outside the range, or a text that is no number, is never set.
+//! - A value outside the range is never set, nor one that is no number (a NaN, or a text).
 //! - Nobody waits: reading is one load.
 //! - The value is recorded and replayed with the source's results. During a replay, setting a
 //!   parameter has no effect.

@@ -1,9 +1,9 @@
 //! Registering a subtask step by step: its function, its input and output topics, and its deadline.
 //!
 //! The paper's three functions ([`Dag::register_periodic_subtask`], [`Dag::register_subtask`],
-//! [`Dag::register_sink_subtask`]) do the same in one line. The steps cover cases beyond the three:
-//! a subtask *using* an object besides its inputs ([`Dag::using`]), a subtask whose function is
-//! *replaced* after a fault ([`Dag::restarting`]), the source of a *sporadic* DAG
+//! [`Dag::register_sink_subtask`]) do the same in one line. The steps also cover cases beyond those
+//! three: a subtask *using* an object besides its inputs ([`Dag::using`]), a subtask whose function
+//! is *replaced* after a fault ([`Dag::restarting`]), the source of a *sporadic* DAG
 //! ([`Dag::sporadic`]).
 //!
 //! # Untyped subtasks
@@ -287,7 +287,8 @@ impl Dag {
     }
 
     /// Sets the relative deadline of an untyped sink: the time from a release to the sink's latest
-    /// finish, where shorter than the DAG's. (A typed sink states its deadline at registration.)
+    /// finish, where that is shorter than the DAG's deadline. (A typed sink states its deadline at
+    /// registration.)
     ///
     /// ```
     /// use core::time::Duration;

@@ -29,8 +29,8 @@
 //! Several uses form a tuple of up to 8, and the function gets a tuple. Since the function borrows
 //! all of them for one call only, the function can keep nothing beyond the instance.
 //!
-//! The methods of [`SubtaskBuilder`] are the same as for [`Dag`]. Each wraps the given function.
-//! The wrapper begins the uses, lends them to the function for one call, and ends them.
+//! The methods of [`SubtaskBuilder`] are the same as those of [`Dag`]. Each wraps the given
+//! function. The wrapper begins the uses, lends them to the function for one call, and ends them.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -252,7 +252,8 @@ fn is_source(of: &CheckedDag<'_>, input: &OutsideInput) -> bool {
 
 /// A DAG whose next subtask has uses. Made by [`Dag::using`].
 ///
-/// Its methods are the same as for [`Dag`], for functions with the uses as their first argument.
+/// Its methods are the same as those of [`Dag`], for functions with the uses as their first
+/// argument.
 ///
 /// See [`State`](crate::shared::State).
 #[derive(Debug)]

@@ -37,7 +37,7 @@ use crate::draft::{NamedTopics, SubtaskAttributes};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 use crate::run::waiting::{defer, defer_untyped};
 
-/// The error of a device that has not answered within the limit of the wait.
+/// The error of a wait whose device has not answered within the limit.
 ///
 /// ```
 /// assert_eq!(fass::shared::TimedOut.to_string(), "the device has not answered in time");

@@ -95,7 +95,7 @@ impl WallClock {
         UnixTime { offset_ns }.of(instant_ns)
     }
 
-    /// Sets the Unix time of an instant, for the jobs to come; for example by the word of a peer,
+    /// Sets the Unix time of an instant, for the jobs to come; for example as told by a peer,
     /// possibly wrong. The first time counts as given. A later time moves the clock by at most
     /// `most`, also backwards; so take intervals from [`now_ns`](crate::now_ns).
     pub fn correct(&self, instant_ns: u64, unix_ns: u64, most: Duration) {

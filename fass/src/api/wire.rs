@@ -128,9 +128,9 @@ pub struct WireOptions {
     /// line feed; 256 by default. ([`Framing::Fixed`] states its own length.) An outgoing packet
     /// may always have 1,984 bytes, or the device's limit if that is less.
     pub longest_bytes: usize,
-    /// The number of incoming packets with room on the wire, and the same number of outgoing
-    /// packets; 16 by default, and rounded up to a power of two. Each packet takes the memory of
-    /// its longest length, and at least 2 KiB.
+    /// The number of packets for which the wire has room, incoming and outgoing each; 16 by
+    /// default, and rounded up to a power of two. Each place takes the memory of the longest
+    /// packet, and at least 2 KiB.
     pub room: usize,
 }
 
@@ -162,7 +162,7 @@ pub struct WireCounts {
     pub malformed: u64,
     /// Bytes sent by complete instances.
     pub sent_bytes: u64,
-    /// Bytes sent by complete instances, without room on the wire.
+    /// Bytes sent by complete instances that found no room on the wire.
     pub unsent_bytes: u64,
 }
 
@@ -250,6 +250,7 @@ impl Wire {
     /// let dag = fass::create_dag();
     /// let sink = dag.using(wire.sending_values(encode)).subtask(square).reads(&["number"]);
     /// ```
+    ///
     /// # Panics
     ///
     /// If another subtask sends on the wire.
@@ -340,8 +341,8 @@ impl DeviceEnd {
         &self.0
     }
 
-    /// Passes bytes to the wire that have arrived at `now_ns`, on the clock of [`crate::now_ns`].
-    /// If a packet is complete and a sporadic DAG receives packets, returns the arguments for
+    /// Passes to the wire the bytes that arrived at `now_ns`, on the clock of [`crate::now_ns`]. If
+    /// a packet is complete and a sporadic DAG receives packets, returns the arguments for
     /// [`Platform::raise`](crate::platform::Platform::raise).
     ///
     /// An interrupt handler may call the method.
@@ -395,7 +396,7 @@ impl DeviceEnd {
         self.0.shared.outgoing.begin_packets(most_bytes, ready);
     }
 
-    /// Returns the DAG released by packets, if there is one.
+    /// Returns the DAG released by packets, with its plan's number, once there is one.
     ///
     /// See [`announce`](Self::announce).
     #[must_use]
@@ -412,8 +413,8 @@ impl DeviceEnd {
     }
 
     /// Passes the oldest outgoing packet, and its addressee, to `send`. `send` may swap the buffer,
-    /// and returns whether the packet has gone; the method returns the same. Afterwards
-    /// [`tell_gone`](Self::tell_gone) ends a subtask's wait.
+    /// and returns whether the packet has gone; the method returns the same. Afterwards call
+    /// [`tell_gone`](Self::tell_gone) to end a subtask's wait.
     ///
     /// See [`depart`](Self::depart).
     pub fn swap_out(&self, send: impl FnOnce(&mut Buffer, Option<SocketAddrV4>) -> bool) -> bool {

@@ -68,6 +68,7 @@ impl Wire {
     /// assert!(responses.eq([Some(3_000_000), Some(5_000_000)]));
     /// assert_eq!(machine.sent(&modem), b"signal?\nsignal?\n");
     /// ```
+    ///
     /// # Panics
     ///
     /// If another subtask receives or reads on the wire.

@@ -27,7 +27,7 @@
 //! (doi:10.1145/1278480.1278553).
 //!
 //! The bound holds from the writer's first completion on, and as long as jobs come: not after the
-//! last job of a DAG with a limit, nor while a DAG is paused or after its end. For a sporadic
+//! last job of a DAG with a limit, nor while the DAG is paused or after its end. For a sporadic
 //! writer there is no such bound, because its signals may stay away.
 
 use alloc::string::{String, ToString};

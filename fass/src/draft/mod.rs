@@ -417,8 +417,8 @@ impl SubtaskAttributes {
         self
     }
 
-    /// Sets the execution budget: the platform ends an instance executing longer, without preempted
-    /// time, as a fault, and the instance's DAG as well.
+    /// Sets the execution budget: if an instance executes for longer, preempted time not counted,
+    /// the platform ends the instance as a fault, and its DAG as well.
     ///
     /// Without a budget the platform may enforce a multiple of the [WCET](Self::wcet). At most
     /// `u64::MAX` nanoseconds; a longer budget is a fault at commit.

@@ -27,7 +27,8 @@ use crate::run::plan::Plan;
 /// The number of events copied at once.
 const AT_ONCE: usize = 64;
 
-/// The number of clusters with room made at the start, so no commit changes the allocated memory.
+/// The number of clusters for which room is made at the start, so no commit changes the allocated
+/// memory.
 const MOST_CLUSTERS: usize = 64;
 
 /// The record of a boot, and the sink of its bytes.

@@ -204,7 +204,7 @@ impl Drain for OfLatest {
 #[derive(Clone, Debug)]
 pub struct LatestJobs {
     jobs: u32,
-    /// The history of each channel; empty for a channel without inputs.
+    /// The history of each channel; empty for a channel whose values are no inputs.
     places: Vec<ChannelHistory>,
     /// For each DAG, the job after the latest job seen.
     ends: Vec<u64>,

@@ -8,7 +8,8 @@ use super::{LaunchError, Platform, ask_edge, with_edge};
 use crate::edge::{BootRecord, Sink};
 use crate::run::plan::Plan;
 
-/// Whether a launched plan is recorded or replayed, and so needs the events.
+/// Whether a plan has been launched in a requested mode of the edge, so that events are of
+/// interest.
 static IS_ON: AtomicBool = AtomicBool::new(false);
 
 /// Sets up recording or replay of a plan on a platform, if requested, restores the plan's states,
@@ -18,8 +19,8 @@ static IS_ON: AtomicBool = AtomicBool::new(false);
 ///
 /// # Errors
 ///
-/// If nothing of the plan is recorded, if the plan does not fit a replay or is a second plan, or if
-/// its states cannot be restored.
+/// In a replay, if nothing of the plan is recorded, if the plan does not fit the recording or is a
+/// second plan, or if its states cannot be restored. In a recording, if there is no memory for it.
 pub fn launch<S: Sink + Send + 'static>(
     platform: &impl Platform,
     plan: &mut Plan,

@@ -32,8 +32,8 @@ pub trait Protocol: Send {
     fn hear(&mut self, datagram: &[u8], now_ns: u64) -> u64;
 
     /// Passes the next outgoing datagram to `send`, if there is one. `send` may swap the buffer,
-    /// and returns whether the datagram has gone; the method returns the same. The next call passes
-    /// a datagram again that has not gone.
+    /// and returns whether the datagram has gone; the method returns the same. A datagram that has
+    /// not gone is passed again by the next call.
     fn send(&mut self, now_ns: u64, send: &mut dyn FnMut(&mut Buffer) -> bool) -> bool;
 
     /// Tells the protocol whether the device has a link, at the start of a run and after each

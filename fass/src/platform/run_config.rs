@@ -57,7 +57,7 @@ pub struct RunConfig {
     /// replaces their stated WCETs with the observed ones. `sched_dag::wcets` has the format.
     pub wcets: Option<Cow<'static, str>>,
     /// The app's promise that its coming commits contain a *fixed* set: all jobs are released, on
-    /// time, and no DAG is paused, resumed or ended by functions, modes or persons. The text is a
+    /// time, and no DAG is paused, resumed or ended by functions, modes or people. The text is a
     /// certificate of that set ([`certify`](sched_dag::analysis::certify())). Based on the
     /// certificate the commit may prove bounds valid only for a fixed set. A fault, or an execution
     /// beyond its WCET, voids the bounds of all DAGs.

@@ -31,7 +31,7 @@ pub(crate) trait Effect: Send {
     fn bind(&mut self, _turn: usize) {}
 
     /// Returns the word changed by the latest wait, if a thread of the platform may sleep on the
-    /// word. Returns each word once.
+    /// word. Returns it only once for each such wait.
     fn bell(&mut self) -> Option<Arc<AtomicU32>> {
         None
     }
@@ -42,7 +42,7 @@ pub(crate) trait Effect: Send {
     /// Acts for a failed instance.
     fn fail(&mut self, _failed_ns: u64) {}
 
-    /// Discards all signals from now on.
+    /// Discards the effect's signals from now on.
     fn mute(&mut self) {}
 }
 
@@ -94,7 +94,7 @@ pub(crate) const STOP: u8 = 1;
 pub(crate) const GO: u8 = 2;
 /// The request to enter a mode at once.
 pub(crate) const AT_ONCE: u8 = 1;
-/// The request to enter a mode once the DAGs leaving are idle.
+/// The request to enter a mode once the DAGs it pauses are idle.
 pub(crate) const WHEN_IDLE: u8 = 2;
 
 /// A place for the request of an instance, initially empty; the last request counts.

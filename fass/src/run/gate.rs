@@ -1,4 +1,4 @@
-//! The gate to the app's code: a platform's calls of it all pass through here.
+//! The gate to the app's code: every call of that code by a platform passes through here.
 //!
 //! The app's code is called in an instance, in the app's main function, or nowhere;
 //! `docs/architecture.md` lists the places. A debug build asks the platform each time whether this

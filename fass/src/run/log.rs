@@ -12,7 +12,7 @@
 //! # No guarantees
 //!
 //! - Lines of several cores come only roughly in the order of their writing; their times tell the
-//!   exact order.
+//!   order.
 //! - An instance ended by its budget in the middle of a line takes the line's place with it: one of
 //!   64, until the next boot.
 

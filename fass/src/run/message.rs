@@ -6,8 +6,8 @@
 //! `Arc<PointCloud>` is *shared* (all readers see the same bytes, nothing is copied), a `Vec` is
 //! duplicated and so allocates, to be avoided in an app with deadlines.
 //!
-//! A type without permitted clones travels inside [`Unique`]. Such a value is always moved; a
-//! second reader of its topic is refused at commit.
+//! A type that cannot or must not be cloned travels inside [`Unique`]. Such a value is always
+//! moved; a second reader of its topic is refused at commit.
 
 use core::any::{TypeId, type_name};
 use core::ops::{Deref, DerefMut};

@@ -53,9 +53,9 @@ pub struct Plan {
     pub proven: ProvenBounds,
     /// The answers of the commit, for platforms keeping a record of the run.
     pub(crate) answers: Box<dyn CommitWords>,
-    /// For each DAG, the DAG released by a signal when a fault ends the first DAG
-    /// ([`Dag::on_fault`](crate::Dag::on_fault)). It happens right after the fault, in the same
-    /// step of the scheduler.
+    /// For each DAG, the DAG to be released by a signal when a fault ends the former
+    /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
+    /// scheduler.
     pub after_fault: Vec<Option<DagId>>,
     /// The server of requests other than signals, if a function may make one or a DAG begins
     /// paused. A platform without support for such requests refuses the plan.
@@ -188,8 +188,8 @@ pub(crate) trait PolledSubtask: Send {
         None
     }
 
-    /// Frees its memory after a fault, except what the app's function owns: no destructor can be
-    /// called.
+    /// Frees the subtask's memory after a fault, except the values owned by the app's function:
+    /// none of their destructors can be called.
     fn forget(self: Box<Self>);
 }
 
@@ -349,7 +349,7 @@ impl SubtaskCode {
 
     /// Publishes the effects prepared outside the DAG by the last [`run`](Self::run): shows latest
     /// values, and calls `ask` with each signal and each other request. For an unfinished instance,
-    /// returns how long it waits instead.
+    /// returns instead how long it waits.
     ///
     /// The platform calls this once it regards the instance as complete, at `completed_ns` on the
     /// clock of [`crate::now_ns`], but not for a failed instance. It passes the requests to the
@@ -369,7 +369,8 @@ impl SubtaskCode {
         None
     }
 
-    /// Ends any other turn. Apart, so the path of one effect saves no registers for a loop.
+    /// Ends a turn of a subtask with several effects, or with waits. A separate function, so the
+    /// path of a single effect saves no registers for a loop.
     #[inline(never)]
     fn end_turn(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) -> Option<WaitLimit> {
         if let Effects::OfTurns(turn, all) = &mut self.effects

@@ -183,7 +183,8 @@ impl PolledSubtask for ReplayedSource {
     fn forget(self: Box<Self>) {}
 }
 
-/// A sample in the recorded format: its job, the time of the job's completion in ns, and the value.
+/// A sample in the recorded format: its job, the completion time of the writer's instance in ns,
+/// and the value.
 type FoundSample<T> = Option<(u64, u64, T)>;
 
 /// The probe of a subtask sampling values of this type.
@@ -248,7 +249,7 @@ pub(crate) fn looking(line: Arc<ChannelState>, look: impl Fn(u64) + Send + 'stat
     Box::new(|body| found(body.before(look)))
 }
 
-/// Has the line pass on a subtask's findings at its completion.
+/// Has the line pass on a subtask's findings when its instance is complete, or has failed.
 pub(crate) fn finding(line: Arc<ChannelState>) -> Around {
     let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
     Box::new(|mut body| {

@@ -1,4 +1,4 @@
-//! A subtask with a function replaceable by another after a fault.
+//! A subtask whose function another function can replace after a fault.
 //!
 //! Nothing that a fault has ended is dropped, as it may be half changed. The function's place is
 //! reused, but everything it owned is lost. The subtask *claims* the ends of the topics while it

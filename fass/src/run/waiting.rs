@@ -122,8 +122,8 @@ pub async fn sleep(duration: Duration) {
 /// Waits, in the function of an async subtask, until `since_release` has passed since the release
 /// of the job; for no time if it has passed already.
 ///
-/// The limit of the wait must be as long, less the time covered by an earlier `until` of the
-/// instance; when the job started does not matter.
+/// The limit of the wait must be at least `since_release`, less the time covered by an earlier
+/// `until` of the instance; when the job started does not matter.
 ///
 /// ```
 /// use core::time::Duration;

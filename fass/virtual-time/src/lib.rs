@@ -1,4 +1,5 @@
 //! Runs DAGs built with `fass` on the host, in virtual time.
+//!
 //! For our purposes *virtual time* is a clock jumping from one event to the next (other terms are
 //! in `docs/glossary.md`). The real functions run, with real values on real topics, under the
 //! kernel's own scheduler. Only the passing of time is made up: a function takes the time it states

@@ -292,7 +292,7 @@ impl Session {
         end
     }
 
-    /// Runs up to a time, and reports why the run cannot go on, if so.
+    /// Runs up to a time. The error says why the run cannot go on.
     pub(crate) fn run_up_to(&mut self, until_ns: u64) -> Result<(), RunError> {
         let end = self.go_on(until_ns);
         match end {

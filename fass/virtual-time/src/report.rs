@@ -170,7 +170,7 @@ impl Report {
     }
 
     /// Returns the events as lines such as `5000000 start sink[0] core 1`: the time, the event, the
-    /// name with the job in brackets, and further facts. The stop of a DAG has no job.
+    /// name with the job in brackets, and further facts. A stop of a whole DAG names no job.
     ///
     /// For tests that compare whole sequences in words.
     #[must_use]
@@ -322,7 +322,7 @@ impl<'r> DagReport<'r> {
 pub struct InstanceRecord {
     /// The instance.
     pub instance: Instance,
-    /// The total execution time after the start, in nanoseconds.
+    /// The total execution time, in nanoseconds, known once the instance has started.
     pub execution_ns: u64,
     pub(crate) times: law::InstanceRecord,
 }

@@ -1,5 +1,5 @@
-//! Settings of a machine, made by the builder's methods before the commit: also how long calls last
-//! that state no duration, and disturbances: late interrupts and failing calls.
+//! Settings of a machine, made by the builder's methods before the commit: also the duration of
+//! calls that state none, and disturbances: late interrupts and failing calls.
 //!
 //! Everything follows from the given settings alone, so a run can be repeated.
 

@@ -387,8 +387,8 @@ impl Replay {
         self.restore(plan);
         let task_set = Arc::make_mut(&mut plan.task_set);
         for dag in (0..).map(DagId).take(task_set.dags().len()) {
-            // No other signals come. Without a last job, a sporadic DAG would never end the run, or
-            // would not keep it going.
+            // No other signals come. Without a last job, a periodic DAG would never end the run,
+            // and a sporadic DAG would not keep it going.
             let begin = self.begins[dag.index()];
             let of_signals = || {
                 let signals = self.signals.get(&dag);

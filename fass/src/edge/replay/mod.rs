@@ -7,7 +7,7 @@
 //!
 //! # Replays on a machine
 //!
-//! Only recorded signals release sporadic DAGs: each neither before its time, nor before the
+//! Only recorded signals release sporadic DAGs. No signal is raised before its time, or before the
 //! previous signal has led to a release. So no signal is dropped where functions take longer than
 //! in the recorded run. Core 0 raises the signals in its spare time.
 
@@ -471,7 +471,7 @@ impl Replay {
     }
 
     /// Returns the first recorded fault that has not occurred again: of any job, or of the given
-    /// one. In a replay of a whole run, only faults of called functions count.
+    /// one. Where the replay begins with job 0 of the DAG, only faults of called functions count.
     #[must_use]
     pub fn unmet_fault(&self, of: Option<(DagId, u64)>) -> Option<Divergence> {
         let is_unmet = |RecordedFault { instance, .. }: &&RecordedFault| {

@@ -26,14 +26,14 @@
 //! > is 0, and initialised otherwise. Only the side in possession of the slot changes the stamp.
 //! > The writer changes 0 to `2k + 1` once the value is written. The reader changes it back to 0
 //! > once the value is moved out, or to 2 to leave the value to the writer, which sets it to 0
-//! > before dropping the value. A change of sides is a `Release` store, and the other side looks at
-//! > it by an `Acquire` load. So all accesses of one side to the value happen before all of the
-//! > other.
+//! > before dropping the value. A change of sides is a `Release` store (or a relaxed one, where the
+//! > reader leaves a value it has not touched), and the other side loads the stamp by `Acquire`. So
+//! > all accesses of one side to the value happen before all those of the other.
 //!
 //! The reader *gives up* the value of a cancelled job in a few instructions, and the writer drops
-//! the value in place when the slot is next needed. Dropping is the app's code and may panic, take
-//! long or never end. The scheduler cancels a job in mid-step, where app code must not run; the
-//! writer runs as a subtask of the DAG, preempted and contained.
+//! the value in place when the slot is next needed. Dropping runs the app's code, which may panic,
+//! take long or never end. The scheduler cancels a job in mid-step, where app code must not run;
+//! the writer runs as a subtask of the DAG, preempted and contained.
 //!
 //! With one thread on each side, a load and a store suffice: the ring contains no locked
 //! read-modify-write. The invariant does not depend on the scheduler. On a platform running
@@ -76,8 +76,8 @@ const fn stamp_of(job: u64) -> u64 {
     job << 1 | 1
 }
 
-/// Makes the ring of an edge with at least `slots` slots: the near slot, and a power of two of
-/// others.
+/// Makes the ring of an edge with at least `slots` slots: the near slot and, if `slots` is more
+/// than 1, others, whose number is a power of two.
 ///
 /// # Panics
 ///
@@ -463,8 +463,8 @@ impl<T: Sync> CurrentIndex<T> {
     #[inline]
     pub(crate) fn get(&self) -> &'static T {
         let current = self.0.load(Ordering::Acquire);
-        // SAFETY: by the current invariant the pointer is valid for ever, and the value is never
-        // changed.
+        // SAFETY: by the current invariant the pointer is valid for ever, and the value is only
+        // ever shared.
         unsafe { &*current }
     }
 }

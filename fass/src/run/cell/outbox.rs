@@ -110,9 +110,9 @@ impl Outbox {
             let needed = match words {
                 [of_job, _, length, rest @ ..] => {
                     let bytes = rest.as_ptr().cast_mut().cast::<u8>();
-                    // SAFETY: by the record invariant these words belong to the claim's holder, who
-                    // is this call. They are atomic, so they may be changed through a shared
-                    // reference.
+                    // SAFETY: by the record invariant these words belong to the claim's holder, and
+                    // this call holds the claim. They are atomic, so they may be changed through a
+                    // shared reference.
                     let bytes = unsafe { slice::from_raw_parts_mut(bytes, size_of_val(rest)) };
                     match write(bytes) {
                         Ok(count) if count <= most => {

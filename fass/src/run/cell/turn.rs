@@ -2,7 +2,7 @@
 //!
 //! The app's future is polled with a special [`Waker`]. The waker wakes nobody: the scheduler
 //! decides when a turn is taken. The waker's data is the state of the turn. Through the waker a
-//! future of this crate asks for a wait, however deeply other futures enclose the future.
+//! future of this crate asks for a wait, however deeply it is nested in other futures.
 //!
 //! > **Turn waker invariant.** The data of a waker with [`TURN`] as its functions points to a
 //! > [`TurnState`] living at least as long as every reference to the waker. Such a waker is made in
@@ -14,7 +14,8 @@ use core::task::{Context, RawWaker, RawWakerVTable, Waker};
 
 use crate::run::turn::TurnState;
 
-/// The functions of turn wakers, recognised by this address. Only a `static` has a fixed address.
+/// The functions of turn wakers, recognised by this address. A `static` has exactly one address; a
+/// `const` may have several.
 static TURN: RawWakerVTable = RawWakerVTable::new(|_| inert(), |_| {}, |_| {}, |_| {});
 
 /// The functions of clones.

@@ -111,8 +111,8 @@ pub(crate) trait Probe: Send + Sync {
     /// Notes the job of the running instance.
     fn note_job(&self, job: u64);
 
-    /// In a replay, puts the recorded sample of the instance into the slot. Reports whether there
-    /// is one.
+    /// In a replay, puts the recorded sample of the instance into the slot, or empties the slot if
+    /// the instance found no value. Reports whether the recording has an entry for the instance.
     fn replay(&self, slot: &dyn Any) -> bool;
 
     /// Looks at the instance's sample.
