@@ -29,7 +29,7 @@ pub use sys::{wait, wake};
 pub struct EndSignals(());
 
 impl EndSignals {
-    /// Counts all signals from now on.
+    /// Counts every SIGINT and SIGTERM from now on.
     #[must_use = "they are caught as long as the value lives"]
     pub fn catch() -> Self {
         Self::new(Catch::All)

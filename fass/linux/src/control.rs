@@ -36,8 +36,8 @@ use crate::{clock, sys};
 /// assert_eq!(run.violations().count(), 0);
 /// ```
 ///
-/// A thread asking for the run's state takes a cluster's lock for a moment, so nobody must preempt
-/// that thread meanwhile: see [`raise`](Self::raise). No code of the caller runs under the lock:
+/// A thread asking for the run's state takes a cluster's lock for a moment, so it must not be
+/// preempted meanwhile: see [`raise`](Self::raise). No code of the caller runs under the lock:
 ///
 /// ```compile_fail,E0624
 /// linux::Control::get().unwrap().with_scheduler(0, |_| panic!("under a lock"));
@@ -192,8 +192,8 @@ impl Control {
         Some(look(&mut state.engine.scheduler))
     }
 
-    /// Ends the run in order when a caught signal asks for its end, or has asked already: releases
-    /// stop, and jobs in flight go on to their end.
+    /// Ends the run in an orderly way when a caught signal asks for its end, or has asked already:
+    /// releases stop, and jobs in flight go on to their end.
     ///
     /// # Errors
     ///

@@ -11,9 +11,9 @@
 //! A cluster *rests* when its DAGs are over; a signal may set a resting cluster going again. The
 //! run is over when all clusters rest and no letter is on its way. One count of *reasons to go on*
 //! covers both conditions: each letter adds one, and so does each cluster that does not rest. A
-//! letter is delivered before being counted, since the writer may be a thread from outside, losing
-//! its processor at any instruction. So a step opened by another letter may serve the new letter
-//! early. A step opens only counted letters.
+//! letter is delivered before being counted, since the writer may be a thread from outside, which
+//! may lose its processor at any instruction. So a step opened by another letter may serve the new
+//! letter early. A step opens only counted letters.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};

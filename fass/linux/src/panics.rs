@@ -7,9 +7,9 @@
 //! spare worker takes its place. Its thread, with everything on its stack, sleeps until the end of
 //! the program.
 //!
-//! Outside of instances, such a panic still ends the program, and so does any panic in a program
-//! replacing the hook. After such a fault nobody can replace the hook: `set_hook` waits for the
-//! thread inside.
+//! Outside of instances, such a panic still ends the program, and so does any such panic in a
+//! program that replaces the hook. After such a fault nobody can replace the hook: `set_hook` waits
+//! for the thread inside.
 
 use std::any::Any;
 use std::panic::{self, AssertUnwindSafe, catch_unwind};

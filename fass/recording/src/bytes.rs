@@ -4,6 +4,7 @@ use core::fmt;
 
 /// Writes values one after the other into a buffer, and counts the bytes that do not fit. The
 /// type's parameter chooses one of the two forms, so recording has no code for the other form.
+///
 /// ```
 /// use recording::{Encoder, Full, Recordable};
 ///

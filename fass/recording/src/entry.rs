@@ -109,9 +109,9 @@ kinds! {
         Source = "source",
         /// Another subtask returned the values. A replay compares them.
         Result = "result",
-        /// A subtask found the values as latest values of a topic, in any DAG. The type is
-        /// `(u64, u64, T)?`, with the value's job, and the time of the value's completion. A replay
-        /// takes the values.
+        /// A subtask found the values as latest values of a topic, in any DAG. The type is `(u64,
+        /// u64, T)?`, with the value's job, and the time at which the value's writer was complete.
+        /// A replay takes the values.
         Sample = "sample",
         /// A subtask found the values in a state, before changing the state in the job. A replay
         /// beginning with a job takes that job's recorded states, and compares the others. Since
@@ -357,7 +357,7 @@ crate::recordable! {
         /// For each state ordering two subtasks: its name, the earlier and the later subtask.
         pub states: Vec<(String, u32, u32)>,
         /// The sampled latest values: the sampling subtask, the DAG writing the values, the number
-        /// of the topic in that DAG, and the values' largest permitted age.
+        /// of the topic in that DAG, and the bound on the values' age, if there is one.
         pub samples: Vec<(u32, u32, u32, Option<u64>)>,
     }
 

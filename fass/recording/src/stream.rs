@@ -1,4 +1,5 @@
 //! The file: a mark, a header, entries, and an end, each with a checksum.
+//!
 //! ```text
 //! 0x89 "FASSREC"  version, 2 bytes   then frames:
 //! kind, 1 byte    length, 4 bytes    payload    checksum, 4 bytes

@@ -84,7 +84,8 @@ pub struct Publication<T>(Wire, PhantomData<fn(T)>);
 pub struct Subscription<T>(Wire, PhantomData<fn() -> T>);
 
 impl<T: Message> Publication<T> {
-    /// Returns the use for the publishing subtask. Its handle is a [`Publisher`](crate::Publisher).
+    /// Returns the declaration that a subtask publishes the topic, for
+    /// [`Dag::using`](fass::Dag::using). The function gets a [`Publisher`](crate::Publisher).
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn publishing(&self) -> SendValuesUse<T> {
@@ -98,8 +99,8 @@ impl<T: Message> Publication<T> {
 }
 
 impl<T: Message> Subscription<T> {
-    /// Returns the use for the receiving source. Packets that are not messages are malformed, and
-    /// counted.
+    /// Returns the declaration that a source receives the topic, for
+    /// [`Dag::using`](fass::Dag::using). Packets that are not messages are malformed, and counted.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn receiving(&self) -> ReceiveUse<T> {

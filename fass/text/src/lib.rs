@@ -2,7 +2,7 @@
 //!
 //! - [`Lines`]: words and numbers of a file, with line numbers;
 //! - [`quoted`], [`visible`]: words of a file, or of a person, in messages;
-//! - [`of_file`]: faults a commit would refuse, in the words of a file;
+//! - [`of_file`]: faults for which a commit would refuse the DAGs, in the words of a file;
 //! - [`repeated`]: items that appear twice.
 
 #![cfg_attr(not(test), no_std)]

@@ -1,8 +1,8 @@
 //! Zenoh's bytes: numbers of variable length, bytes preceded by their count, and extensions.
 //!
-//! Each byte of a number has seven bits of the number, and a bit for a following byte. The ninth
-//! byte has eight bits, and is always the last: so nine bytes hold 64 bits, as time stamps of 2038
-//! and later need.
+//! Each byte of a number has seven bits of the number, and a bit that says whether another byte
+//! follows. The ninth byte has eight bits, and is always the last: so nine bytes hold 64 bits, as
+//! time stamps of 2038 and later need.
 
 /// Why a datagram is not read to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -91,7 +91,7 @@ pub struct Fault {
     /// The place of a panic: `file:line:column`.
     pub place: Option<String>,
     /// Whether the instance has exceeded its budget. Unless its function has returned, the function
-    /// runs on, delaying nobody, and no other thread can take over: the cost is the DAG.
+    /// runs on, delaying nobody, and no other function can take its place: the cost is the DAG.
     pub is_overrun: bool,
     /// The cost.
     pub cost: FaultCost,
