@@ -1,10 +1,10 @@
 //! Budgets: how long instances may execute, and which thread checks.
 //!
-//! A budget is processor time, and a thread uses processor time only while running on a processor.
-//! Reading the processor-time clock is a system call, so instances do not read it at their start.
-//! Instead, the release thread looks at least once per shortest budget, and begins counting at its
-//! first sight of an instance. So an instance ends after its budget, and at most the shortest
-//! budget of all, plus 20 us, later. The instance's thread cannot be ended: it is demoted for good.
+//! A budget is in processor time, and a thread uses that up only while it runs. Reading the
+//! processor-time clock is a system call, so instances do not read it at their start. Instead, the
+//! release thread looks at least once per shortest budget, and begins counting when it first sees
+//! an instance. So an instance ends after its budget, and later by at most the shortest budget of
+//! all plus 20 us. The instance's thread cannot be ended: it is demoted for good.
 //!
 //! An instance that waits may go on in another thread. So, for waiting subtasks, each worker reads
 //! its clock at both ends of a turn, and adds up the instance's time. At the end of a turn the

@@ -36,8 +36,8 @@
 //! - An instance blocking in mid-function (reading a file, locking a mutex) leaves its core to
 //!   workers demoted there, and to other programs. An async instance can ask
 //!   [`blocking`](fn@blocking) to make such a call, and wait. A non-preemptive instance leaves its
-//!   core as well: when an instance demoted there ends meanwhile, the end is reported only after
-//!   the non-preemptive instance has ended, or when the scheduler wants the demoted instance.
+//!   core as well: if a worker demoted there finishes meanwhile, that end is reported only after
+//!   the non-preemptive instance has ended, or when the scheduler wants the demoted one.
 #![deny(unsafe_code)]
 
 mod blocking;

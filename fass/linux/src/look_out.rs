@@ -23,8 +23,8 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use sched_dag::CoreId;
 
-/// How much later each thread looks than the thread before it, and how long other threads leave an
-/// event to the thread that has claimed the event.
+/// How much later each thread looks than the thread before it, and how long the others leave an
+/// event to the one that has claimed it.
 const PATIENCE_NS: u64 = 15_000;
 
 /// How long before an event the release thread looks whether a core has become idle.

@@ -36,8 +36,7 @@ pub(crate) fn make_room(threads: usize) {
     given_up().reserve(threads);
 }
 
-/// Gives a thread up: nobody waits for the thread's present section, and the thread enters no
-/// further one.
+/// Gives a thread up: nobody waits for its present section, and it enters no further one.
 pub(crate) fn give_up(thread: u32) {
     given_up().push(thread);
     RELEASED.notify_all();

@@ -697,8 +697,8 @@ impl Team {
     }
 
     /// Ends the instance of a worker that never gets another one. If the worker has a core, a spare
-    /// worker takes the core and is called, so as to learn of the core. Where idle workers watch, a
-    /// worker unaware of its core would sleep, and only workers handle events.
+    /// worker takes it and is called, so that the spare one learns of it. Where idle workers watch,
+    /// a worker unaware of its core would sleep, and only workers handle events.
     fn give_up(
         &self,
         state: &mut Guard<'_, State>,

@@ -109,8 +109,8 @@ kinds! {
         Source = "source",
         /// Another subtask returned the values. A replay compares them.
         Result = "result",
-        /// A subtask found the values as latest values of a topic, in any DAG. The type is `(u64,
-        /// u64, T)?`, with the value's job, and the time at which the value's writer was complete.
+        /// A subtask found the values as latest values of a topic, in any DAG. The type is
+        /// `(u64, u64, T)?`, with the value's job, and the time at which its writer was complete.
         /// A replay takes the values.
         Sample = "sample",
         /// A subtask found the values in a state, before changing the state in the job. A replay

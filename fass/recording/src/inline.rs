@@ -35,7 +35,7 @@ impl<const N: usize> Text<N> {
         Self::try_new(text).expect("the text is longer than its place; state a longer one")
     }
 
-    /// Makes an inline text from a text, if the text fits.
+    /// Makes an inline text from a text, if that fits.
     #[must_use]
     pub fn try_new(text: &str) -> Option<Self> {
         List::try_new(text.as_bytes()).map(Self)

@@ -13,7 +13,7 @@
 //!
 //! - The driver sees a question only after the wait for the answer has begun (R3).
 //! - An answer ends exactly the wait for which it was given, once. The driver gets back a second
-//!   answer, an answer to a wait already over, or an answer to a job already gone.
+//!   answer, and one to a wait that is over or to a job that is gone.
 //! - Neither end waits for the other or takes a lock; and nothing is allocated.
 //!
 //! # How the two ends meet
@@ -718,8 +718,8 @@ impl<Q, A> DeviceDriver<Q, A> {
     ///
     /// # Errors
     ///
-    /// Returns the answer if the question already has an answer, or if no instance waits for an
-    /// answer any more.
+    /// Gives `answer` back if the question has one already, or if no instance waits for one any
+    /// more.
     pub fn answer(&mut self, ticket: Ticket, answer: A) -> Result<(), A> {
         let (cell, number) = (&self.cell, ticket.number);
         // Until this question is posted the answer's place belongs to the asking end, whose older

@@ -156,9 +156,9 @@ impl<T> Lock<T> {
     ///
     /// # Panics
     ///
-    /// If the caller is an instance whose subtask does not declare the lock, or an instance that
-    /// has entered all declared sections already; if the caller is no instance while a run goes on;
-    /// if the caller is in a section already; or if a fault has ended a section of this lock.
+    /// If the caller's subtask does not declare the lock, or the calling instance has entered all
+    /// declared sections; if the caller is no instance while a run goes on; if it is in a section
+    /// already; or if a fault has ended a section of this lock.
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         let (platform, name) = (expect_installed(), self.name);

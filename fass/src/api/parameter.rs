@@ -1,9 +1,9 @@
 //! Parameters: numbers set by a person, a file or a test while DAGs run.
 //!
 //! A parameter is like a [latest value](crate::shared::Latest) written from outside, with a name, a
-//! type and a range. A *source* reads the parameter when the source starts, and sends the value
-//! along edges to the subtasks that need it. So a job has one value of the parameter, whatever
-//! happens meanwhile.
+//! type and a range. A *source* reads the parameter when it starts, and sends the value along edges
+//! to the subtasks that need it. So a job has one value of the parameter, whatever happens
+//! meanwhile.
 //!
 //! # Guarantees
 //!

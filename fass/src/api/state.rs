@@ -3,7 +3,7 @@
 //! A closure may keep data for itself alone. A value needed by *several* functions, such as a pose
 //! estimated by one function and corrected by another, is a [`State`]. [`Dag::state`] declares a
 //! state, and subtasks declare their access at registration ([`Dag::using`]). So the data flow is
-//! in the model, where a mutex would hide the flow.
+//! in the model, where a mutex would hide it.
 //!
 //! # Guarantees
 //!
@@ -45,7 +45,7 @@ use crate::run::replaceable::{Reset, ResettableState};
 
 /// A type usable as a state: safe to use from several cores in turn.
 ///
-/// Apps need not implement the trait; they meet the trait as a bound of [`Dag::state`].
+/// Apps need not implement the trait; they meet it as a bound of [`Dag::state`].
 ///
 /// ```
 /// fn is_state<T: fass::shared::StateValue>() {}

@@ -53,7 +53,7 @@ pub(crate) mod sealed {
 
 /// Anything a subtask can use besides its inputs, or a tuple of up to 8 uses.
 ///
-/// Apps do not call the trait's methods; they meet the trait as a bound of [`Dag::using`].
+/// Apps do not call its methods; they meet the trait as a bound of [`Dag::using`].
 ///
 /// ```
 /// use fass::shared::{State, Uses};

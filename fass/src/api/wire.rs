@@ -12,8 +12,8 @@
 //!   earlier instance has taken: the packets since the last job, each with the time of its last
 //!   byte. If the receiver is the source of a sporadic DAG, each packet raises the DAG's signal.
 //! - Bytes sent by an instance go out when the instance is complete (R3), all or nothing, in the
-//!   order of jobs: as one packet, unless the instance [ends](Sender::end_packet) several packets.
-//!   A failing instance sends nothing.
+//!   order of jobs: as one packet, unless the instance [ends](Sender::end_packet) several. A
+//!   failing instance sends nothing.
 //! - Nobody waits, except an async function that [reads or writes](super::wire_waits). The device
 //!   does not wait for the receiver, nor the sender for the device. Packets without room are lost;
 //!   on the way out, all packets of an instance. Lost packets are always the newest: earlier
@@ -23,8 +23,8 @@
 //!
 //! # Limits
 //!
-//! - A job of a sporadic DAG may find no packet: the job before was about to start when the packet
-//!   came, and took the packet as well.
+//! - A job of a sporadic DAG may find no packet: if the job before was about to start when the
+//!   packet came, it took that as well.
 //! - The delay of a sent byte until it leaves the device depends on the platform.
 
 use alloc::boxed::Box;
@@ -317,9 +317,8 @@ impl Wire {
     }
 }
 
-/// The device's end of a wire. There is only one, and the platform takes this end when connecting
-/// the wire: so a function with a handle of the wire cannot take bytes from the DAG owning the
-/// wire.
+/// The device's end of a wire. There is only one, and the platform takes it when connecting the
+/// wire: so a function with a handle of the wire cannot take bytes from the DAG that owns it.
 ///
 /// ```compile_fail,E0599
 /// let wire = fass::shared::Wire::new("numbers");

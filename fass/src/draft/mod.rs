@@ -340,7 +340,7 @@ fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
 /// Attributes of a subtask beyond its function and its topics.
 ///
 /// The paper leaves the attributes to the scheduling algorithm. All of them are optional here, and
-/// the commit reports a missing attribute if the chosen policy needs the attribute.
+/// the commit reports a missing one if the chosen policy needs it.
 ///
 /// # Examples
 ///

@@ -99,8 +99,7 @@ impl RunRecorder {
     }
 }
 
-/// Takes a value missing where the drain reads: puts a given value there, or notes the loss of the
-/// value.
+/// Takes a value that is not where the drain reads: puts it there, or notes its loss.
 fn store(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, at_ns: u64) {
     let outbox = given
         .get(usize::from(value.channel))

@@ -17,8 +17,8 @@ use sched_dag::{DagId, ModeId};
 
 /// An action that a function may have prepared for the completion.
 pub(crate) trait Effect: Send {
-    /// Publishes the effect if the function has prepared the effect since the last call. `ask`
-    /// takes requests to the scheduler.
+    /// Publishes the effect if the function has prepared one since the last call. `ask` takes
+    /// requests to the scheduler.
     fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request));
 
     /// Acts at the end of a turn ending in a wait. The pair holds the end of the turn and the

@@ -179,8 +179,7 @@ pub(crate) trait PolledSubtask: Send {
         None
     }
 
-    /// Gives up the function, and the states used by the function: another function takes the next
-    /// turn.
+    /// Gives up the function, and the states it uses: another one takes the next turn.
     fn replace(&mut self) {}
 
     /// Returns the state of the subtask's turns, if the subtask may wait.

@@ -1,11 +1,11 @@
 //! The two ends of a topic in its subtasks, and how the commit ties them together.
 //!
-//! A [`Publisher`] is the writing end of a topic. It owns a writer for each edge leaving the topic,
-//! one for each reading port, and a writer for each subtask sampling the topic's latest value. If
-//! the topic is recorded, a *tap* looks at each value first. A [`Subscriber`] is one reading port.
-//! At the commit, [`DagWiring`] hands out the ends: the first request for either end of an edge
-//! makes the ring, and leaves the other end for the second request. All rings exist before the
-//! first release, so no job can be missed because its reader was not there yet.
+//! A [`Publisher`] is the writing end of a topic. It owns a writer for each edge leaving the topic
+//! (there is an edge for each reading port), and a place for each subtask sampling the topic's
+//! latest value. If the topic is recorded, a *tap* looks at each value first. A [`Subscriber`] is
+//! one reading port. At the commit, [`DagWiring`] hands out the ends: the first request for either
+//! end of an edge makes the ring, and leaves the other end for the second request. All rings exist
+//! before the first release, so no job can be missed because its reader was not there yet.
 //!
 //! The verification has already compared the types of both ends; the downcast in [`DagWiring`]
 //! relies on it.

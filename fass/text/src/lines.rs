@@ -306,8 +306,7 @@ impl fmt::Display for Malformed {
 
 impl core::error::Error for Malformed {}
 
-/// Returns the positions of the first item equal to an earlier one, and of that earlier item: the
-/// earlier position first.
+/// Finds the first item equal to an earlier one. Returns both positions, the earlier first.
 pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, usize)> {
     let items: Vec<T> = items.into_iter().collect();
     let order = sorted_by_key(items.len(), |position| &items[position]);

@@ -76,10 +76,10 @@ impl VirtualTime {
     /// types, contains a source not recorded now, or has lost a source's value.
     ///
     /// Values written by other subtasks to recorded topics are compared, and so are recorded
-    /// states: [`Report::compared`](crate::Report::compared) counts the compared values,
-    /// [`Report::uncompared`](crate::Report::uncompared) the values not compared, as the run is not
-    /// over or the topic is not recorded any more.
-    /// [`Report::divergence`](crate::Report::divergence) is the first difference.
+    /// states: [`Report::compared`](crate::Report::compared) counts those, and
+    /// [`Report::uncompared`](crate::Report::uncompared) the others, where the run is not over or
+    /// the topic is not recorded any more. [`Report::divergence`](crate::Report::divergence) is the
+    /// first difference.
     ///
     /// # Errors
     ///

@@ -9,10 +9,10 @@
 //! # Instances ending after the loss of their core
 //!
 //! A demoted worker runs on while its core's processor has nothing better to do (`worker`): before
-//! the new active worker has begun, while the new worker waits in mid-function, or while the new
-//! worker has returned and waits for the scheduler's lock. So a *parked* instance may end. The end
-//! counts on the core where the instance ran last, and in the journal a core has only one instance
-//! at a time. By the core's present occupant:
+//! the new active worker has begun, while the new one waits in mid-function, or after that one has
+//! returned and waits for the scheduler's lock. So a *parked* instance may end. The end counts on
+//! the core where the instance ran last, and in the journal a core has only one instance at a time.
+//! By the core's present occupant:
 //!
 //! - No occupant: the parked instance resumes and ends.
 //! - A preemptable occupant: the occupant loses the core for the duration of the scheduler's step.
@@ -90,8 +90,8 @@ pub struct Fault {
     pub cause: Cow<'static, str>,
     /// The place of a panic: `file:line:column`.
     pub place: Option<String>,
-    /// Whether the instance has exceeded its budget. Unless its function has returned, the function
-    /// runs on, delaying nobody, and no other function can take its place: the cost is the DAG.
+    /// Whether the instance has exceeded its budget. If its function has not returned, it runs on,
+    /// delaying nobody, and no other function can take over: the cost is the DAG.
     pub is_overrun: bool,
     /// The cost.
     pub cost: FaultCost,
@@ -290,8 +290,8 @@ impl State {
         self.port.time.of_run(time_ns)
     }
 
-    /// Begins the instant of the clock's present time, and returns that instant, or the latest
-    /// instant written down if it is later: another thread may have read the clock later.
+    /// Begins the instant of the clock's present time, and returns it, or the latest instant
+    /// written down if that is later: another thread may have read the clock later.
     pub(crate) fn now_ns(&mut self) -> u64 {
         let now_ns = self.since_epoch(clock::now_ns());
         self.begin(now_ns)

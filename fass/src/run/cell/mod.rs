@@ -16,10 +16,10 @@
 //! flight. An overrun skipping releases breaks the sequence: with J = 2, jobs 1 and 3 can be in
 //! flight together.)
 //!
-//! A slot holds a value and an atomic word, the *stamp*: 0 while the slot is empty, `2k + 1`
-//! (modulo 2^64) while the slot holds the value of job k, and 2 while it holds a value given up.
-//! (Job k + 2^63 has the stamp of job k, but no run gets there in 292 years.) One soundness
-//! argument, cited below by name, covers the ring:
+//! A slot has room for a value, and an atomic word, the *stamp*: 0 while the slot is empty,
+//! `2k + 1` (modulo 2^64) while it has the value of job k, and 2 while it has a value that was
+//! given up. (Job k + 2^63 has the stamp of job k, but no run gets there in 292 years.) One
+//! soundness argument, cited below by name, covers the ring:
 //!
 //! > **Stamp invariant.** While a slot's stamp is even, only the ring's writer may touch the slot's
 //! > value; while the stamp is odd, only the ring's reader. The value is uninitialised if the stamp

@@ -200,8 +200,8 @@ impl WireInput {
         is_whole
     }
 
-    /// Takes a packet in a buffer, by swapping the buffer for the buffer of a place. Reports
-    /// whether the packet is there.
+    /// Takes a packet in a buffer, by swapping that for the buffer of a place. Reports whether the
+    /// packet is there.
     pub(crate) fn swap(
         &self,
         packet: &mut Buffer,
