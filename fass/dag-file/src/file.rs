@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 use sched_dag::{DagSpec, SubtaskSpec};
 
-/// A whole file.
+/// The contents of a whole DAG file.
 #[derive(Clone, Debug, Default)]
 pub struct DagFile {
     /// The sets, at least one.
@@ -36,7 +36,7 @@ impl Set {
     }
 }
 
-/// One DAG.
+/// One DAG of a set.
 #[derive(Clone, Debug, Default)]
 pub struct FileDag {
     /// The DAG. If the spec has no number of jobs, a [`Length`](crate::Length) decides the number.
