@@ -1,11 +1,11 @@
 //! Goldens: texts in the tree that must equal the output of its programs.
 //!
-//! A *golden* is a fault's text in its page, an output or code that a page shows, a baseline, the
-//! table of budgets. A test compares it with the present output. Under `./scripts/test --bless` a
-//! golden that differs is rewritten in its file, and the test passes, so that a person reads the
-//! change in `git diff`; the command ends with the files that were rewritten. Nothing else of a
-//! file changes. A golden that its file does not hold letter by letter cannot be rewritten: its
-//! test still fails.
+//! A *golden* is the text of a fault in its page, an output or code shown by a page, a baseline, or
+//! the table of budgets. A test compares the golden with the present output. Under
+//! `./scripts/test --bless` the test rewrites a differing golden in the file and passes; a person
+//! then reads the change in `git diff`. The command ends with a list of the rewritten files.
+//! Nothing else in a file changes. If the file does not contain the golden letter by letter,
+//! rewriting is impossible and the test still fails.
 
 use std::env;
 use std::fs::{self, File};
@@ -15,25 +15,26 @@ use std::sync::Mutex;
 
 use tool::system::workspace;
 
-/// The variable by which `--bless` reaches test programs: the path of the list of rewritten files.
+/// The environment variable telling test programs of `--bless`: the path of the list of rewritten
+/// files.
 pub const BLESSED: &str = "TOOL_BLESSED";
 
-/// A text that is kept in a file.
+/// A text kept in a file.
 #[derive(Clone, Copy, Debug)]
 pub struct GoldenText<'t> {
-    /// The file, from the workspace's root.
+    /// The file's path from the workspace's root.
     pub file: &'t str,
-    /// The nearest text above the golden that occurs once in the file, such as a heading.
+    /// The nearest text above the golden occurring only once in the file, such as a heading.
     pub below: &'t str,
     /// The golden.
     pub text: &'t str,
 }
 
-/// Compares a golden, whose file, place and text these are, with the present output of a program.
+/// Compares a golden, given by file, place and text, with a program's present output, `said`.
 ///
 /// # Panics
 ///
-/// Panics if they differ and the golden is not rewritten.
+/// Panics if the two differ and the golden is not rewritten.
 #[track_caller]
 pub fn assert_is(file: &str, below: &str, text: &str, said: &str) {
     let list = env::var_os(BLESSED);
@@ -44,12 +45,12 @@ pub fn assert_is(file: &str, below: &str, text: &str, said: &str) {
 }
 
 impl GoldenText<'_> {
-    /// Compares the golden with the present output of a program; rewrites it if there is a `list`
-    /// of rewritten files.
+    /// Compares the golden with a program's present output. A differing golden is rewritten if
+    /// there is a `list` of rewritten files.
     ///
     /// # Errors
     ///
-    /// In words: they differ, and the golden was not rewritten.
+    /// In words: the two differ, and the golden was not rewritten.
     pub fn compare(&self, said: &str, list: Option<&Path>) -> Result<(), String> {
         let GoldenText { file, below, text } = self;
         if *text == said {
@@ -74,7 +75,7 @@ impl GoldenText<'_> {
         let file = workspace().join(self.file);
         let page = fs::read_to_string(&file)?;
         let place = page.find(self.below).and_then(|start| {
-            // Only below its heading: the same text may stand elsewhere, too.
+            // Only below the heading: the same text may also occur elsewhere.
             let start = start + self.below.len();
             Some(start + page[start..].find(self.text)?)
         });

@@ -1,17 +1,18 @@
 //! The laboratory: commands that measure, judge and test the project itself.
 //!
-//! An app's author needs none of them. They stand on the tool's library, and nothing of the tool on
-//! them; `docs/decisions/0052-product-and-laboratory-apart.md` has the reasons.
+//! An app's author needs none of them. The laboratory builds on the tool's library; the tool uses
+//! nothing of the laboratory. `docs/decisions/0052-product-and-laboratory-apart.md` has the
+//! reasons.
 //!
 //! - [`mod@bench`]: measurements, compared with a baseline;
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
 //! - [`soak`](mod@soak): random DAG sets for a long time;
 //! - [`test`](mod@test): every test, and checks of the whole tree;
-//! - [`golden`]: texts of the tree that tests hold to their word.
+//! - [`golden`]: texts in the tree, compared by tests with the output of programs.
 
 #![forbid(unsafe_code)]
 
-// Its printing macros hide the standard library's, which panic when a reader has left.
+// The tool's printing macros replace the standard library's, which panic when a reader has left.
 #[macro_use(print, println, eprint, eprintln)]
 extern crate tool;
 

@@ -1,4 +1,4 @@
-//! The laboratory's program. The scripts in `scripts/` call its subcommands, as they do the tool's.
+//! The laboratory's program. The scripts in `scripts/` call the subcommands, as with the tool.
 
 #![forbid(unsafe_code)]
 

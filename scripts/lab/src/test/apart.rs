@@ -1,7 +1,8 @@
-//! Product and laboratory are apart: which package never stands on which.
+//! Product and laboratory are apart: dependencies forbidden between packages.
 //!
-//! A package *stands on* those that any table of its manifest names, and on those that these need in
-//! turn, their tests apart. `docs/decisions/0052-product-and-laboratory-apart.md` has the reasons.
+//! A package *stands on* every package named in a table of its manifest, and on everything those
+//! packages need in turn, except for their tests.
+//! `docs/decisions/0052-product-and-laboratory-apart.md` has the reasons.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -10,7 +11,7 @@ use tool::image::package_name;
 
 use super::{SourceFile, none_of};
 
-/// Folders, and those that no package in them stands on.
+/// Groups of folders, each with the folders that none of its packages may stand on.
 const NEVER: [(&[&str], &[&str]); 4] = [
     (
         &["sched-dag", "fass", "kernel", "boot", "apps"],
@@ -24,18 +25,18 @@ const NEVER: [(&[&str], &[&str]); 4] = [
     (&["scripts/web"], &["scripts/lab", "scripts/tool"]),
 ];
 
-/// The apps of the laboratory, which may stand on all.
+/// The laboratory's apps, which may stand on everything.
 const LABORATORY: &str = "apps/lab";
 
-/// The packages by name: the folder of each, and the names of those that it needs, with whether its
-/// tests alone do.
+/// The packages by name: each with its folder and the names of needed packages. A flag marks a
+/// package needed by tests alone.
 type Packages<'s> = BTreeMap<String, (&'s Path, Vec<(bool, &'s str)>)>;
 
-/// Holds the manifests to what never is.
+/// Checks the manifests for forbidden dependencies.
 ///
 /// # Errors
 ///
-/// In words: which package stands on which.
+/// In words: each offending package, and the package beneath.
 pub(super) fn check(sources: &[SourceFile]) -> Result<(), String> {
     let manifests = sources.iter().filter_map(|SourceFile { name, text }| {
         let folder = Path::new(name.strip_suffix("/Cargo.toml")?);
@@ -59,7 +60,7 @@ pub(super) fn check(sources: &[SourceFile]) -> Result<(), String> {
     })
 }
 
-/// Returns the folders of the packages that one stands on.
+/// Returns the folders of the packages that a given package stands on.
 fn stands_on<'s>(name: &str, packages: &Packages<'s>) -> BTreeSet<&'s Path> {
     let mut found = BTreeSet::new();
     let mut open: Vec<(&str, bool)> = vec![(name, true)];
@@ -76,7 +77,7 @@ fn stands_on<'s>(name: &str, packages: &Packages<'s>) -> BTreeSet<&'s Path> {
     found
 }
 
-/// Reads what a manifest names in its tables of dependencies, with whether it is for tests alone.
+/// Reads the names in a manifest's dependency tables, each with a flag: needed by tests alone.
 fn needs(manifest: &str) -> Vec<(bool, &str)> {
     let mut table = "";
     let mut needs = Vec::new();
@@ -99,8 +100,8 @@ fn needs(manifest: &str) -> Vec<(bool, &str)> {
 mod tests {
     use super::{SourceFile, check};
 
-    /// Makes manifests of rows such as `kernel: fass, dev random`, by folder; a package is called as
-    /// the last part of its folder.
+    /// Makes manifests from rows such as `kernel: fass, dev random`: a folder and its needs. The
+    /// last part of the folder is the package's name.
     fn manifests(rows: &[&str]) -> Vec<SourceFile> {
         let manifest = |row: &&str| {
             let (folder, needs) = row.split_once(": ").unwrap();

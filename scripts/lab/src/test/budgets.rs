@@ -1,14 +1,14 @@
 //! Budgets of lines: a crate may grow beyond its budget only if something else shrinks.
 //!
-//! A *row* of the table is a folder with a `Cargo.toml`, without the folders in it that have one;
-//! files outside all packages belong to the row of their top folder, such as `scripts`. Counted are
-//! lines of Rust, assembly, C, Python, shell and pages for browsers that are neither blank nor a
-//! comment alone. Tests are counted apart: files in a folder `tests` or called `tests.rs`, and
-//! modules below `#[cfg(test)]`. `--bless` sets each budget to the present count, lower or higher.
-//! The row `all` is a ceiling of the sums, which only a person raises; proofs have a row of their
-//! own, beside the sums, with comments. The check
-//! [`escape`] makes sure that counted files have the default format, that Rust and assembly are
-//! only in counted files, and that product code is not named like a test.
+//! A *row* of the table is a folder with a `Cargo.toml`, without nested packages; files outside all
+//! packages belong to the row of their top folder, such as `scripts`. Counted are lines of Rust,
+//! assembly, C, Python, shell and browser pages, except blank lines and lines with only a comment.
+//! Tests are counted separately: files in a folder `tests` or called `tests.rs`, and modules below
+//! `#[cfg(test)]`. `--bless` sets each budget to the present count, lower or higher. The row `all`
+//! is a ceiling on the sums, raised only by a person. Proofs have a row of their own outside the
+//! sums, with comments counted. The check [`escape`] makes sure of three properties: counted files
+//! have the default format, Rust and assembly are only in counted files, and product code is not
+//! named like a test.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -19,13 +19,13 @@ use super::{SourceFile, none_of};
 use crate::golden::GoldenText;
 use tool::system::workspace;
 
-/// The table, from the workspace's root.
+/// The table's path from the workspace's root.
 const TABLE: &str = "tests/baselines/lines.txt";
 
-/// The endings of counted files. Timelines as data are tests: their ending goes here.
+/// The endings of counted files. Timelines kept as data count as tests: their ending goes here.
 const ENDINGS: [&str; 8] = [".rs", ".s", ".c", ".py", ".sh", ".js", ".html", ".css"];
 
-/// The row of proofs, with the program and the script that go with them.
+/// The row of proofs, including their program and script.
 const PROOFS: &str = "sched-dag/proofs";
 
 /// The row of the ceiling.
@@ -34,7 +34,8 @@ const ALL: &str = "all";
 /// Lines of code and of tests, by the row's name.
 type LineCounts = BTreeMap<String, [usize; 2]>;
 
-/// Compares these files with the table; rewrites it if there is a `list` of rewritten files.
+/// Compares the given files with the table. Rewrites the table if there is a `list` of rewritten
+/// files.
 pub(super) fn check(sources: &[SourceFile], list: Option<&Path>) -> Result<(), String> {
     let table = fs::read_to_string(workspace().join(TABLE));
     let table = table.map_err(|error| format!("{TABLE}: {error}"))?;
@@ -155,7 +156,7 @@ fn is_test(name: &str) -> bool {
     name.starts_with("tests/") || name.contains("/tests/") || name.ends_with("tests.rs")
 }
 
-/// Returns how a source or settings file makes lines escape the count, or be counted as tests
+/// Finds text in a source or settings file that makes lines escape the count, or count as tests
 /// wrongly.
 pub(super) fn escape(name: &str, text: &str) -> Option<String> {
     if !name.ends_with(".rs") && !name.ends_with(".toml") {
@@ -192,7 +193,8 @@ pub(super) fn escape(name: &str, text: &str) -> Option<String> {
 mod tests {
     use super::{LineCounts, complaints, escape, lines, read, write};
 
-    /// As it stands here, it must not end this module where they are counted.
+    /// A source with `@` for `#[cfg(test)]`: written out, the attribute would seem to end this
+    /// module early.
     const SOURCE: &str = "
         //! Essay.
         use a::b; // code
@@ -259,8 +261,8 @@ mod tests {
         assert_eq!(read(""), LineCounts::new());
     }
 
-    /// Files, their texts, in which `~` ends a line, and what escapes the count by them. So that
-    /// this file is not taken for one of them, `^` stands for `!` and `%` for `rustfmt`.
+    /// Files, their texts, and the part letting lines escape the count. `~` ends a line. To hide
+    /// the rows from the check of this very file, `^` stands for `!` and `%` for `rustfmt`.
     const ESCAPES: &str = r#"rustfmt.toml |  | a format
 a/src/b.rs | #[%::skip]~fn f() {} | %::skip
 a/src/b.rs | #[cfg_attr(all(), %::skip)]~fn f() {} | %::skip

@@ -1,12 +1,12 @@
-//! Checks: properties of the whole tree, each counted as one test.
+//! Checks: properties of the whole tree, each counted as a test.
 //!
-//! They hold the promises that no unit test can: no package from elsewhere, no file too long,
-//! layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter and
-//! the documentation to complain of, a hand-off of no more instructions than its baseline, and a
-//! guest under KVM where KVM works. They judge the project's own packages.
+//! Checks keep the promises beyond the reach of unit tests: no package from elsewhere, no file too
+//! long, layers in order, no crate beyond its budget of lines, no complaint from the formatter, the
+//! linter or the documentation, a hand-off of no more instructions than its baseline, and a guest
+//! under KVM where KVM works. The checks judge the project's own packages.
 //!
-//! Free disk space is checked before anything is built: a disk that fills up in the middle shows as
-//! an error of the linker, or as a guest without a log.
+//! Free disk space is checked before anything is built: a disk filling up in the middle would show
+//! up as a linker error, or as a guest without a log.
 
 use std::env;
 use std::fs;
@@ -27,10 +27,11 @@ use tool::qemu::Qemu;
 use tool::recordings;
 use tool::system;
 
-/// The most lines of a source file.
+/// The largest number of lines of a source file.
 const MOST_LINES: usize = 800;
 
-/// The folders of the root; cargo's own has what is made, results of measurements included.
+/// The folders of the root. Cargo's own folder holds everything generated, results of measurements
+/// included.
 const FOLDERS: [&str; 9] = [
     "apps",
     "boot",
@@ -43,7 +44,7 @@ const FOLDERS: [&str; 9] = [
     "tests",
 ];
 
-/// Refuses folders that nobody has planned, such as a command's output.
+/// Refuses unplanned folders in the root, such as a command's output.
 fn strange_folders(root: &Path) -> Result<(), String> {
     let folders = fs::read_dir(root).into_iter().flatten().flatten();
     let folders = folders.filter(|entry| entry.path().is_dir());
@@ -53,7 +54,7 @@ fn strange_folders(root: &Path) -> Result<(), String> {
     none_of(strange.map(line).collect())
 }
 
-/// Runs the wanted checks, without those of cargo.
+/// Runs the wanted checks, except for cargo's.
 pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
     let blessed = plan.blessed.as_deref();
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), String>| {
@@ -97,8 +98,8 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     run_with_programs(plan, tally);
 }
 
-/// Runs the checks that need programs of the host, build images and boot guests; a missing program is
-/// reported as skipped, not as a failure.
+/// Runs the checks that need host programs, images or guests. A missing program is reported as
+/// skipped, not as a failure.
 fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
     let blessed = plan.blessed.as_deref();
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), CheckFailure>| {
@@ -138,7 +139,7 @@ fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
     });
 }
 
-/// Runs the checks that cargo makes, while other things run.
+/// Runs cargo's checks, in parallel with other work.
 pub(super) fn lint_all(plan: &TestPlan, sources: &[SourceFile]) -> Tally {
     let mut tally = Tally::default();
     let mut run = |name: &str, words: &str, remedy: &str| {
@@ -167,17 +168,17 @@ pub(super) fn lint_all(plan: &TestPlan, sources: &[SourceFile]) -> Tally {
     tally
 }
 
-/// Runs cargo on the packages of these files; its output is printed only if it fails.
+/// Runs cargo on the packages of the given files. Cargo's output is printed only on failure.
 fn cargo(sources: &[SourceFile], words: &str, remedy: &str) -> Result<(), String> {
     let mut command = system::cargo();
     let mut each = words.split(' ');
     command.args(each.next());
-    // By name, since `--workspace` would also judge apps that are not the project's own.
+    // By name, since `--workspace` would also judge apps of other projects.
     for package in packages(sources) {
         command.args(["-p", &package]);
     }
     command.args(each).env("RUSTDOCFLAGS", "-D warnings");
-    // A folder of their own, since cargo would have tests wait for them, or them for tests.
+    // A folder of their own: on a shared one, cargo would let lints and tests wait for each other.
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
     command.env("CARGO_TARGET_DIR", target.join("lints"));
     let _lasting = ProgressNote::new(&format!("cargo {words}"));
@@ -191,7 +192,8 @@ fn cargo(sources: &[SourceFile], words: &str, remedy: &str) -> Result<(), String
     Err(format!("`cargo {words}` failed; {remedy}"))
 }
 
-/// Names packages from elsewhere: ours lie in the workspace, and have no `source`.
+/// Names packages from elsewhere. The project's packages lie in the workspace, and have no
+/// `source`.
 fn foreign(lock: &str) -> Result<(), String> {
     let packages = lock.split("[[package]]").skip(1);
     let foreign = packages.filter(|package| package.contains("\nsource = "));
@@ -214,8 +216,8 @@ fn lacks_essay(name: &str, text: &str) -> Option<String> {
     lacks.then(|| "does not open with `//!`".to_string())
 }
 
-/// Finds a policy's name in the library of scheduling, apart from the table of policies: scheduler,
-/// law, analysis and witness go by what the table says of each.
+/// Finds a policy's name in the scheduling library, outside the table of policies. Scheduler, law,
+/// analysis and witness must ask the table for each policy's properties instead.
 fn names_policy(name: &str, text: &str) -> Option<String> {
     let room = name.strip_prefix("sched-dag/src/")?;
     let code = layers::code(text);
@@ -226,7 +228,7 @@ fn names_policy(name: &str, text: &str) -> Option<String> {
     (!is_free).then(|| format!("names {named}; ask the table what that policy is like"))
 }
 
-/// Collects the fault of each file, with its name, on one line.
+/// Collects the fault of each file, with the file's name, on a single line.
 fn complain(
     sources: &[SourceFile],
     fault: impl Fn(&str, &str) -> Option<String>,
@@ -238,10 +240,10 @@ fn complain(
     none_of(faults.collect())
 }
 
-/// The most disk space that all tests and images take, built from nothing, in MiB.
+/// The largest disk space taken by all tests and images, built from nothing, in MiB.
 const NEEDED_MIB: u64 = 3 << 10;
 
-/// Makes sure that there is room. If the free space is unknown, only says so.
+/// Makes sure of enough disk space. If the free space is unknown, only prints a note.
 ///
 /// # Errors
 ///
@@ -271,7 +273,7 @@ fn judge(free_mib: u64, folder: &Path) -> Result<(), String> {
     ))
 }
 
-/// Reads the available space, in MiB, from the output of `df -Pk` for one folder (POSIX, `df`,
+/// Reads the available space, in MiB, from the output of `df -Pk` for a single folder (POSIX, `df`,
 /// under STDOUT): the number before the percentage. Names may contain blanks.
 fn free_mib(said: &str) -> Option<u64> {
     // From the end, since a device's name may contain blanks, too.

@@ -1,15 +1,15 @@
-//! The order within each crate: which folder may name which other; circles are refused.
+//! The order of layers within each crate: a layer may name only lower ones; circles are refused.
 //!
 //! A crate's folders (and single files) right below `src` are its *layers*. The page
-//! docs/architecture.md, and no other, lists them from top to bottom; a layer may name those listed
-//! after it. A folder may have a row of its own, which orders the modules right below it.
-//! Everywhere, no file may lead back to itself through files that name each other, except for a
-//! file and those it contains.
+//! docs/architecture.md, and no other, lists them from top to bottom; a layer may name only layers
+//! listed later. A folder may have a row of its own to order the modules right below. Everywhere,
+//! no file may lead back to itself through files naming each other, except for a file and the files
+//! in its folder.
 //!
 //! A file's *module* is its path from the workspace's root, without `.rs` and `/mod`; the crate's
-//! root is its folder `src`. It *names* a module if a path in its code, in a `use` or elsewhere,
-//! begins with `crate`, `super`, `self` or a child's name and leads into that module. Code for
-//! tests is left out: a test may name anything.
+//! root is the folder `src`. A file *names* a module if a path in the file's code, in a `use` or
+//! elsewhere, begins with `crate`, `super`, `self` or a child's name and leads into the module.
+//! Test code is left out: a test may name anything.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -18,11 +18,11 @@ use std::path::{Path, PathBuf};
 use super::{SourceFile, none_of};
 use tool::system::workspace;
 
-/// The page with the table, and the heading right above it.
+/// The page with the table, and the heading right above the table.
 const PAGE: &str = "docs/architecture.md";
 const HEADING: &str = "## Layers inside the crates";
 
-/// A row of the table: the folder of a crate's sources, or one in it, and its layers from top to
+/// A row of the table: a crate's source folder or a folder inside, and its layers from top to
 /// bottom.
 #[derive(Debug, PartialEq, Eq)]
 struct LayerRow {
@@ -30,7 +30,7 @@ struct LayerRow {
     layers: Vec<String>,
 }
 
-/// The modules of its own crate that each module names, without itself.
+/// For each module, the other modules of its crate named by its code.
 type Names = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
 /// Checks the files of every crate in the table.
@@ -96,7 +96,7 @@ fn module(place: &Path) -> Option<PathBuf> {
     Some(module)
 }
 
-/// Returns a file's text without its comments, and without its unit tests, which stand last.
+/// Returns a file's text without comments, and without the unit tests at the end.
 pub(super) fn code(text: &str) -> String {
     let product = text.split("\n#[cfg(test)]\nmod tests {").next();
     let lines = product.unwrap_or_default().lines();
@@ -115,8 +115,8 @@ fn names(codes: &BTreeMap<PathBuf, String>) -> Names {
     codes.iter().map(named).collect()
 }
 
-/// Returns the module that a path leads into, seen from `module`; `None` for a path into another
-/// crate.
+/// Returns the module containing the target of a path, as seen from `module`; `None` for a path
+/// into another crate.
 fn target(module: &Path, path: &[&str], modules: &BTreeMap<PathBuf, String>) -> Option<PathBuf> {
     let [first, rest @ ..] = path else {
         return None;
@@ -152,11 +152,11 @@ fn target(module: &Path, path: &[&str], modules: &BTreeMap<PathBuf, String>) -> 
     Some(from)
 }
 
-/// Returns every path of the code; those of a `use` are written out one by one.
+/// Returns every path of the code, with the paths of a `use` written out separately.
 fn paths(code: &str) -> Vec<Vec<&str>> {
     let mut found = Vec::new();
-    // The path so far, whether it is complete, and for each open brace the length of the path that
-    // its branches begin with.
+    // The path so far, whether the path is complete, and for each open brace the length of the
+    // prefix shared by its branches.
     let (mut path, mut is_whole, mut begins) = (Vec::new(), false, Vec::new());
     let mut is_joined = false;
     for token in tokens(code) {
@@ -208,13 +208,13 @@ fn tokens(code: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Returns the layer of a row that contains a module.
+/// Returns a module's layer in a row.
 fn layer(row: &LayerRow, module: &Path) -> Option<String> {
     let first = module.strip_prefix(&row.src).ok()?.iter().next()?;
     Some(first.to_string_lossy().into())
 }
 
-/// Returns the layers that only the table or only the folder has.
+/// Returns a complaint for each layer found only in the table or only in the folder.
 fn strangers(row: &LayerRow, names: &Names) -> Vec<String> {
     let there: BTreeSet<String> = names.keys().filter_map(|it| layer(row, it)).collect();
     let listed: BTreeSet<String> = row.layers.iter().cloned().collect();
@@ -230,7 +230,7 @@ fn strangers(row: &LayerRow, names: &Names) -> Vec<String> {
     missing.chain(gone).collect()
 }
 
-/// Returns the files that name a layer above their own.
+/// Returns a complaint for each file naming a layer above its own.
 fn upward(row: &LayerRow, names: &Names) -> impl Iterator<Item = String> {
     let place = |module: &Path| {
         let layer = layer(row, module)?;
@@ -250,7 +250,7 @@ fn upward(row: &LayerRow, names: &Names) -> impl Iterator<Item = String> {
     })
 }
 
-/// Returns the circles of files that name each other, each in order of their names.
+/// Returns the circles of files naming each other, each circle sorted by name.
 fn circles(names: &Names) -> BTreeSet<Vec<&PathBuf>> {
     let reached = names.keys();
     let reached = reached.map(|module| (module, reached_from(module, names)));
@@ -268,13 +268,13 @@ fn circles(names: &Names) -> BTreeSet<Vec<&PathBuf>> {
         .collect()
 }
 
-/// Returns the modules that `module` names, directly or through others.
+/// Returns the modules named by `module`, directly or through others.
 fn reached_from<'n>(module: &'n PathBuf, names: &'n Names) -> BTreeSet<&'n PathBuf> {
     let mut reached = BTreeSet::new();
     let mut open = vec![module];
     while let Some(next) = open.pop() {
         for named in names.get(next).into_iter().flatten() {
-            // A file and those it contains may name each other.
+            // A file and the files in its folder may name each other.
             let contains = next.starts_with(named) || named.starts_with(next);
             if !contains && reached.insert(named) {
                 open.push(named);

@@ -1,9 +1,9 @@
-//! The tests of all packages: run by cargo, counted by libtest's output.
+//! The tests of all packages: run by cargo, counted from libtest's output.
 //!
-//! Two calls of cargo run at a time, for the programs that boot guests and for the others: while
-//! guests are waited for, others compute. `scripts/lab/program`, cargo's runner, names each program
-//! and limits its time. A program's last word is its `test result:` lines, which are summed. Its
-//! output is shown in full if something failed.
+//! Two cargo calls run at a time, for the programs booting guests and for all others: while guests
+//! boot, other tests compute. `scripts/lab/program`, cargo's runner, names each program and limits
+//! its time. A program ends with `test result:` lines; their counts are summed. If something
+//! failed, the program's output is shown in full.
 
 use std::fs::{self, File};
 use std::mem;
@@ -18,7 +18,7 @@ use tool::install::{self, HostNeed};
 use tool::progress::ProgressNote;
 use tool::system;
 
-/// The programs that modules of boot tests need besides QEMU.
+/// The programs needed by modules of boot tests, besides QEMU.
 const NEEDS: [(&str, &[&HostNeed]); 4] = [
     ("debugger::", &[&install::GDB]),
     ("on_screen::", &[&install::GRUB, &install::OVMF]),
@@ -26,28 +26,28 @@ const NEEDS: [(&str, &[&HostNeed]); 4] = [
     ("in_bochs::", &[&install::GRUB, &install::BOCHS]),
 ];
 
-/// The modules of tests on the host that run the page's engine, with their programs.
+/// The modules of host tests running the page's engine, each with the program needed.
 const OF_PAGE: [(&str, &HostNeed); 2] = [
     ("in_node::", &install::NODE),
     ("in_chromium::", &install::CHROMIUM),
 ];
 
-/// The modules of tests on the host that convert YAML, and that ask what Coq has proven right.
+/// The modules of host tests for converting YAML, and for asking the checker proven right in Coq.
 const CONVERT: &str = "by_convert::";
 const PROVEN: &str = "proven::";
 
-/// Makes sure that something is there.
+/// A function making sure of a prerequisite.
 type Ensure = fn() -> Result<(), String>;
 
-/// The modules of boot tests that need more than programs: a router of Zenoh in Python, and the page's
+/// The modules of boot tests with needs beyond programs: a Zenoh router in Python, and the page's
 /// engine.
 const BY_MORE: [(&str, Ensure); 2] = [
     ("with_router::", || install::python().map(drop)),
     ("live_page::", install::ensure_wasm),
 ];
 
-/// Compiles the tests of all packages, and lists the wanted ones that boot guests. Cargo's errors
-/// go to standard error.
+/// Compiles the tests of all packages, and returns the names of the wanted boot tests. Cargo's
+/// errors go to standard error.
 ///
 /// # Errors
 ///
@@ -61,7 +61,7 @@ pub(super) fn compile(plan: &TestPlan) -> Result<Vec<String>, String> {
     Ok(tests.map(String::from).collect())
 }
 
-/// Runs the tests of all packages; `boots` lists those that boot guests.
+/// Runs the tests of all packages; `boots` lists the boot tests.
 pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
     let boots = boot(plan, boots, tally);
     thread::scope(|scope| {
@@ -98,7 +98,7 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
     });
 }
 
-/// Returns cargo with these options and words for the wanted tests.
+/// Returns a cargo command with the given options and words, for the wanted tests.
 fn cargo(options: &[&str], words: &str, plan: &TestPlan) -> Command {
     let mut command = system::cargo();
     let words = words.split_whitespace();
@@ -108,18 +108,18 @@ fn cargo(options: &[&str], words: &str, plan: &TestPlan) -> Command {
     command
 }
 
-/// Returns the command for the wanted tests of one kind of program.
+/// Returns the command for the wanted tests in a kind of program: `boots` or `host`.
 fn programs(option: &str, kind: &str, plan: &TestPlan) -> Command {
     // Examples, which cargo would compile without `--tests`, are built where a test runs them.
     let words = format!("test --workspace --tests {option} --");
     let runner = system::workspace().join("scripts/lab/program");
-    // A variable would reach what tests run by cargo of their own.
+    // An environment variable would also reach the cargo calls made by tests.
     let runner = format!("target.'cfg(unix)'.runner = [{runner:?}, {kind:?}]");
     cargo(&["--config", &runner], &words, plan)
 }
 
-/// Returns the command for those of the tests that can boot their guests; `None` if there are none.
-/// The others are skipped and counted as such: a guest that cannot boot must not pass silently.
+/// Returns the command for the tests able to boot their guests; `None` if there are no boot tests.
+/// The other tests are counted as skipped: a guest unable to boot must not pass silently.
 fn boot(plan: &TestPlan, tests: &[String], tally: &mut Tally) -> Option<Command> {
     let obstacle = match plan.quick {
         true => Err("left out by --quick".into()),
@@ -133,7 +133,7 @@ fn boot(plan: &TestPlan, tests: &[String], tally: &mut Tally) -> Option<Command>
     }
     let mut command = programs("--no-fail-fast", "boots", plan);
     for (module, needs) in NEEDS {
-        // What they need is installed before, by one package manager at a time.
+        // Needs are installed beforehand, as only a single package manager can run at a time.
         let is_wanted = tests.iter().any(|test| test.starts_with(module));
         let mut needs = needs.iter().filter(|_| is_wanted);
         let there = needs.try_for_each(|need| install::ensure(need));
@@ -147,7 +147,7 @@ fn boot(plan: &TestPlan, tests: &[String], tally: &mut Tally) -> Option<Command>
     Some(command)
 }
 
-/// Leaves out a module of tests that lacks something, and counts it.
+/// Leaves out a module of tests lacking something, and counts the module as skipped.
 fn leave_out(module: &str, there: Result<(), String>, command: &mut Command, tally: &mut Tally) {
     if let Err(why) = there {
         tally.skip(module, &why);
@@ -155,11 +155,11 @@ fn leave_out(module: &str, there: Result<(), String>, command: &mut Command, tal
     }
 }
 
-/// Runs one command, and counts the results in its output.
+/// Runs a command, and counts the test results in its output.
 pub(super) fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tally) {
     let before = tally.failures.len();
     let mut program = TestProgram::new(name);
-    // Cargo itself has no result.
+    // Cargo itself prints no result line.
     program.has_result = true;
     let ended = follow(plan, command, &mut |line| {
         let line = line.trim_end();
@@ -178,7 +178,7 @@ pub(super) fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tal
     }
 }
 
-/// Runs one command to its end, and shows its output line by line.
+/// Runs a command to its end, and shows its output line by line.
 fn follow(plan: &TestPlan, mut command: Command, show: &mut dyn FnMut(&str)) -> Result<(), String> {
     let log = system::new_log("test")?;
     let error = |error| format!("`{}`: {error}", log.display());
@@ -204,7 +204,7 @@ fn follow(plan: &TestPlan, mut command: Command, show: &mut dyn FnMut(&str)) -> 
 struct TestProgram {
     name: String,
     output: String,
-    /// The last list of names; before a result, it is that of the failed tests.
+    /// The last list of names: right before a result, the names of the failed tests.
     listed: Vec<String>,
     has_failed: bool,
     has_result: bool,
@@ -250,7 +250,7 @@ impl TestProgram {
         }
     }
 
-    /// Counts a death, and shows the output if something failed.
+    /// Counts a missing result as a failure, and shows the output if something failed.
     fn finish(self, tally: &mut Tally) {
         if !self.has_result {
             tally.fail(

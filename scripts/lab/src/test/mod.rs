@@ -1,16 +1,16 @@
 //! The subcommand `test`: runs and counts every test.
 //!
-//! A *test* is a libtest test of any package (boot tests, which boot guests, are such tests), a
-//! doctest, or a *check*: one property of the whole tree with a name of its own, such as "clippy
-//! has nothing to say". All of them are counted in one tally, whose last line is `N passed, M
-//! failed`, with `, K skipped` if something could not run; the reasons stand above it.
+//! A *test* is a libtest test of any package (boot tests, which boot guests, included), a doctest,
+//! or a *check*: a named property of the whole tree, such as "clippy has nothing to say". A single
+//! tally counts all of them. Its last line is `N passed, M failed`, with `, K skipped` if something
+//! could not run; the reasons stand above the line.
 //!
-//! Nothing passes by not running: a test binary that does not compile, dies
-//! without its result line, or does not end within its time is a failure.
+//! Nothing passes by not running: a test binary counts as a failure if it does not compile, dies
+//! without its result line, or exceeds its time limit.
 //!
-//! The checks judge the project's own packages. Other apps in this tree need not follow the
-//! project's rules on lints, format and files, but must pass their tests. A package accepts the
-//! rules by taking the workspace's lints.
+//! The checks judge the project's own packages. Other apps in the tree must pass their tests, but
+//! need not follow the project's rules on lints, format and files. A package accepts the rules by
+//! taking the workspace's lints.
 
 mod apart;
 mod budgets;
@@ -34,7 +34,7 @@ use tool::image::{self, package_name};
 use tool::options::{Command, OptionValue, Refusal, options};
 use tool::{elf, files, install, system};
 
-/// The table of `test`.
+/// The command-line table of `test`.
 pub static TEST: Command = Command {
     invocation: "./scripts/test",
     about: "Runs every test, on the host and in QEMU, and counts them.",
@@ -70,7 +70,7 @@ options! {
 
 /// The tests to run.
 struct TestPlan {
-    /// A part of the names of the wanted tests; `None`: all.
+    /// A part of the wanted tests' names; `None`: all tests.
     filter: Option<String>,
     /// Leave out guests, images and lints.
     quick: bool,
@@ -92,7 +92,7 @@ impl TestPlan {
 /// Runs the subcommand with the words after its name.
 pub fn test(words: &[OsString]) -> ExitCode {
     TEST.carry_out(words, |options| {
-        // Before anything is built: a full disk would show as an error of the linker.
+        // Before building: a full disk would later show up as a linker error.
         checks::check()?;
         let list = options.is_given(name::BLESS);
         let list = list.then(|| system::new_log("blessed"));
@@ -154,7 +154,7 @@ fn run_all(plan: &TestPlan, tally: &mut Tally) -> Result<(), String> {
     })
 }
 
-/// Returns the complaint about a filter that nothing matched.
+/// Returns a complaint if the filter left nothing to run.
 fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
     let filter = filter.filter(|_| !tally.has_run())?;
     if tally.is_empty() {
@@ -168,8 +168,8 @@ fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
     ))
 }
 
-/// Builds the images before the tests that boot them, so that the limits of these tests need not
-/// include a compiler. An image of the project's own must be small.
+/// Builds the images before their tests boot them: the tests' time limits then need not cover
+/// compilation. The image of an app of the project must also be small.
 fn build_images(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
     if plan.quick {
         return;
@@ -199,9 +199,9 @@ fn build_image(app: &str, most: u64) -> Result<(), String> {
 /// The reason why a check has not passed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum CheckFailure {
-    /// It failed.
+    /// The check failed.
     Failed(String),
-    /// It could not run.
+    /// The check could not run.
     Skipped(String),
 }
 
@@ -211,7 +211,7 @@ impl From<String> for CheckFailure {
     }
 }
 
-/// Returns an error that lists the faults, if there are any.
+/// Returns an error listing the faults, if there are any.
 fn none_of(faults: Vec<String>) -> Result<(), String> {
     match faults.is_empty() {
         true => Ok(()),
@@ -235,13 +235,13 @@ mod made {
     }
 }
 
-/// Returns all files of the workspace, sorted, without the generated ones and without those of
-/// packages that are not the project's own.
+/// Returns all files of the workspace, sorted, except generated files and packages other than the
+/// project's own.
 fn sources() -> Vec<SourceFile> {
     below(system::workspace())
 }
 
-/// Returns the names of the packages whose files these are, sorted.
+/// Returns the names of the packages containing the given files, sorted.
 fn packages(sources: &[SourceFile]) -> Vec<String> {
     let manifests = sources.iter().filter(|it| it.name.ends_with("Cargo.toml"));
     let mut names: Vec<String> = manifests.filter_map(|it| package_name(&it.text)).collect();
@@ -317,7 +317,7 @@ impl Tally {
         self.failures.push(format!("{name}: {first}"));
     }
 
-    /// Counts something that could not run.
+    /// Counts something unable to run.
     fn skip(&mut self, name: &str, why: &str) {
         self.skips.push(format!("{name}: {why}"));
     }

@@ -1,18 +1,19 @@
-//! `--miri` and `--thread-sanitizer`: tests under tools that look where threads meet.
+//! `--miri` and `--thread-sanitizer`: tests under tools for the interplay of threads.
 //!
-//! Both come with a nightly toolchain of Rust only. So they are asked for, and never needed. Miri
-//! executes every access by the rules of the language, and shows an atomic's old values where these
-//! allow that; many *seeds* are as many interleavings. It is slow, so counts shrink under
-//! `cfg!(miri)`, and it has neither assembly nor Linux' scheduling calls. ThreadSanitizer sees data
-//! races of whole runs on Linux' threads, as they happen to interleave.
+//! Both tools come only with a nightly toolchain of Rust. So they run on request, and nothing
+//! depends on them. Miri executes every access by the rules of the language, and returns an
+//! atomic's old values where the rules allow; many *seeds* give as many interleavings. Miri is
+//! slow, so counts shrink under `cfg!(miri)`, and supports neither assembly nor Linux' scheduling
+//! calls. ThreadSanitizer sees data races in whole runs on Linux' threads, in the interleavings
+//! that happen to occur.
 
 use std::process::Command;
 
 use super::{Tally, TestPlan, libtest};
 use tool::system;
 
-/// The tests that Miri runs together: a name, cargo's words, and how many seeds. Those with one seed
-/// have one thread, or are too slow for more.
+/// The groups of tests under Miri: a name, cargo's words, and the number of seeds. Groups with a
+/// single seed have a single thread, or are too slow for more.
 const MIRI: [(&str, &str, u32); 7] = [
     ("letters", "-p sched-dag --test it -- letters", 4),
     (
@@ -39,13 +40,13 @@ const MIRI: [(&str, &str, u32); 7] = [
     ),
 ];
 
-/// The tests that ThreadSanitizer runs.
+/// The groups of tests under ThreadSanitizer.
 const THREADS: [(&str, &str); 2] = [
     ("runs", "-p linux --lib --test it --test random"),
     ("edges", "-p fass --lib"),
 ];
 
-/// Runs the tests whose names are wanted under Miri.
+/// Runs the wanted groups of tests under Miri.
 pub(super) fn run_miri(plan: &TestPlan, tally: &mut Tally) -> Result<(), String> {
     ensure("miri")?;
     for (name, words, seeds) in MIRI {
@@ -61,11 +62,11 @@ pub(super) fn run_miri(plan: &TestPlan, tally: &mut Tally) -> Result<(), String>
     Ok(())
 }
 
-/// Runs the tests whose names are wanted under ThreadSanitizer.
+/// Runs the wanted groups of tests under ThreadSanitizer.
 pub(super) fn run_thread_sanitizer(plan: &TestPlan, tally: &mut Tally) -> Result<(), String> {
     ensure("rust-src")?;
-    // The standard library is compiled anew, as a sanitizer has to see its accesses, too. Tests
-    // unwind: with a profile that aborts there would be two of `core`.
+    // The standard library is compiled anew, since the sanitizer has to see its accesses, too.
+    // Tests unwind: with an aborting profile, two copies of `core` would be linked.
     let all = "cargo test --quiet -Zbuild-std --target x86_64-unknown-linux-gnu \
                --config profile.dev.panic='unwind'";
     for (name, words) in THREADS {
@@ -92,7 +93,7 @@ fn nightly(words: &str) -> Command {
     command
 }
 
-/// Sees to it that the nightly toolchain is there with a component.
+/// Makes sure of a nightly toolchain with a component.
 fn ensure(component: &str) -> Result<(), String> {
     let mut listed = Command::new("rustup");
     listed.args(["component", "list", "--installed", "--toolchain=nightly"]);

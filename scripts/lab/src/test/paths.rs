@@ -1,17 +1,18 @@
-//! Paths: files and folders that a page or a comment names are there.
+//! Paths: files and folders named by a page or a comment must exist.
 //!
-//! A path is a word between backquotes with a slash in it that begins with a folder of the root, or
-//! ends in a slash or in a file's usual ending. It counts from the root or from a folder above the
-//! file that names it, or is the end of a longer path. A page's links count from its own folder.
+//! A path is a word between backquotes with a slash inside. The word begins with a folder of the
+//! root, or ends in a slash or in a file's usual ending. A path may start from the root or from a
+//! folder above the file naming it, or be the end of a longer path. A page's links start from the
+//! page's folder.
 //!
-//! The CHANGELOG tells of files as they were.
+//! The CHANGELOG is exempt: past files may be gone.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
 use super::{SourceFile, none_of};
 
-/// Paths that are made by a reader, stand for any, or are in somebody else's sources.
+/// Paths created by a reader, standing for any path, or from other projects' sources.
 const ELSEWHERE: [&str; 6] = [
     "target/",
     "x/",
@@ -21,14 +22,14 @@ const ELSEWHERE: [&str; 6] = [
     "docs/misc/pvh.pandoc",
 ];
 
-/// Endings of names by which a word with a slash is a file's.
+/// Endings by which a word with a slash counts as a file's name.
 const ENDINGS: [&str; 8] = [".rs", ".md", ".s", ".ld", ".txt", ".toml", ".dag", ".svg"];
 
-/// Holds the paths of pages and comments against the files that are there.
+/// Compares the paths in pages and comments with the existing files.
 ///
 /// # Errors
 ///
-/// Each path that leads nowhere, with its file and line.
+/// Each path leading nowhere, with its file and line.
 pub(super) fn check(sources: &[SourceFile]) -> Result<(), String> {
     let mut there = BTreeSet::new();
     for SourceFile { name, .. } in sources {
@@ -78,7 +79,7 @@ fn link(rest: &str) -> Option<&str> {
     (!path.is_empty() && !path.contains(':')).then_some(path)
 }
 
-/// Returns the path without `..`.
+/// Returns the path with each `..` resolved.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in path.components() {

@@ -1,11 +1,12 @@
-//! Words: those of the house's rules on names and sentences that can be counted.
+//! Words: the countable part of the house rules on names and sentences.
 //!
-//! - A doc sentence says what a thing is or does; none begins with a question word.
-//! - No two types of a crate share a name, and none is called by a question word or a pronoun.
-//! - A sentence that says nouns needs no second reading: in no room do pronouns become more
-//!   frequent, and the pages have no more words than a ceiling, which only a person raises.
+//! - A doc sentence says what an item is or does, and never begins with a question word.
+//! - No two types of a crate share a name, and no type is called by a question word or a pronoun.
+//! - Sentences with nouns need no second reading: in no room do pronouns become more frequent, and
+//!   the words of all pages stay below a ceiling, raised only by a person.
 //!
-//! Types of tests and examples, and those within functions and inline modules, are let be.
+//! A *room* is a top folder or a first page. Types of tests and examples, and types within
+//! functions and inline modules, are exempt.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,30 +16,30 @@ use super::{SourceFile, none_of};
 use crate::golden::GoldenText;
 use tool::system::workspace;
 
-/// The table of rooms, from the workspace's root.
+/// The path of the table of rooms, from the workspace's root.
 const TABLE: &str = "tests/baselines/words.txt";
 
 /// The row of the ceiling of words.
 const PAGES: &str = "docs/*.md";
 
-/// The pages that a user reads first, which are rooms of their own.
+/// The pages a user reads first, each a room of its own.
 const FIRST_PAGES: [&str; 3] = ["README.md", "docs/guide.md", "docs/commands.md"];
 
 /// The row of all other pages of `docs/`.
 const OTHER_PAGES: &str = "docs/others";
 
-/// The words that stand for nouns and are counted.
+/// The counted words, which stand for nouns.
 const COUNTED: [&str; 5] = ["what", "that", "which", "it", "one"];
 
-/// The words that begin no doc sentence at the beginning of a line.
+/// The words forbidden at the beginning of a doc line.
 const QUESTIONS: [&str; 5] = ["What ", "That which ", "Whatever ", "Who ", "Whoever "];
 
-/// The words that name no type.
+/// The words forbidden as type names.
 const PRONOUNS: [&str; 11] = [
     "What", "Why", "Who", "Whose", "Which", "When", "Where", "How", "Of", "By", "Me",
 ];
 
-/// Says at which lines a doc sentence begins with a question word.
+/// Returns a complaint with the numbers of the doc lines beginning with a question word.
 pub(super) fn asks(name: &str, text: &str) -> Option<String> {
     if !name.ends_with(".rs") {
         return None;
@@ -56,11 +57,11 @@ pub(super) fn asks(name: &str, text: &str) -> Option<String> {
     })
 }
 
-/// Holds the names of types against the rules.
+/// Checks the names of types against the rules.
 ///
 /// # Errors
 ///
-/// In words: which names, and where.
+/// In words: the offending names and their places.
 pub(super) fn check_names(sources: &[SourceFile]) -> Result<(), String> {
     let manifests = sources.iter().map(|it| it.name.as_str());
     let crates = manifests.filter_map(|name| name.strip_suffix("Cargo.toml"));
@@ -72,7 +73,7 @@ pub(super) fn check_names(sources: &[SourceFile]) -> Result<(), String> {
         if !name.ends_with(".rs") || of_tests.iter().any(|part| name.contains(part)) {
             continue;
         }
-        // A crate may lie in another one: the longest folder is the file's own.
+        // A crate may lie inside another: the longest matching folder is the file's own crate.
         let within = crates.iter().filter(|folder| name.starts_with(**folder));
         let own = within.max_by_key(|folder| folder.len()).unwrap_or(&"");
         for type_name in text.lines().filter_map(type_name) {
@@ -95,12 +96,12 @@ pub(super) fn check_names(sources: &[SourceFile]) -> Result<(), String> {
     none_of(faults)
 }
 
-/// Compares pronouns and words with the table; rewrites it if there is a `list` of rewritten files,
-/// where a room has fewer pronouns than it may have.
+/// Compares the pronouns and words with the table. Given a `list` of rewritten files, rewrites the
+/// table, lowering the limits of rooms with fewer pronouns than allowed.
 ///
 /// # Errors
 ///
-/// In words: the rooms that have too many.
+/// In words: the rooms above their limits.
 pub(super) fn check_rooms(sources: &[SourceFile], list: Option<&Path>) -> Result<(), String> {
     let table = fs::read_to_string(workspace().join(TABLE));
     let table = table.map_err(|error| format!("{TABLE}: {error}"))?;
@@ -141,8 +142,8 @@ pub(super) fn check_rooms(sources: &[SourceFile], list: Option<&Path>) -> Result
     none_of(over.collect())
 }
 
-/// Counts the pronouns in 1,000 words of the documentation of each top folder, of each crate of the
-/// kernel, of the first pages and of all others, and the words of all pages of `docs/`.
+/// Counts the pronouns in 1,000 words of documentation, for each top folder, each crate of the
+/// kernel, each first page and all other pages, and the words of all pages of `docs/`.
 fn rooms(sources: &[SourceFile]) -> BTreeMap<String, usize> {
     let mut counts = BTreeMap::<String, [usize; 2]>::new();
     let mut words = 0;
@@ -175,7 +176,7 @@ fn rooms(sources: &[SourceFile]) -> BTreeMap<String, usize> {
     rooms
 }
 
-/// Adds the pronouns and the words of these lines, without blocks and names of code.
+/// Adds up the pronouns and words of the given lines, without code blocks and names of code.
 fn count<'t>(lines: impl Iterator<Item = &'t str>, [pronouns, all]: &mut [usize; 2]) {
     let mut is_code = false;
     for line in lines {
@@ -194,7 +195,7 @@ fn count<'t>(lines: impl Iterator<Item = &'t str>, [pronouns, all]: &mut [usize;
     }
 }
 
-/// Returns the name of the type that a line at the top level of a file defines, if it does.
+/// Returns the name of the type defined by a line at the top level of a file, if any.
 fn type_name(line: &str) -> Option<&str> {
     let mut words = line.split([' ', '<', '(', ';', ':', '{']);
     if !line.starts_with(|first: char| first.is_ascii_lowercase()) {
