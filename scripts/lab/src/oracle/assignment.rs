@@ -1,6 +1,6 @@
 //! Reference values of tables and lent cores: attempts, lists, busy times, groups and bounds.
 //!
-//! A case gives a set of DAGs and what an independent implementation divides the cores into;
+//! A case gives a set of DAGs and the division of the cores by an independent implementation;
 //! [`check`] computes the same with `sched_dag::analysis::lend` and compares record by record.
 //!
 //! ```text
@@ -16,7 +16,7 @@
 //! end
 //! ```
 //!
-//! With tables of several DAGs (attempts 5 and 6) other records come in:
+//! Tables of several DAGs (attempts 5 and 6) bring in other records:
 //!
 //! ```text
 //! case NAME m ndags limit                         the most entries of a table
@@ -46,14 +46,14 @@ pub(super) static ORACLE: FileOracle<AssignmentCase> = FileOracle {
     schedules: None,
 };
 
-/// One set of DAGs with the division expected of it.
+/// A set of DAGs with the expected division of the cores.
 #[derive(Debug)]
 pub struct AssignmentCase {
     /// The case's name.
     pub name: String,
     /// The number of cores.
     pub(crate) cores: u32,
-    /// The most entries of a table; `None`: the case is of lent cores alone.
+    /// The largest number of entries of a table; `None`: the case has only lent cores.
     pub(crate) limit: Option<usize>,
     /// The DAGs.
     pub(crate) tasks: Vec<Task>,
@@ -64,12 +64,12 @@ pub struct AssignmentCase {
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as described above.
+/// [`Malformed`] for the first record that deviates from the description above.
 pub fn parse(text: &str) -> Result<Vec<AssignmentCase>, Malformed> {
     cases(text, |header, lines| parse_case(header, lines, true))
 }
 
-/// Works like [`parse`] for a file in which a case may end after its DAGs.
+/// Works like [`parse`], for files whose cases may end after the DAGs.
 ///
 /// # Errors
 ///
@@ -78,7 +78,7 @@ pub(crate) fn parse_sets(text: &str) -> Result<Vec<AssignmentCase>, Malformed> {
     cases(text, |header, lines| parse_case(header, lines, false))
 }
 
-/// Reads a case, which may lack what is expected of it unless it `is_answered`.
+/// Reads a case. Unless the case `is_answered`, the expected records may be missing.
 fn parse_case(
     header: &Line<'_>,
     lines: &mut Lines<'_>,
@@ -118,7 +118,8 @@ fn parse_case(
     })
 }
 
-/// Reads a DAG with its offset, whether it is sporadic or non-preemptive, and deadlines of sinks.
+/// Reads a DAG with its offset, the deadlines of sinks, and whether the DAG is sporadic or
+/// non-preemptive.
 fn parse_attributes(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
     let header = lines.expect("dag")?;
     let [period, deadline, terms @ ..] = header.fixed::<8>()?;
@@ -150,7 +151,8 @@ fn parse_attributes(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
     Ok(task.with_table_terms(terms))
 }
 
-/// Checks the form of a record, and returns it in normal form: spellings such as `007` are equal.
+/// Checks a record's form, and returns the record in normal form: spellings such as `007` are
+/// equal.
 fn record(line: &Line<'_>, has_tables: bool) -> Result<String, Malformed> {
     if line.kind == "attempt" && line.words == ["-"] {
         return Ok("attempt -".to_owned());
@@ -173,7 +175,7 @@ fn record(line: &Line<'_>, has_tables: bool) -> Result<String, Malformed> {
         true if line.kind == "failed" && has_tables => Ok(failed(&line.words)),
         true => {
             let number = |word: &&str| match word.strip_prefix('-') {
-                // Of a job that is begun in a lap before.
+                // A job begun in an earlier lap has a negative number.
                 Some(word) if line.kind == "list" => Ok(-line.number::<i128>(word)?),
                 _ => line.number::<i128>(word),
             };
@@ -276,7 +278,7 @@ fn of_family(owner: &CoreOwner, tasks: &[&Task]) -> Vec<String> {
     let mut records = vec![shown("table", &sizes.chain(dags).collect::<Vec<_>>())];
     let parts_ns = [lap_ns.div_ceil(7), lap_ns.div_ceil(2)];
     let windows_ns = [parts_ns[0], parts_ns[1], lap_ns, lap_ns + lap_ns / 3];
-    // The records count from the grid also where a table counts from the release of its one DAG.
+    // Records count from the grid, even where a table counts from the release of its only DAG.
     let is_alone = owner.dags.len() == 1;
     let on_grid = |entry: &TableEntry| {
         let task = tasks[entry.dag.index()];
@@ -341,7 +343,7 @@ fn busy(table: &Table, core: usize, tasks: &[&Task], windows_ns: &[u64]) -> Stri
     counted("busy", core, windows_ns.iter().flat_map(busy))
 }
 
-/// Returns a record that begins with a number.
+/// Returns a record beginning with a number.
 fn counted(kind: &str, number: usize, others: impl Iterator<Item = i128>) -> String {
     let numbers = [number as i128].into_iter().chain(others);
     shown(kind, &numbers.collect::<Vec<_>>())
@@ -369,7 +371,7 @@ mod tests {
         FILE.split_inclusive("end\n").next().unwrap()
     }
 
-    /// A part of the first case, its replacement, and the difference that it makes.
+    /// A part of the first case, its replacement, and the resulting difference.
     const WRONG: &str = r"attempt 3 | attempt 4 | expected `attempt 4`, computed `attempt 3`
 failed 1 0 0 | failed 1 0 | expected `failed 1 0`, computed `failed 1 0 0`
 order 4 0 0 | order 4 0 1 | expected `order 4 0 1`, computed `order 4 0 0`

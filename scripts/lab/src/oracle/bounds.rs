@@ -1,8 +1,8 @@
 //! Reference values of the analysis at commit: lengths, widths, bounds, verdicts.
 //!
-//! A case gives task sets and the results of independent implementations for them; [`check`]
+//! A case holds a task set and the results of independent implementations for the set; [`check`]
 //! computes the same with `sched_dag::analysis` and compares every quantity. There are three kinds
-//! of cases. In all of them it is
+//! of cases. All have the form
 //!
 //! ```text
 //! case NAME m ntasks
@@ -26,7 +26,8 @@
 //! of the set:  dm_order mp_gfp_dm mp_gfp_dm_clip mp_gedf mp_gedf_clip
 //! ```
 //!
-//! and, where subtasks wait, in blocks of `waiting.txt` that begin with `bounds` instead of `case`
+//! and, for subtasks with waits, in blocks of `waiting.txt` that begin with `bounds` instead of
+//! `case`
 //!
 //! ```text
 //! of a DAG:    len / vol / span / width / cov (by chains, waits as work)
@@ -35,12 +36,12 @@
 //!              wait_gedf wait_gedf_best wait_np_gedf
 //! ```
 //!
-//! Bounds under fixed priorities are in the order of `dm_order`. A lone `-`
-//! says that a test does not accept or does not apply. The bounds of the first kind that
-//! the multi-path ones have replaced are in `older_bounds`. `alone`, `peel` and `spread` bound one
-//! job alone: by one path, by reserved chains, and with waits that are executed. No choice of chains
-//! gives less than `least`, so neither `alone` nor `peel` may be below it. The waits of a subtask
-//! are on a line of its own:
+//! Bounds under fixed priorities are in the order of `dm_order`. A lone `-` marks a test that does
+//! not accept the set or does not apply. The module `older_bounds` has the bounds of the first kind
+//! replaced by multi-path bounds. `alone`, `peel` and `spread` bound a single job alone: by one
+//! path, by reserved chains, and with waits counted as execution. No choice of chains gives less
+//! than `least`, so neither `alone` nor `peel` may be smaller. The waits of a subtask are on a line
+//! of their own:
 //!
 //! ```text
 //! wait V n C_0 W_1 C_1 ..     subtask V has n >= 1 waits of the limits W between segments of the
@@ -68,7 +69,7 @@ pub(super) static ORACLE: FileOracle<BoundsCase> = FileOracle {
     schedules: None,
 };
 
-/// One task set with the values expected of it.
+/// A task set with its expected values.
 #[derive(Debug)]
 pub struct BoundsCase {
     /// The case's name.
@@ -78,14 +79,14 @@ pub struct BoundsCase {
     quantities: Quantities,
 }
 
-/// The computed quantities: name in the file, and value.
+/// Quantities: the name in the file, and the value.
 type Quantities = Vec<(String, String)>;
 
-/// The quantities of a DAG and of a set.
+/// The names of the quantities of a DAG and of a set.
 type Form = [&'static [&'static str]; 2];
 
-/// They are by kind of file. Each case has each of them once, but the last one of a DAG once for
-/// each number of cores.
+/// The forms of the kinds of files without waits. Each case has each quantity once. Only the last
+/// quantity of a DAG comes once for each number of cores.
 const FORMS: [Form; 2] = [
     [
         &["len", "vol", "bottom_level", "single"],
@@ -113,7 +114,7 @@ const FORMS: [Form; 2] = [
     ],
 ];
 
-/// Those where subtasks wait.
+/// The form for subtasks with waits.
 const WAITING: Form = [
     &["len", "vol", "span", "width", "cov", "alone"],
     &[
@@ -131,7 +132,7 @@ const WAITING: Form = [
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as described above.
+/// [`Malformed`] for the first record that deviates from the description above.
 pub fn parse(text: &str) -> Result<Vec<BoundsCase>, Malformed> {
     cases(text, parse_case)
 }
@@ -150,7 +151,7 @@ pub(super) fn parse_case(
         let mut task = parse_task(lines)?;
         let mut size = task.wcets_ns().len();
         if has_waits {
-            // None of these quantities has a part for each subtask.
+            // No quantity of this form has a part for each subtask.
             (task, size) = (parse_waits(lines, task)?, 1);
         }
         // Only `multi_path.txt` begins with `cov`; the first DAG decides for the whole case.
@@ -182,7 +183,7 @@ pub(super) fn parse_task(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
         .map_err(|error| header.malformed(error.to_string()))
 }
 
-/// Reads the waits of a DAG's subtasks, if it has any.
+/// Reads the waits of a DAG's subtasks, if any.
 fn parse_waits(lines: &mut Lines<'_>, task: Task) -> Result<Task, Malformed> {
     let unsuspended = task.wcets_ns().iter().map(|&wcet_ns| SubtaskWaits {
         count: 0,
@@ -222,7 +223,8 @@ fn parse_waits(lines: &mut Lines<'_>, task: Task) -> Result<Task, Malformed> {
     }
 }
 
-/// Reads the waits of one of so many subtasks: which, how many, and segments and limits in turn.
+/// Reads the waits of one of `subtasks` subtasks: its number, the number of waits, and segments and
+/// limits in turn.
 pub(super) fn parse_wait(
     line: &Line<'_>,
     subtasks: usize,
@@ -243,7 +245,7 @@ pub(super) fn parse_wait(
     Ok((subtask, count, times.collect::<Result<_, _>>()?))
 }
 
-/// Reads the quantities of these names, in any order, of a DAG or set of `size` parts.
+/// Reads the named quantities, in any order, of a DAG or set with `size` parts.
 fn parse_quantities(
     lines: &mut Lines<'_>,
     names: &[&str],
@@ -266,7 +268,7 @@ fn parse_quantities(
     }
 }
 
-/// Checks the form of a quantity, and returns it in normal form.
+/// Checks a quantity's form, and returns its name and value in normal form.
 fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malformed> {
     // Numbers are printed again, so that spellings such as `007` compare equal.
     let plain = |words: &[&str]| {
@@ -377,7 +379,8 @@ fn compute_of_dag(what: &str, expected: &str, task: &Task) -> String {
     }
 }
 
-/// Computes the bounds of one job alone. Of `least` they tell only whether it may be so much.
+/// Computes the bounds of a single job alone. The bounds only show whether the expected `least` is
+/// possible.
 fn compute_alone(expected: &str, task: &Task, cores: u32) -> String {
     let Some(bounds) = alone_forms(task, cores) else {
         return "-".to_owned();
@@ -394,7 +397,7 @@ fn compute_alone(expected: &str, task: &Task, cores: u32) -> String {
 /// Computes one quantity of a set.
 fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
     let mut order: Vec<usize> = (0..tasks.len()).collect();
-    // Ties go to the DAG that comes first.
+    // Ties go to the earlier DAG.
     order.sort_by_key(|&dag| (tasks[dag].relative_deadline_ns(), dag));
     let by_deadline: Vec<&Task> = order.iter().map(|&dag| tasks[dag]).collect();
     let accepted = |yes: bool| u8::from(yes).to_string();
@@ -463,7 +466,7 @@ mod tests {
         FILE.split_inclusive("end\n").next().unwrap()
     }
 
-    /// A part of the first case, its replacement, and the difference that it makes.
+    /// A part of the first case, its replacement, and the resulting difference.
     const WRONG: &str = r"\nlen 41 | \nlen 42 | dag 1: len: expected 42, computed 41
 graham 50 long_paths 46 | graham 50 long_paths 47 | dag 2: single 7: expected graham 50 long_paths 47, computed graham 50 long_paths 46
 melani_gedf 11 44 60 | melani_gedf - | melani_gedf: expected -, computed 11 44 60

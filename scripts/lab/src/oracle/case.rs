@@ -1,7 +1,7 @@
-//! A reference schedule: a set of DAGs, the execution time of every instance,
-//! and the schedule that two independent implementations agree on.
+//! A reference schedule: a set of DAGs, the execution time of every instance, and a schedule agreed
+//! on by two independent implementations.
 //!
-//! The records of such a file, blank-separated words, one record a line:
+//! The records of a file are lines of blank-separated words:
 //!
 //! ```text
 //! case NAME m edf(0/1) preemptive(0/1) ndags
@@ -18,11 +18,11 @@
 //! end
 //! ```
 //!
-//! One unit of the file's time counts as a nanosecond here. WCETs play no part in a schedule; they
+//! A unit of the file's time counts as a nanosecond here. WCETs play no part in a schedule; they
 //! are only checked against the execution times.
 //!
-//! Reading is strict: whatever is not as the format says is refused with its line. The DAGs are
-//! those of a DAG file; samples are the execution times, job by job.
+//! Reading is strict: any deviation from the format is refused with its line. DAGs have the types
+//! of a DAG file, where the samples are the execution times, job by job.
 
 use std::collections::BTreeMap;
 
@@ -38,22 +38,22 @@ use text::{Line, Lines, Malformed, cases, quoted};
 
 use super::bounds::parse_wait;
 
-/// One set of DAGs with its expected schedule.
+/// A set of DAGs with its expected schedule.
 #[derive(Debug)]
 pub struct Case {
     /// The case's name.
     pub name: String,
     /// The number of cores.
     pub cores: u32,
-    /// How these are divided.
+    /// The division of the cores into clusters.
     pub clusters: CoreDivision,
-    /// How ready instances are ordered.
+    /// The policy ordering the ready instances.
     pub policy: Policy,
     /// Whether a started instance may lose its core.
     pub preemption: Preemption,
     /// The DAGs.
     pub set: Set,
-    /// When each segment of the subtasks with waits is expected to take place.
+    /// The expected times of the segments of subtasks with waits.
     pub turn_times: BTreeMap<Instance, TurnTimes>,
     /// The expected instances.
     pub instances: BTreeMap<Instance, InstanceTimes>,
@@ -64,48 +64,48 @@ pub struct Case {
 /// The times of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceTimes {
-    /// When it first executed.
+    /// When the instance first executed.
     pub start_ns: u64,
-    /// When it had executed for its execution time.
+    /// When the instance had received its whole execution time.
     pub finish_ns: u64,
-    /// How many dispatches took its core away.
+    /// The number of dispatches that took its core away.
     pub preemptions: u64,
 }
 
 /// The times of the turns of an instance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TurnTimes {
-    /// How many of its waits ended by their limits.
+    /// The number of waits ended by their limits.
     pub timeouts: u64,
-    /// When each segment first executed, and when it had executed.
+    /// When each segment first executed, and when it ended.
     pub spans_ns: Vec<(u64, u64)>,
 }
 
 /// The times of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobTimes {
-    /// When it was released.
+    /// When the job was released.
     pub release_ns: u64,
-    /// When it was complete.
+    /// When the job was complete.
     pub finish_ns: u64,
-    /// The time between.
+    /// The time from release to completion.
     pub response_ns: u64,
-    /// Whether that is more than the relative deadline.
+    /// Whether the response time exceeds the relative deadline.
     pub missed: bool,
 }
 
-/// How the times of a case become times of the machine.
+/// The conversion from a case's times to machine times.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeScale {
     /// The length of a unit, in nanoseconds.
     pub unit_ns: u64,
-    /// How much less each segment executes, in nanoseconds.
+    /// The time by which each segment's execution is shortened, in nanoseconds.
     pub guard_ns: u64,
 }
 
 impl Case {
-    /// Returns how long the segments of an instance execute, and how long after each of them the
-    /// answer to its wait comes.
+    /// Returns an instance's execution time for each segment, and after each the time until the
+    /// answer to its wait.
     pub(super) fn sample(&self, instance: Instance) -> &[u64] {
         let dag = &self.set.dags[instance.dag.index()];
         let subtask = instance.subtask.index();
@@ -135,7 +135,7 @@ impl Case {
         Ok(verified?.task_set)
     }
 
-    /// Returns the DAGs with times of the machine.
+    /// Returns the DAGs with machine times.
     ///
     /// # Errors
     ///
@@ -181,8 +181,8 @@ impl Case {
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as described above, and for
-/// DAGs that cannot be committed.
+/// [`Malformed`] for the first record that deviates from the format above, and for DAGs that cannot
+/// be committed.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
     cases(text, parse_case)
 }
@@ -234,7 +234,7 @@ pub(super) fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Cas
     Ok(case)
 }
 
-/// Reads the cores of each cluster, which are all there are.
+/// Reads the number of cores of each cluster; together they must be all cores.
 fn parse_clusters(line: &Line<'_>, cores: u32) -> Result<Vec<u32>, Malformed> {
     let sizes: Vec<u32> = line.numbers(line.words.len())?;
     if sizes.contains(&0) {
@@ -363,8 +363,7 @@ fn parse_waits(line: &Line<'_>, lines: &mut Lines<'_>, dag: &mut FileDag) -> Res
     Ok(())
 }
 
-/// Refuses a case in which even a schedule on one core might end after the last
-/// time there is.
+/// Refuses a case whose schedule might end, even on a single core, after the largest 64-bit time.
 fn check_horizon(header: &Line<'_>, set: &Set) -> Result<(), Malformed> {
     let (mut last_release_ns, mut held_ns) = (0, 0);
     for FileDag { spec, subtasks, .. } in &set.dags {
@@ -386,7 +385,7 @@ fn check_horizon(header: &Line<'_>, set: &Set) -> Result<(), Malformed> {
     Ok(())
 }
 
-/// Reads what is expected of each instance and each job.
+/// Reads the expected times of each instance and each job.
 fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malformed> {
     loop {
         let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
@@ -446,7 +445,7 @@ fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malforme
     }
 }
 
-/// Returns the instance that a record names by its DAG, job and subtask.
+/// Returns the instance named by a record's DAG, job and subtask.
 fn instance_of(
     line: &Line<'_>,
     case: &Case,
@@ -463,7 +462,7 @@ fn instance_of(
     })
 }
 
-/// Refuses a case that ends without what is expected of some instance or job.
+/// Refuses a case without a record for some instance or job.
 fn check_all_told(end: &Line<'_>, case: &Case) -> Result<(), Malformed> {
     let mut left = [0; 3];
     for FileDag { spec, .. } in &case.set.dags {
@@ -490,7 +489,7 @@ fn check_all_told(end: &Line<'_>, case: &Case) -> Result<(), Malformed> {
     Ok(())
 }
 
-/// Refuses a record that has replaced an earlier one.
+/// Refuses a record that has replaced an earlier record.
 fn once<T>(line: &Line<'_>, earlier: Option<T>) -> Result<(), Malformed> {
     match earlier {
         None => Ok(()),

@@ -36,7 +36,7 @@ pub(super) static ORACLE: FileOracle<GraphCase> = FileOracle {
     schedules: None,
 };
 
-/// A set with the verdict expected of it.
+/// A set with its expected verdict.
 #[derive(Debug)]
 pub(super) struct GraphCase {
     name: String,
@@ -44,7 +44,7 @@ pub(super) struct GraphCase {
     is_edf: bool,
     dags: Vec<AbstractionDag>,
     verdict: String,
-    /// By DAG and subtask the bound, and the longest response of some runs.
+    /// For each sink: DAG, subtask, bound, and the longest response of some runs.
     sinks: Vec<[u64; 4]>,
 }
 
@@ -103,7 +103,8 @@ fn parse_dag(lines: &mut Lines<'_>, is_edf: bool) -> Result<AbstractionDag, Malf
         let deadline_ns = line.number(deadline)?;
         subtasks[line.index("subtask", sink, count)?].deadline_ns = Some(deadline_ns);
     }
-    // By number of steps to a sink: edges need not lead to larger numbers.
+    // The deadlines travel from the sinks to the sources, one edge a round: edges need not lead to
+    // larger numbers.
     let mut dues: Vec<u64> = subtasks.iter().filter_map(|of| of.deadline_ns).collect();
     for &(from, _) in &edges {
         dues[from] = u64::MAX;

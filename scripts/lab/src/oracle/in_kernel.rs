@@ -1,27 +1,27 @@
 //! Reference schedules on the bare machine: the kernel against the oracle.
 //!
-//! Cases become sets of a DAG file, whose samples are their execution times; those for the same
-//! machine run in one boot of the app `dag-file`, and their traces are compared here. For every
-//! instance start and finish must be near the reference, the number of preemptions equal; for every
-//! job the release and the miss must be equal, the finish near. *Near* is within a tolerance, a
-//! fraction of a unit below a half, so the order of events a unit apart in the reference is
-//! compared, too.
+//! Each case becomes a set of a DAG file, with the execution times as samples. Cases for the same
+//! machine run in one boot of the app `dag-file`; their traces are compared here. For every
+//! instance, start and finish must be near the reference, and the number of preemptions equal. For
+//! every job, the release and the miss must be equal, and the finish near. *Near* is within a
+//! tolerance, a fraction of a unit below a half: so the order of events a unit apart in the
+//! reference is compared, too.
 //!
 //! The differences between the model and a machine, and the measures against them:
 //!
-//! - *The kernel takes time*, microseconds for every decision and switch, more
-//!   with more cores. That shifts starts, and is most of the tolerance. So that
-//!   it does not add up along chains of instances, execution times include it: a
-//!   segment counts from the latest unit of time on (the app's word `grid_us`).
+//! - *The kernel takes time*: microseconds for every decision and switch, more with more cores. The
+//!   delay shifts starts, and is most of the tolerance. Lest delays add up along chains of
+//!   instances, execution times include them: a segment counts from the latest unit of time on (the
+//!   app's word `grid_us`).
 //! - *Simultaneous events* of the model come one after the other on a machine, in an arbitrary
-//!   order. A decision between two of them is right by the rules but not the reference's: it would
-//!   start an instance that the model does not, and without preemption that one keeps its core. The
-//!   kernel therefore treats events less than a *window* apart as one instant
-//!   (`Machine::set_coincidence`): it decides so much later, which is the other part of the
-//!   tolerance. With a window of 0 it decides at once, as it does in apps; cases without
-//!   simultaneous events pass that way too.
-//! - *Completions come before releases* of the same instant, and a finish at the
-//!   deadline is no miss: execution ends a *guard* before the unit of time does.
+//!   order. A decision between two of them is right by the rules, but not the reference's: it would
+//!   start a different instance, and without preemption that instance keeps its core. The kernel
+//!   therefore treats events less than a *window* apart as one instant
+//!   (`Machine::set_coincidence`). Every decision then comes later by the window, which is the
+//!   other part of the tolerance. With a window of 0 the kernel decides at once, as in apps; cases
+//!   without simultaneous events pass that way too.
+//! - *Completions come before releases* of the same instant, and a finish at the deadline is no
+//!   miss. For both, execution ends a *guard* before the unit of time.
 
 use std::ffi::OsString;
 use std::fs;
@@ -82,7 +82,7 @@ options! {
     MACHINE: OptionValue::OneOf(Machine::NAMES), or "microvm";
 }
 
-/// Runs the command with the words after the kind, whose files `parse` reads.
+/// Runs the command with the words after the kind; `parse` reads the files.
 pub(super) fn command(words: &[OsString], parse: Parse<Case>) -> ExitCode {
     IN_KERNEL.carry_out(words, |options| run_files(options, parse))
 }
@@ -92,7 +92,7 @@ fn run_files(options: &Arguments, parse: Parse<Case>) -> Result<ExitCode, Refusa
     let mut cases = read(options.files(), parse).map_err(Refusal::Usage)?;
     let most_cores = options.number(name::CORES_UP_TO).unwrap_or(MOST_CORES);
     let all = cases.len();
-    // The number of those left out is printed, so that they do not pass unseen.
+    // The number of cases left out is printed, lest they pass unseen.
     cases.retain(|case| u64::from(case.cores) <= most_cores);
     if cases.len() < all {
         let left_out = all - cases.len();
@@ -163,20 +163,20 @@ pub struct Settings {
     pub computes: bool,
 }
 
-/// The result of one case.
+/// The result of a case.
 #[derive(Clone, Debug)]
 pub struct CaseVerdict {
     /// The case's name.
     pub name: String,
-    /// Its number of cores.
+    /// The case's number of cores.
     pub cores: u32,
-    /// Its deviation, or the first difference, in one line.
+    /// The case's deviation, or the first difference, in one line.
     pub outcome: Result<Deviation, String>,
 }
 
 impl Settings {
-    /// Returns the settings for a unit: a guard of a 1000th and a window of a
-    /// 100th of it, and a tolerance of 2 %, deterministic, on a microvm.
+    /// Returns the settings for a unit: a guard of a 1000th and a window of a 100th of a unit, a
+    /// tolerance of 2 %, deterministic mode, and a microvm.
     pub fn for_unit(unit_us: u64) -> Self {
         Self {
             mode: Mode::Deterministic,
@@ -189,8 +189,8 @@ impl Settings {
         }
     }
 
-    /// Makes cores compute. As events then wait for what others do, the guard is a 160th and the
-    /// window a 40th of a unit, and the tolerance is 5 %.
+    /// Makes cores compute. Events then wait for other work, so the guard is a 160th and the window
+    /// a 40th of a unit, and the tolerance is 5 %.
     pub fn computing(self) -> Self {
         Self {
             guard_us: self.unit_us / 160,
@@ -212,7 +212,7 @@ impl Settings {
         self.unit_us.saturating_mul(10 * self.tolerance_percent)
     }
 
-    /// Returns the limit for a boot with these cases, in wall time.
+    /// Returns the limit for a boot with the given cases, in wall time.
     fn limit(&self, cases: &[&Case]) -> Duration {
         const FOR_BOOT: Duration = Duration::from_secs(120);
         const FOR_CASE: Duration = Duration::from_secs(5);
@@ -229,13 +229,13 @@ impl Settings {
     }
 }
 
-/// The largest number of cases of one boot: the guest has them all in memory.
+/// The largest number of cases of one boot: the guest holds all of them in memory.
 const MOST_CASES: usize = 64;
 
 /// The guest's memory.
 const MEMORY_MIB: u64 = 64;
 
-/// Runs cases in the kernel, in boots of one kind of machine each, and compares.
+/// Runs cases in the kernel, each boot on a single kind of machine, and compares.
 ///
 /// # Errors
 ///
@@ -282,7 +282,7 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<CaseVerdict>, Stri
     Ok(judged)
 }
 
-/// Returns how many cores a case is for, and the kernel's words for the rest of its machine.
+/// Returns a case's number of cores, and the kernel's words for the rest of the machine.
 fn machine_words(case: &Case) -> (u32, String) {
     let policy = case.policy.word();
     let preemption = match case.preemption {
@@ -338,8 +338,8 @@ fn boot_with(
     outcome
 }
 
-/// Judges the cases that ran and, if the guest did not run all, the one that ended it. The cases
-/// after that have not run.
+/// Judges the cases that ran. If the guest did not run all, also judges the case that ended the
+/// boot; the cases after that have not run.
 pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> Vec<CaseVerdict> {
     let mut judged = Vec::with_capacity(cases.len());
     let ending = outcome.judge().err();
@@ -417,7 +417,7 @@ j 0 0 0 1 1 0
 end
 ";
 
-    /// A run of it with units of 1 ms, which starts 10 us late and finishes 10 us early: the
+    /// A run of the case with units of 1 ms, starting 10 us late and finishing 10 us early: the
     /// commit, the events, and the output.
     const LOG: &str = r#"static 1
 0 T=4000000 D=9000000 O=0: a/0
@@ -432,7 +432,7 @@ end
 {"kind":"verdict","status":"success","reason":""}
 "#;
 
-    /// A part of that, its replacement, and the difference that it makes.
+    /// A part of the log, its replacement, and the resulting difference.
     const ALTERED: &str = r#"10000 | 20001 | dag 0 job 0 subtask 0: start: expected 0, found 0.020
 990000 finish | 979999 finish | dag 0 job 0 subtask 0: finish: expected 1, found 0.979
 990000 finish | 500000 suspend c0 0.0.0\n600000 request c0 0.0.0\n600000 resume c0 0.0.0\n990000 finish | dag 0 job 0 subtask 0: preemptions: expected 0, found 1

@@ -1,20 +1,20 @@
-//! The oracle: reference data against the scheduler, its analysis, and the baseline.
+//! The oracle: compares reference data with the scheduler, its analysis, and the baseline.
 //!
-//! `oracle KIND FILE...` reads reference files and compares each case with the results of this
-//! project. For a failing case the first difference is printed; the last line is `N passed, M
-//! failed`. The exit code is 0 if none failed, 1 if some did, and 2 if a file is malformed, which
-//! is reported with its line number, and then nothing is compared.
+//! `oracle KIND FILE...` reads reference files and compares each case with this project's results.
+//! For a failing case the first difference is printed; the last line is `N passed, M failed`. The
+//! exit code is 0 if no case failed and 1 if some did. A malformed file is reported with the line
+//! number: nothing is compared, and the exit code is 2.
 //!
-//! - [`assignment`]: cores that are owned and lent;
+//! - [`assignment`]: owned and lent cores;
 //! - [`bounds`]: the analysis at commit;
 //! - `graph`: closed lists of a schedule-abstraction graph;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`one_core`]: response times on one core;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline;
-//! - [`waiting`]: schedules and bounds of subtasks that wait, in one file.
+//! - [`waiting`]: schedules and bounds of subtasks with waits, in a single file.
 //!
-//! One kind reads no files: it simulates random sets that the analysis accepts (`responses`).
+//! The kind `responses` reads no files: it simulates random sets that the analysis accepts.
 
 pub mod assignment;
 pub mod bounds;
@@ -83,16 +83,16 @@ pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }
 
-/// A kind whose cases stand in reference files.
+/// A kind with cases from reference files.
 struct FileOracle<Case: 'static> {
-    /// The command as a person types it.
+    /// The command as typed by a person.
     invocation: &'static str,
     about: &'static str,
     parse: Parse<Case>,
     /// Compares a case, and returns the first difference.
     check: fn(&Case) -> Result<(), String>,
     name: fn(&Case) -> &str,
-    /// Reads the schedules alone, which may run on the bare machine; `None` if there are none.
+    /// Reads only the schedules, which may run on the bare machine; `None` if there are none.
     schedules: Option<Parse<schedules::Case>>,
 }
 
@@ -132,7 +132,7 @@ impl<Case> FileOracle<Case> {
     }
 }
 
-/// Reads the cases of all files, at least one.
+/// Reads the cases of all files; there must be at least one file.
 pub(crate) fn read<'f, Case>(
     names: impl ExactSizeIterator<Item = &'f Path> + Clone,
     parse: Parse<Case>,
@@ -140,7 +140,7 @@ pub(crate) fn read<'f, Case>(
     if names.len() == 0 {
         return Err("which files? name at least one reference file".into());
     }
-    // A file that is given twice would count its cases twice.
+    // A file given twice would have its cases counted twice.
     files::check_once(names.clone())?;
     let mut cases = Vec::new();
     for file in names {
@@ -152,7 +152,7 @@ pub(crate) fn read<'f, Case>(
     Ok(cases)
 }
 
-/// Compares the expected value of a case with the one found.
+/// Compares the expected value of a case with the found value.
 fn equal(place: impl Display, what: &str, expected: u64, found: u64) -> Result<(), String> {
     match expected == found {
         true => Ok(()),
@@ -167,7 +167,7 @@ mod judged {
     use super::FileOracle;
     use crate::tests::{altered, rows};
 
-    /// Makes sure that a file has so many cases, all of which agree.
+    /// Makes sure that a file has `count` cases, and that all agree.
     pub(super) fn assert_agree<Case>(oracle: &FileOracle<Case>, text: &str, count: usize) {
         let cases = (oracle.parse)(text).unwrap();
         assert_eq!(cases.len(), count);
@@ -176,8 +176,8 @@ mod judged {
         }
     }
 
-    /// Makes sure that the first case of a text differs once it is altered: in each row are a part,
-    /// another in its place, and the difference.
+    /// Makes sure that alterations make a text's first case differ. Each row holds a part, its
+    /// replacement, and the expected difference.
     pub(super) fn assert_differs<Case>(oracle: &FileOracle<Case>, text: &str, table: &str) {
         for [from, to, difference] in rows(table) {
             let cases = (oracle.parse)(&altered(text, [&from, &to])).expect("still well formed");

@@ -1,28 +1,29 @@
-//! Published bounds that the multi-path ones have replaced, for comparison with them.
+//! Published bounds, since replaced by multi-path bounds and kept for comparison.
 //!
-//! They round down, as `bounds.txt` does, and find their fixed points by small steps, which is slow
-//! where times are nanoseconds. All but the last assume `D <= T`; priorities are the order given.
+//! The bounds round down, as `bounds.txt` does. Their fixed points are found by small steps, which
+//! is slow for times in nanoseconds. All but the last assume `D <= T`; priorities are the order
+//! given.
 //!
 //! - [`graham`]: R. L. Graham, SIAM J. Applied Mathematics 17(2), 1969;
-//! - [`long_paths`]: Q. He et al., RTSS 2022: path 0 is a longest path, path `j` a longest
-//!   one when the subtasks of the earlier paths weigh nothing;
+//! - [`long_paths`]: Q. He et al., RTSS 2022: path 0 is a longest path, path `j` a longest path if
+//!   the subtasks of the earlier paths weigh nothing;
 //! - [`melani_fp`], [`melani_edf`]: A. Melani et al., IEEE Trans. Computers 66(2), 2017;
-//! - [`np_safe_fp`]: the same with the blocking of subtasks that are never preempted;
+//! - [`np_safe_fp`]: the same with the blocking of non-preemptive subtasks;
 //! - [`li_edf`]: J. Li et al., ECRTS 2014: utilisation of `m / b`, `length <= D / b`, with
 //!   `b = (3 - 2/m + sqrt(5 - 8/m + 4/m^2)) / 2`, and `D = T`;
 //! - [`bonifaci_edf`]: V. Bonifaci et al., ECRTS 2013, Theorem 21: a density of `(m + 1/2) / 3`,
-//!   `length <= D / 3`. These two say only whether deadlines are met.
+//!   `length <= D / 3`. The last two say only whether deadlines are met.
 
 use std::cmp::Reverse;
 
 use sched_dag::analysis::{Task, parallelism};
 
-/// Whether a workload is limited to as many cores as the DAG is wide.
+/// Whether a DAG's workload is limited to as many cores as the DAG's width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Width {
-    /// It may use all cores, as published.
+    /// The workload may use all cores, as published.
     Ignored,
-    /// It may not: the bound of Bertogna and Cirinei (RTSS 2007) for chains.
+    /// The width limits the workload: the bound of Bertogna and Cirinei (RTSS 2007) for chains.
     Used,
 }
 
@@ -59,7 +60,7 @@ pub(crate) fn melani_fp(tasks: &[&Task], cores: u32, width: Width) -> Option<Vec
     by_priority(tasks, cores, width, |_| 0)
 }
 
-/// Works like [`melani_fp`], for subtasks that are never preempted.
+/// Works like [`melani_fp`], for non-preemptive subtasks.
 pub(crate) fn np_safe_fp(tasks: &[&Task], cores: u32) -> Option<Vec<u64>> {
     by_priority(tasks, cores, Width::Ignored, |dag| {
         let lower = tasks[dag + 1..].iter();
@@ -113,8 +114,8 @@ pub(crate) fn bonifaci_edf(tasks: &[&Task], cores: u32) -> bool {
     is_light(tasks, 1.0 / 3.0, (f64::from(cores) + 0.5) / 3.0)
 }
 
-/// Reports whether each length is at most such a part of its deadline, and the density at most so
-/// much.
+/// Reports whether each length is at most `part` of its deadline, and the density at most
+/// `density`.
 fn is_light(tasks: &[&Task], part: f64, density: f64) -> bool {
     let mut lengths = (tasks.iter()).map(|task| (task.length_ns(), task.relative_deadline_ns()));
     let volumes = tasks.iter().map(|task| {
@@ -165,7 +166,7 @@ fn least(task: &Task, cores: u32, blocking: u64, interference: impl Fn(u64) -> u
     None
 }
 
-/// Returns the largest execution in a window, on `p` cores, of jobs that are done within `bound`.
+/// Returns the largest execution in a window, on `p` cores, of jobs done within `bound`.
 fn workload(task: &Task, p: u64, bound: u64, window: u64) -> u64 {
     let (volume, pitch) = (task.volume_ns(), p * task.period_ns());
     let area = (p * (window + bound)).checked_sub(volume);
@@ -175,7 +176,7 @@ fn workload(task: &Task, p: u64, bound: u64, window: u64) -> u64 {
     packed.min(p * window)
 }
 
-/// Returns the largest execution of jobs whose deadlines are no later than `deadline`.
+/// Returns the largest execution of jobs with deadlines no later than `deadline`.
 fn due(task: &Task, p: u64, bound: u64, deadline: u64) -> u64 {
     let (volume, own) = (task.volume_ns(), task.relative_deadline_ns());
     let jobs = (deadline.checked_sub(own)).map_or(0, |gap| gap / task.period_ns() + 1);

@@ -1,4 +1,4 @@
-//! Reference values of one core: response times that some run attains, and the published ones.
+//! Reference values of one core: response times attained by some run, and published ones.
 //!
 //! ```text
 //! case NAME edf(0/1) ndags
@@ -10,7 +10,7 @@
 //! end
 //! ```
 //!
-//! or a line for each set of sequential DAGs, the most urgent one first
+//! or a line for each set of sequential DAGs, the most urgent DAG first
 //!
 //! ```text
 //! edf C,T,D .. -> least .. | most ..
@@ -18,11 +18,11 @@
 //! waits C,T .. | C_0 W_1 C_1 .. -> most | sum joint      the last one waits
 //! ```
 //!
-//! A response time does not depend on the deadlines under static priorities, nor under EDF if all
-//! are later by the same. So they are, lest a bound be beyond its deadline. Then each set is asked
-//! as it is stated: of that a bound may lack if another one is late; none may be less or more than is
-//! expected.
-//! Pinned DAGs are refused: nothing here pins.
+//! Under static priorities a response time does not depend on the deadlines; nor does it under EDF
+//! if all deadlines are later by the same time. So a set is first compared with later deadlines,
+//! lest a bound exceed its deadline. Then the set is compared as stated: a bound may be missing if
+//! another bound is late, but none may be below or above the expected range. Pinned DAGs are
+//! refused: nothing here pins.
 
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer};
 use sched_dag::{
@@ -46,17 +46,17 @@ pub(super) static ORACLE: FileOracle<OneCoreCase> = FileOracle {
     schedules: None,
 };
 
-/// By how much all deadlines are later than those of a case.
+/// The time by which all deadlines are later than in a case, in nanoseconds.
 const LATER_NS: u64 = 10_000;
 
-/// One set of DAGs with the response times expected of it.
+/// A set of DAGs with its expected response times.
 #[derive(Debug)]
 pub struct OneCoreCase {
     /// The case's name.
     pub name: String,
     policy: Policy,
     dags: Vec<DagSpec>,
-    /// The DAG, the sink if it is of one, and the least and the most.
+    /// The DAG, the sink in the case of a sink's bound, and the least and largest expected value.
     expected: Vec<(usize, Option<usize>, [u64; 2])>,
 }
 
@@ -64,7 +64,7 @@ pub struct OneCoreCase {
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as described above.
+/// [`Malformed`] for the first record that deviates from the description above.
 pub fn parse(text: &str) -> Result<Vec<OneCoreCase>, Malformed> {
     let code = |line| {
         if str::starts_with(line, '#') {
@@ -144,7 +144,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<OneCoreCase, M
                 let of = numbers()?;
                 (of[0], Some(of[1]), values(&of[2..]))
             }
-            // A bound of waits may be any that is no more.
+            // A bound of a set with waits may be any value up to `most`.
             "w" if line.words.len() == 5 => match line.words[4] {
                 "-" => continue,
                 most => (line.number(line.words[0])?, None, [0, line.number(most)?]),
@@ -193,7 +193,7 @@ fn parse_dag(lines: &mut Lines<'_>) -> Result<DagSpec, Malformed> {
     Ok(spec)
 }
 
-/// Returns the waits of a subtask by the WCETs of segments and the limits between.
+/// Returns a subtask's waits, from the WCETs of its segments and the limits in between.
 fn waits(times: &[u64]) -> Vec<Wait> {
     let waits = times[1..].chunks_exact(2).map(|of| Wait {
         limit_ns: of[0],
@@ -245,7 +245,7 @@ fn parse_line(line: &Line<'_>) -> Result<OneCoreCase, Malformed> {
     Ok(case)
 }
 
-/// Reads sequential DAGs, of which nothing is expected yet.
+/// Reads sequential DAGs, still without expectations.
 fn parse_line_of(line: &Line<'_>, keeps: bool, sets: &str) -> Result<OneCoreCase, Malformed> {
     let mut case = OneCoreCase {
         name: format!("line {}", line.number),
@@ -270,7 +270,8 @@ fn priority_of(place: usize) -> u32 {
     u32::try_from(place).unwrap_or(u32::MAX)
 }
 
-/// Compares each bound with what is expected, where all deadlines are late, and as they are stated.
+/// Compares each bound with the expected range, first with later deadlines, then with the stated
+/// ones.
 ///
 /// # Errors
 ///
@@ -291,7 +292,8 @@ pub fn check(case: &OneCoreCase) -> Result<(), String> {
     compare(case, &stated)
 }
 
-/// Compares the bounds of DAGs with what is expected of a case: of all, if all are in time.
+/// Compares the bounds of DAGs with a case's expectations. Bounds may be missing only if some
+/// expected value exceeds its deadline.
 fn compare(case: &OneCoreCase, dags: &[DagSpec]) -> Result<(), String> {
     let is_in_time = |&(dag, subtask, [_, most]): &(usize, Option<usize>, [u64; 2])| {
         let of: &DagSpec = &dags[dag];
@@ -347,7 +349,7 @@ mod tests {
         assert_agree(&ORACLE, LINES, 200);
     }
 
-    /// The first set, with differences: a part, another in its place, what is found.
+    /// The first set, with differences: a part, its replacement, and the found difference.
     const WRONG: &str = "\
 r 0 2 2 | r 0 3 3 | dag 0: expected 3 to 3, found 2
 r 2 4 4 | r 2 3 3 | dag 2: expected 3 to 3, found 4

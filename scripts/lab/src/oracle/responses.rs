@@ -1,20 +1,20 @@
 //! `oracle responses`: random accepted sets on a simulated machine with overheads.
 //!
-//! No response may exceed its bound as long as the machine's own work takes no more than is charged
-//! for it, whatever becomes of DAGs in the set that have no bound. The scheduler is the project's
-//! own, in virtual time; its overheads are drawn, up to the charge:
+//! No response may exceed its bound as long as the machine's own work stays within the charge for
+//! it, whatever becomes of DAGs without a bound. The scheduler is the project's own, in virtual
+//! time. Its overheads are drawn at random, up to the charge:
 //!
-//! - a timer interrupt is late, and with it a release, unless a completion's step comes first;
-//! - an instance that starts keeps its core for the decision and two switches more;
-//! - a step that releases jobs takes longer, the more instances become ready, and so does one
-//!   that follows a completion, for those beyond 16; meanwhile no core executes, and no other
-//!   step begins;
-//! - a device interrupts a core as soon as it may again, when a release is due, or after a step;
-//!   meanwhile an instance there stands still, and releases wait; now and then all cores do;
-//! - a resumed instance keeps its core for an interrupt more, which is charged to the one that
-//!   preempted it, or to all that an entry may move.
+//! - a timer interrupt is late and delays its release, unless a completion's step comes first;
+//! - a starting instance keeps its core longer, for the decision and two switches;
+//! - a step that releases jobs takes longer the more instances become ready; after a completion,
+//!   only instances beyond 16 count. Meanwhile no core executes, and no other step begins;
+//! - a device interrupts a core as soon as allowed again, when a release is due, or after a step.
+//!   Meanwhile the core's instance stands still and releases wait; now and then all cores stand
+//!   still;
+//! - a resumed instance keeps its core longer, for an interrupt. The charge falls on the preempting
+//!   instance, or on all instances that a table entry may move.
 //!
-//! Observed is the response time of each job, from its nominal release.
+//! The observed figure is the response time of each job, from its nominal release.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -61,7 +61,7 @@ options! {
 #[derive(Default)]
 struct ObservedResponses {
     accepted: u64,
-    /// Those of them with a DAG that has no bound.
+    /// The accepted sets in which some DAG has no bound.
     in_part: u64,
     drawn: u64,
     responses: u64,
@@ -94,8 +94,8 @@ pub(super) fn command(words: &[OsString]) -> ExitCode {
 }
 
 impl ObservedResponses {
-    /// Draws a set, with a device or without, runs it if a DAG of it has a bound, and returns a line
-    /// for each response above its own.
+    /// Draws a set, with a device or without, and runs the set if any DAG has a bound. Returns a
+    /// line for each response above its bound.
     fn add(&mut self, seed: u64, has_device: bool) -> Vec<String> {
         let mut random = Random::new(seed);
         let (specs, options, mut costs) = sample(&mut random);
@@ -106,7 +106,7 @@ impl ObservedResponses {
         let commit = CommitOptions::new(options.policy, options.cores)
             .with_construction(ConstructionPolicy::any_graph());
         let Ok(verified) = verify(&specs, &commit) else {
-            // It has a WCET or a path beyond the deadline.
+            // The set has a WCET or a path beyond the deadline.
             return Vec::new();
         };
         let task_set = verified.task_set;
@@ -174,7 +174,8 @@ impl ObservedResponses {
 }
 
 /// Draws a set, a platform of up to 5 cores, and its overheads. Some subtasks keep their cores, or
-/// DAGs are in groups; an overhead is up to a fifth of the least WCET.
+/// DAGs are in groups. An overhead is up to a fifth of the least WCET, apart from added short
+/// subtasks.
 fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, LargestOverheads) {
     let cores = random.within(1..=5);
     let mut specs = set(random, 1_000, &[cores]);
@@ -186,7 +187,7 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, LargestOverhe
             widen(spec, random);
         }
         if random.once_in(6) {
-            // Little, but often: where it has no bound, much of it waits for others.
+            // Little work, but often: without a bound, many of the DAG's jobs wait for other DAGs.
             spec.subtasks.drain(..spec.subtasks.len() - 1);
             spec.edges.clear();
             widen(spec, random);
@@ -219,13 +220,13 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, LargestOverhe
     };
     let late_ns = random.within(0..=200);
     for spec in &mut specs {
-        // Fewer and more than are enough for the deadline.
+        // Limits below and above the number needed for the deadline.
         spec.in_flight = random.once_in(4).then(|| random.within(1..=8));
     }
     (specs, options, LargestOverheads { overheads, late_ns })
 }
 
-/// Makes a DAG slower, so that many jobs of others are released during one of it.
+/// Slows a DAG down: during each of its jobs, many jobs of other DAGs are then released.
 fn stretch(spec: &mut DagSpec, times: u64, room: u64) {
     for subtask in &mut spec.subtasks {
         subtask.wcet_ns = subtask.wcet_ns.map(|ns| ns * times);
@@ -235,8 +236,8 @@ fn stretch(spec: &mut DagSpec, times: u64, room: u64) {
     }
 }
 
-/// Adds more short subtasks to a DAG than one completion may make ready without a charge, as sources
-/// or as successors of its first subtask.
+/// Adds short subtasks to a DAG, as sources or as successors of its first subtask: more than a
+/// completion may make ready without a charge.
 fn widen(spec: &mut DagSpec, random: &mut Random) {
     let is_fork = random.once_in(2);
     for _ in 0..random.within(16..=32) {
@@ -266,7 +267,7 @@ impl LargestOverheads {
         self.overheads.device_distance_ns = takes_ns * random.within(2..=40) + 1;
     }
 
-    /// Returns the settings of an analysis that charges them.
+    /// Returns the settings of an analysis that charges the overheads.
     const fn charged(&self, options: SchedulerOptions) -> AnalysisSettings {
         // Lateness of a release is charged with the dispatch.
         let mut overheads = self.overheads;
@@ -275,7 +276,7 @@ impl LargestOverheads {
     }
 }
 
-/// How long executions and overheads take, of their maximum.
+/// The length of executions and overheads, in relation to their maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DrawnTimes {
     /// The maximum.
@@ -284,14 +285,15 @@ enum DrawnTimes {
     Drawn,
 }
 
-/// A device, with the core that it interrupts.
+/// A device, with the core it interrupts.
 struct InterruptingDevice {
     core: usize,
     /// Whether the other cores stand still, too.
     holds_all: bool,
-    /// The event that it waits for once it may interrupt again: 0 none, 1 the next release, 2 a step.
+    /// The event to wait for once interrupts are allowed again: 0 none, 1 the next release, 2 a
+    /// step.
     waits_for: usize,
-    /// When it may interrupt again, and when its last interrupt ends.
+    /// When the next interrupt is allowed, and when the last interrupt ends.
     from_ns: u64,
     until_ns: u64,
 }
@@ -310,13 +312,13 @@ impl InterruptingDevice {
 
 struct Machine<'r> {
     scheduler: Scheduler,
-    /// The instance that each core executes, and its finish.
+    /// Each core's executing instance, and its finish.
     cores: Vec<Option<(Instance, u64)>>,
     /// The remaining time of each preempted instance.
     left_ns: BTreeMap<Instance, u64>,
     /// The nominal releases of jobs in flight.
     flying: BTreeMap<(DagId, u64), u64>,
-    /// The jobs that wait for a completion.
+    /// The jobs waiting for a completion.
     queued: BTreeSet<(DagId, u64)>,
     /// Each DAG's longest response.
     longest_ns: Vec<u64>,
@@ -327,7 +329,7 @@ struct Machine<'r> {
 }
 
 impl Machine<'_> {
-    /// Runs the set until `until_ns`, and returns each DAG's longest response; a job in flight at
+    /// Runs the set until `until_ns`, and returns each DAG's longest response. A job in flight at
     /// the end counts with its time so far.
     fn longest_responses_ns(mut self, until_ns: u64) -> Vec<u64> {
         self.longest_ns = vec![0; self.scheduler.task_set().dags().len()];
@@ -355,7 +357,7 @@ impl Machine<'_> {
                 alarm = due_ns.map(|due_ns| (due_ns, due_ns + self.draw(costs.late_ns)));
             }
             let finish_ns = self.cores.iter().flatten().map(|(_, finish_ns)| *finish_ns);
-            // The timer's core is the device's.
+            // The timer interrupts the device's core, so the timer waits for the device.
             let interrupt_ns = alarm.map(|(_, at_ns)| at_ns.max(now_ns).max(self.device.until_ns));
             let next_ns = finish_ns.chain(interrupt_ns).min();
             // No step begins before the last one is over.
@@ -399,7 +401,8 @@ impl Machine<'_> {
         }
     }
 
-    /// Returns when the device interrupts next, be a release due or a step just made.
+    /// Returns the time of the device's next interrupt, given the next due release and the last
+    /// step.
     fn device_ns(&self, due_ns: Option<u64>, stepped_ns: Option<u64>) -> Option<u64> {
         let from_ns = self.device.from_ns;
         let at_ns = match self.device.waits_for {
@@ -435,8 +438,8 @@ impl Machine<'_> {
         }
     }
 
-    /// Handles a release or a completion; returns how many instances a release has made ready
-    /// for which its step takes time.
+    /// Handles a release or a completion. Returns the number of instances, made ready by a release,
+    /// for which the step takes time.
     fn hear(&mut self, notice: &DriverNotice, now_ns: u64) -> u64 {
         let (dag, job) = (notice.event.dag, notice.event.job);
         match notice.event.what {
@@ -500,7 +503,7 @@ impl Machine<'_> {
     }
 }
 
-/// Returns how many become ready beyond those for which each instance is charged already.
+/// Returns how many instances become ready beyond the 16 that each instance's own charge covers.
 fn beyond(ready: &[SubtaskId]) -> u64 {
     ready.len().saturating_sub(16) as u64
 }

@@ -1,9 +1,9 @@
 //! Reference schedules: the execution of every instance, exact to the unit.
 //!
-//! A case is a set of DAGs with the execution time of every instance, and the schedule that two
-//! independent implementations agree on ([`Case`] has the format). [`check`] replays the DAGs
-//! through the real scheduler in virtual time; [`compare`] compares a run, there or on a machine,
-//! with the case: each start, finish and number of preemptions, and of each job release, finish,
+//! A case is a set of DAGs with the execution time of every instance, and a schedule agreed on by
+//! two independent implementations ([`Case`] holds both). [`check`] replays the DAGs through the
+//! real scheduler in virtual time. [`compare`] compares a run, in virtual time or on a machine,
+//! with the case: each start, finish and number of preemptions, and each job's release, finish,
 //! response time and miss.
 
 use std::collections::BTreeMap;
@@ -21,8 +21,8 @@ pub use super::case::{Case, TimeScale, parse};
 
 use super::{FileOracle, equal};
 
-/// More cores than this are only simulated if there are as many subtasks: of each subtask at most
-/// one instance runs at a time.
+/// The number of cores that is always simulated. More cores are simulated only if there are as many
+/// subtasks: at most one instance of each subtask runs at a time.
 const ALWAYS_SIMULATED: usize = 1024;
 
 /// The kind `schedules`.
@@ -46,7 +46,7 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Returns the deviation that covers both.
+    /// Returns the deviation covering both.
     pub fn and(self, other: Self) -> Self {
         Self {
             earliest_ns: self.earliest_ns.min(other.earliest_ns),
@@ -55,7 +55,7 @@ impl Deviation {
     }
 }
 
-/// Replays a case and compares everything that it states.
+/// Replays a case and compares the whole expected schedule.
 ///
 /// # Errors
 ///
@@ -83,7 +83,7 @@ pub fn check(case: &Case) -> Result<(), String> {
         }
         RunOutcome::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
     }
-    // The run ended without an event to come, and yet jobs are left: they are stuck.
+    // The run ended without another event, yet jobs are left: they are stuck.
     if !run.is_finished() {
         return Err("some jobs have not ended".to_owned());
     }
@@ -98,13 +98,13 @@ pub fn check(case: &Case) -> Result<(), String> {
     Ok(())
 }
 
-/// Stands for the function of a subtask, of which only the turns matter.
+/// A stand-in for a subtask's function, of which only the turns matter.
 struct CaseBody {
     instance: Instance,
     limits_ns: Vec<u64>,
-    /// The turn that it is at, from 0 on.
+    /// The present turn, from 0 on.
     turn: usize,
-    /// Whether the wait before it has ended by its limit.
+    /// Whether the wait before the present turn has ended by its limit.
     has_timed_out: bool,
 }
 
@@ -156,12 +156,12 @@ impl SubtaskBody for CaseBody {
     fn replace(&mut self) {}
 }
 
-/// Executes as a case says, and answers as its devices do.
+/// The workload of a case: its execution times, and its devices' answers.
 struct CaseWorkload<'c> {
     case: &'c Case,
-    /// The answers that are on their way, and when they come.
+    /// The answers on their way, each with its time.
     answers: Vec<(u64, WaitId)>,
-    /// How many waits of each instance have ended by their limits.
+    /// The number of each instance's waits ended by their limits.
     timeouts: BTreeMap<Instance, u64>,
 }
 
@@ -191,7 +191,7 @@ impl Workload<CaseBody> for CaseWorkload<'_> {
     }
 }
 
-/// Compares the turns of a case's instances with the events of a run, as [`compare`] does the rest.
+/// Compares the turns of a case's instances with the events of a run; [`compare`] does the rest.
 ///
 /// # Errors
 ///
@@ -237,8 +237,9 @@ pub fn compare_turns(
     Ok(near.deviation)
 }
 
-/// Compares a case with the record of a run in which a unit of its time took `unit_ns`. Starts,
-/// finishes and response times may deviate by `tolerance_ns`. Returns their deviation.
+/// Compares a case with the record of a run in which a unit of the case's time took `unit_ns`.
+/// Starts, finishes and response times may deviate by `tolerance_ns`. Returns the largest
+/// deviations.
 ///
 /// # Errors
 ///

@@ -1,8 +1,8 @@
 //! Reference traces of message synchronizers: the output at each arrival.
 //!
-//! A case is a policy with its parameters, a list of arrivals, and the sets that the original
-//! emitted and the messages that it dropped at each. [`check`] feeds the arrivals to the policy of
-//! the crate `pub-sub` and compares. The records of `synchronizer.txt`:
+//! A case holds a policy with its parameters, a list of arrivals, and for each arrival the sets
+//! emitted and the messages dropped by the original. [`check`] feeds the arrivals to the policy of
+//! the crate `pub-sub` and compares the output. The records of `synchronizer.txt`:
 //!
 //! ```text
 //! case NAME exact|approximate N QUEUE_SIZE
@@ -15,9 +15,9 @@
 //! end
 //! ```
 //!
-//! Times are in nanoseconds. An exact queue size of 0 is no limit. A `SEQ` names one arrival of its
-//! topic, and must be unique. A set of messages that never arrived is a difference, not an error of
-//! the file.
+//! Times are in nanoseconds. For the exact policy, a queue size of 0 means no limit. A `SEQ` names
+//! one arrival of its topic, and must be unique. A set of messages that never arrived is a
+//! difference, not an error in the file.
 
 use std::collections::{BTreeSet, HashSet};
 use std::num::NonZeroUsize;
@@ -39,7 +39,7 @@ pub(super) static ORACLE: FileOracle<SynchronizerCase> = FileOracle {
     schedules: None,
 };
 
-/// One synchronizer with its arrivals and the expected output.
+/// A synchronizer with its arrivals and the expected output.
 #[derive(Debug)]
 pub struct SynchronizerCase {
     /// The case's name.
@@ -59,24 +59,24 @@ struct Arrival {
     expected: Departures,
 }
 
-/// The messages that leave a synchronizer during one arrival.
+/// The messages leaving a synchronizer during an arrival.
 #[derive(Clone, Debug, Default)]
 struct Departures {
-    /// For each set its sequence numbers in the order of the topics.
+    /// Each set's sequence numbers, in the order of the topics.
     sets: Vec<Vec<u64>>,
-    /// Topic and sequence number of each message that left in no set.
+    /// Topic and sequence number of each message that left without a set.
     dropped: BTreeSet<(usize, u64)>,
 }
 
-/// The most topics. Storage is reserved by their number, so one that no trace needs is refused
-/// first.
+/// The largest number of topics. Storage is reserved by their number, so a number beyond any trace
+/// is refused first.
 const MOST_TOPICS: usize = 1024;
 
 /// Reads all cases of a file.
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as described above.
+/// [`Malformed`] for the first record that deviates from the description above.
 pub fn parse(text: &str) -> Result<Vec<SynchronizerCase>, Malformed> {
     cases(text, parse_case)
 }
@@ -193,7 +193,7 @@ fn parse_arrivals(lines: &mut Lines<'_>, topics: usize) -> Result<Vec<Arrival>, 
     }
 }
 
-/// Feeds a case and compares everything that it states.
+/// Feeds a case's arrivals to its policy, and compares the whole output.
 ///
 /// # Errors
 ///
@@ -215,8 +215,8 @@ pub fn check(case: &SynchronizerCase) -> Result<(), String> {
     Ok(())
 }
 
-/// Records the messages that leave. The original does not report a message that another one
-/// replaces, but it has left, and so the traces list it.
+/// Records the leaving messages. The original does not report a message replaced by another. Since
+/// the replaced message has left, too, the traces list it.
 impl Outlet<u64> for Departures {
     fn emitted(&mut self, set: Set<'_, u64>) {
         self.sets.push(set.map(|stamped| stamped.message).collect());
@@ -269,7 +269,7 @@ mod tests {
 
     const PUBLIC: &str = include_str!("../../../../tests/oracle/synchronizer.txt");
 
-    /// One set of equal stamps, one stamp that is overtaken.
+    /// A set of equal stamps, and an overtaken stamp.
     const EXACT: &str = "case e exact 2 5
 a 0 7 1
 a 0 8 2
@@ -279,7 +279,7 @@ r 2 0 7
 end
 ";
 
-    /// A set that only a later message proves best, with a penalty of 0.
+    /// A set proven best only by a later message, with a penalty of 0.
     const APPROXIMATE: &str = "case a approximate 2 5
 approximate 100 1 0 0 0
 a 0 0 0
@@ -295,7 +295,7 @@ end
         assert_agree(&ORACLE, PUBLIC, 40);
     }
 
-    /// A part of a case, its replacement, and the difference that it makes.
+    /// A part of a case, its replacement, and the resulting difference.
     const EXACT_WRONG: &str = r"s 2 8 4 | s 2 7 4 | arrival 2 (topic 1, message 4): set 0: expected 7 4, emitted 8 4
 s 2 8 4\n |  | arrival 2 (topic 1, message 4): set 0: expected none, emitted 8 4
 s 2 8 4 | s 2 8 4\ns 2 8 999 | arrival 2 (topic 1, message 4): set 1: expected 8 999, emitted none
@@ -324,8 +324,8 @@ a 0 1 19 | a 0 1 20 | arrival 2 (topic 0, message 1): set 0: expected 1 0, emitt
         }
     }
 
-    /// The same for refusals: with the line and the reason. The tests of bounds cover faults that
-    /// lines of every kind of file can have.
+    /// The same for refusals: with the line and the reason. The tests of bounds cover faults common
+    /// to the lines of all files.
     const EXACT_MALFORMED: &str = r"exact 2 5 | exactly 2 5 | 1 | found `exactly`
 exact 2 5 | exact 0 5 | 1 | 1 to 1024 topics
 exact 2 5 | exact 1025 5 | 1 | 1 to 1024 topics

@@ -1,7 +1,7 @@
-//! Reference values of subtasks that wait: schedules and bounds, in one file.
+//! Reference values of subtasks with waits: schedules and bounds, in one file.
 //!
-//! A file has blocks that begin with `case`, which are [schedules], and blocks that begin with
-//! `bounds`, which [`bounds`] reads; each ends with `end`.
+//! A file has two kinds of blocks. A block from `case` to `end` is one of the [schedules];
+//! [`bounds`] reads a block from `bounds` to `end`.
 
 use text::{Malformed, blocks};
 
@@ -23,7 +23,7 @@ pub(super) static ORACLE: FileOracle<WaitingCase> = FileOracle {
     schedules: Some(parse_schedules),
 };
 
-/// One block of a file.
+/// A block of a file.
 #[derive(Debug)]
 pub enum WaitingCase {
     /// A schedule.
@@ -36,7 +36,7 @@ pub enum WaitingCase {
 ///
 /// # Errors
 ///
-/// [`Malformed`] for the first record that is not as described in the modules.
+/// [`Malformed`] for the first record that deviates from the modules' descriptions.
 pub fn parse(text: &str) -> Result<Vec<WaitingCase>, Malformed> {
     blocks(text, &["case", "bounds"], |header, lines| {
         match header.kind {
@@ -55,11 +55,7 @@ fn parse_schedules(text: &str) -> Result<Vec<Case>, Malformed> {
     Ok(parse(text)?.into_iter().filter_map(schedule).collect())
 }
 
-/// Compares everything that a block states.
-///
-/// # Errors
-///
-/// The first difference, in one line.
+/// Compares all values of a block.
 pub fn check(case: &WaitingCase) -> Result<(), String> {
     match case {
         WaitingCase::Schedule(case) => schedules::check(case),
@@ -88,7 +84,7 @@ mod tests {
         FILE[begin..].split_inclusive("end\n").next().unwrap()
     }
 
-    /// A part of the first set, its replacement, and the difference that it makes.
+    /// A part of the first set, its replacement, and the resulting difference.
     const WRONG: &str = "\
 len 35 | len 36 | dag 1: len: expected 36, computed 35
 vol 102 | vol 101 | dag 1: vol: expected 101, computed 102
