@@ -1,9 +1,9 @@
 //! The subcommand `soak`: random DAG sets for a long time, everything checked.
 //!
 //! A *round* is a random scenario (`tests/scenarios/src/random.rs`). The guest of the boot tests
-//! draws a round, runs it twice, and checks after each run what it can: rules, accounts,
-//! allocations, memory, stacks. Here each round is a boot, several at a time, and the trace of each
-//! run is judged by the same rules, from other evidence.
+//! draws a round, runs the scenario twice, and after each run checks everything within its reach:
+//! rules, accounts, allocations, memory, stacks. Here each round is a boot, several at a time, and
+//! each run's trace is judged by the same rules, from other evidence.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -29,7 +29,7 @@ use views::findings::check;
 use views::protocol::MachineLine;
 use views::record::{COUNTED_TOLERANCE_NS, Run};
 
-/// The table of `soak`.
+/// The command-line table of `soak`.
 static SOAK: Command = Command {
     invocation: "./scripts/soak",
     about: "Runs random DAG sets on the bare machine for a long time, and checks everything.",
@@ -125,14 +125,15 @@ pub fn soak(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Runs the property that holds bounds against virtual time, for so many jobs, as fast as it can
-/// be. Reports whether it holds.
+/// Runs the property test that compares bounds with virtual time, for `jobs` jobs, with full
+/// optimization. Reports whether the property holds.
 fn simulate(jobs: u64) -> Result<bool, String> {
     let test = ["sched-dag", "it", "bounds_hold_whatever"];
     hold(test, &[("ANALYSIS_JOBS", jobs)])
 }
 
-/// Has tests hear so many of something with wrong bytes, whose name they look for.
+/// Runs tests that hear frames or messages with wrong bytes. Each test finds the number in the
+/// environment variable named by `what`.
 fn hear(what: &str, tests: [([&str; 3], u64); 2], seed: u64) -> Result<ExitCode, String> {
     let mut are_heard = true;
     for (test, count) in tests {
@@ -141,8 +142,8 @@ fn hear(what: &str, tests: [([&str; 3], u64); 2], seed: u64) -> Result<ExitCode,
     Ok(ExitCode::from(u8::from(!are_heard)))
 }
 
-/// Runs a test of a package, given by its target and name, with these numbers in its environment,
-/// and reports whether it passes. The package is as fast as it can be.
+/// Runs a test of a package, given by its target and name, with the given numbers in its
+/// environment, and reports whether the test passes. The package is fully optimized.
 fn hold([package, target, test]: [&str; 3], numbers: &[(&str, u64)]) -> Result<bool, String> {
     let mut cargo = system::cargo();
     for package in [package, "random"] {
@@ -218,16 +219,16 @@ fn conclude(report: &SoakReport) -> ExitCode {
     ExitCode::from(u8::from(report.failed > 0))
 }
 
-/// The guest that draws rounds, by its package.
+/// The guest drawing the rounds, by its package.
 const GUEST: &str = "guest-tests";
 
-/// The guest's memory, up to a quarter of which is for journals.
+/// The guest's memory, in MiB; up to a quarter is for journals.
 const MEMORY_MIB: u64 = 256;
 
 /// The number of runs of a round.
 const RUNS_A_ROUND: u64 = 2;
 
-/// The number of breaches of a run that are shown.
+/// The largest number of breaches shown for a run.
 const SHOWN: usize = 5;
 
 /// The rounds to run, and their settings.
@@ -243,9 +244,9 @@ pub struct SoakPlan {
     pub cores: u64,
     /// The meaning of time.
     pub mode: Mode,
-    /// The longest time for which an instance may wait for a core that the rules owe it.
+    /// The longest time an instance may wait for a core owed by the rules.
     pub bound_ns: u64,
-    /// The number of guests that run at the same time.
+    /// The number of guests running at the same time.
     pub side_by_side: usize,
 }
 
@@ -257,13 +258,13 @@ pub struct SoakReport {
     /// The number of DAGs with each combination of policy, overrun policy, division of the cores,
     /// fault, restart and pause.
     pub dags: BTreeMap<String, u64>,
-    /// The longest time for which an instance waited although it should have run.
+    /// The longest time an instance waited although due to run.
     pub longest_wait_ns: u64,
-    /// A line for each failure, with the command that repeats it.
+    /// A line for each failure, with the command to repeat its round.
     pub failures: Vec<String>,
     /// The rounds without a failure.
     pub passed: u64,
-    /// The rounds with one.
+    /// The rounds with a failure.
     pub failed: u64,
 }
 
@@ -286,7 +287,7 @@ impl SoakPlan {
         ..Self::LONG
     };
 
-    /// Returns the command that runs one round again.
+    /// Returns the command to run one round again.
     fn command(&self, round: u64) -> String {
         let SoakPlan {
             round_ms,

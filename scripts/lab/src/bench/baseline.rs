@@ -1,9 +1,9 @@
-//! The figures kept in the repository, the comparison with new ones, and the tables.
+//! The figures kept in the repository, their comparison with new figures, and the tables.
 //!
 //! A baseline holds counted instructions, which repeat exactly on one core: a difference comes from
-//! a change of the code, of the compiler or of what counts. On several cores a rare interrupt may come
-//! some nanoseconds later, so there the margin is wider and the p99 does not count. [`MARGIN_RULE`]
-//! says when a figure has *grown*.
+//! a change of the code, of the compiler or of the counting. On several cores a rare interrupt may
+//! come some nanoseconds later; there the margin is wider and the p99 does not count.
+//! [`MARGIN_RULE`] says when a figure has *grown*.
 
 use std::fs;
 use std::iter;
@@ -21,24 +21,24 @@ use views::json::{self, Object};
 pub(super) struct Baseline {
     /// The path, relative to the workspace's root.
     pub(super) file: &'static str,
-    /// The command that writes the file anew.
+    /// The command for writing the file anew.
     pub(super) saved_by: &'static str,
 }
 
-/// The rule for a figure that has grown, in words; [`margin`] implements it.
+/// The rule for grown figures, in words; [`margin`] implements the rule.
 const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
      instructions, the jitter by 20; a commit by more than 10 %; on several cores the median \
      by more than 10 % and 40";
 
-/// Returns the margin of a figure: in per cent, and in instructions a step. It has grown only if it
-/// exceeds both, since one instruction of a few is many per cent.
+/// Returns the margin of a figure: in per cent, and in instructions a step. A figure has grown only
+/// by more than both, since one instruction of a few is many per cent.
 fn margin(figure: &Figure) -> (u128, u128) {
     match &*figure.figure {
         // A single count more in each step is a change.
         _ if figure.is_count() => (3, 0),
         _ if figure.cores > 1 => (10, 40),
         "commit" => (10, 0),
-        // It is a difference of two times, each with a margin.
+        // The jitter is a difference of two times, each with a margin.
         "release_jitter" => (3, 20),
         _ => (3, 4),
     }
@@ -71,8 +71,8 @@ impl Baseline {
             .map_err(|why| format!("the baseline `{file}`: {why}; `{saved_by}` writes it anew"))
     }
 
-    /// Compares new figures with those before, if there are any, and keeps them if `saves` says so.
-    /// Prints a table, and reports whether no figure has grown.
+    /// Compares new figures with the figures before, if any, and keeps the new figures if `saves`
+    /// says so. Prints a table, and reports whether no figure has grown.
     ///
     /// # Errors
     ///
@@ -210,8 +210,8 @@ pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
 }
 
 impl Baseline {
-    /// Prints the table of baseline, present figures and ratios, and returns a line for each figure that
-    /// has grown or is missing.
+    /// Prints the table of baseline, present figures and ratios, and returns a line for each grown
+    /// or missing figure.
     fn comparison(&self, now: &[Figure], baseline: &[Figure]) -> Vec<String> {
         let columns = "instructions:<60|baseline:12|now:11|ratio:8|p99 was:12|p99 is:11|:0";
         let mut table = Table::new("", columns);

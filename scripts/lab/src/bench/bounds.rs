@@ -1,8 +1,8 @@
-//! Sets of DAGs that methods of analysis accept.
+//! Sets of DAGs accepted by methods of analysis.
 //!
-//! The share of random sets by utilization, for the division of cores that lends them and for other
-//! methods (`acceptance`), or of sets that files give. No time is measured, so the table is the same
-//! on every host.
+//! Gives the share of random sets by utilization, or the share of sets from files, for the division
+//! into lent cores and for other methods (`acceptance`). No time is measured, so the table is the
+//! same on every host.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&COMMAND, words, BoundsPlan::new, measure)
 }
 
-/// Counts and prints; true, as no share has a limit.
+/// Counts and prints. Always returns true, as no share has a limit.
 fn measure(plan: &BoundsPlan) -> Result<bool, String> {
     let BoundsPlan { files, out, .. } = plan;
     let has_ceiling = plan.has_ceiling;

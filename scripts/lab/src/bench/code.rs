@@ -1,4 +1,4 @@
-//! The code of an image: its instructions, and the functions that contain them.
+//! The code of an image: its instructions, and the functions containing the instructions.
 //!
 //! `objdump` and `addr2line` of binutils provide both.
 
@@ -9,7 +9,7 @@ use std::process::Command;
 use tool::places::{self, Frame};
 use tool::system;
 
-/// For each address the functions that contain it, the innermost first.
+/// For each address, the functions containing the address, the innermost first.
 pub(super) type Frames = BTreeMap<u64, Vec<Frame>>;
 
 /// The largest number of addresses in one command line, with room to spare.
@@ -31,7 +31,7 @@ pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String
     Ok(text.lines().filter_map(instruction).collect())
 }
 
-/// Returns the functions that contain each of some addresses.
+/// Returns the functions containing each of some addresses.
 ///
 /// # Errors
 ///
@@ -47,9 +47,9 @@ pub(super) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> 
     Ok(all)
 }
 
-/// Returns the innermost frame of an address that is in a file of ours: its line, relative to the
-/// workspace's root, such as `fass/src/run/plan.rs:183`, and its function. So code of the library
-/// counts for the file that uses it.
+/// Returns an address's innermost frame in a file of ours: the line, relative to the workspace's
+/// root, such as `fass/src/run/plan.rs:183`, and the function. So library code counts for the file
+/// that uses it.
 pub(super) fn own(frames: &[Frame]) -> Option<(&str, &str)> {
     let root = system::workspace().to_str()?;
     frames.iter().find_map(|frame| {

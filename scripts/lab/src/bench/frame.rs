@@ -1,9 +1,9 @@
-//! The framework that all measurements share.
+//! The framework shared by all measurements.
 //!
 //! - [`by_plan`]: from a command line to an exit code;
-//! - [`judged`]: a run of a guest or a program whose lines are read if it is good;
-//! - [`Figure`]: one measured quantity, as a guest prints it and as a baseline keeps it;
-//! - [`draw`]: pictures, by the Python scripts of `scripts/plot`, where these can run.
+//! - [`judged`]: a run of a guest or a program, with its lines read after success;
+//! - [`Figure`]: a measured quantity, as printed by a guest and as kept by a baseline;
+//! - [`draw`]: pictures, by the Python scripts of `scripts/plot`, where Python has matplotlib.
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -34,12 +34,13 @@ pub(super) fn by_plan<Plan>(
     })
 }
 
-/// Runs a measurement with a new log, and returns what `read` finds in its lines. `what` names it
-/// in errors.
+/// Runs a measurement with a new log, and returns the result of `read` on the outcome. `what` names
+/// the measurement in errors.
 ///
 /// # Errors
 ///
-/// In words: it could not be run, has failed, or its lines are malformed; then the log stays.
+/// In words: the measurement could not be run, has failed, or printed malformed lines; then the log
+/// stays.
 pub(super) fn judged<T>(
     what: impl Display,
     name: &str,
@@ -56,20 +57,20 @@ pub(super) fn judged<T>(
     Ok(found)
 }
 
-/// One measured quantity of one workload on a number of cores.
+/// A measured quantity of one workload on a number of cores.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Figure {
     pub(super) cores: u64,
     pub(super) workload: String,
     pub(super) figure: String,
-    /// The number of steps that each of the numbers below covers.
+    /// The number of steps covered by each of the numbers below.
     pub(super) per: u64,
     pub(super) median: u64,
     pub(super) p99: u64,
     pub(super) max: u64,
-    /// The least sample; a baseline does not keep it.
+    /// The least sample; baselines do not keep it.
     pub(super) min: u64,
-    /// The number of samples; a baseline does not keep it.
+    /// The number of samples; baselines do not keep it.
     pub(super) samples: u64,
 }
 
@@ -105,12 +106,13 @@ impl Figure {
         figures.collect()
     }
 
-    /// Reads a figure as [`json`](Self::json) writes it.
+    /// Reads a figure written by [`json`](Self::json).
     pub(super) fn from_json(value: &Value) -> Option<Self> {
         Self::read(value, value.get("cores")?.as_u64()?, value)
     }
 
-    /// Reads a figure; `numbers` is the object with its numbers, a member or the same one.
+    /// Reads a figure; `numbers` is the object with the figure's numbers: a member of `value`, or
+    /// `value` itself.
     fn read(value: &Value, cores: u64, numbers: &Value) -> Option<Self> {
         let text = |name| value.get(name)?.as_text().map(String::from);
         let number = |name| numbers.get(name)?.as_u64();
@@ -127,7 +129,7 @@ impl Figure {
         })
     }
 
-    /// Adds the members of the figure to an object, and returns its text.
+    /// Adds the members of the figure to an object, and returns the object's text.
     pub(super) fn json(&self, begun: Object) -> String {
         begun
             .number("cores", self.cores)
@@ -145,17 +147,17 @@ impl Figure {
         (self.cores, &self.workload, &self.figure) == (other.cores, &other.workload, &other.figure)
     }
 
-    /// Returns whether it counts something other than time or instructions.
+    /// Returns whether the figure counts something other than time or instructions.
     pub(super) fn is_count(&self) -> bool {
         matches!(&*self.figure, "allocations" | "locks" | "sink_wakeups")
     }
 
-    /// Returns one of its numbers per step.
+    /// Returns one of the figure's numbers per step.
     pub(super) fn of_step(&self, number: u64) -> f64 {
         number as f64 / self.per as f64
     }
 
-    /// Returns one of its numbers per step, as text.
+    /// Returns one of the figure's numbers per step, as text.
     pub(super) fn one(&self, number: u64) -> String {
         let decimals = match (self.per, self.is_count()) {
             (1, _) => 0,
@@ -166,7 +168,8 @@ impl Figure {
     }
 }
 
-/// Runs a script of `scripts/plot` on the results in `out`; it draws into a folder `plots` there.
+/// Runs a script of `scripts/plot` on the results in `out`. The pictures go into a folder `plots`
+/// there.
 ///
 /// # Errors
 ///

@@ -1,14 +1,14 @@
 //! Measurements on the host, for people and for machines.
 //!
 //! `bench WHAT` measures one part of the project on this host, in this build, and prints a table
-//! and one JSON object for each figure. Times depend on the host and its load, so none of them has
-//! a limit; counted instructions have. The exit code is 0 if all limits hold, 1 if one does not,
-//! and 2 for a refused command line.
+//! and a JSON object for each figure. Times depend on the host and its load, so no time has a
+//! limit; counts of instructions and bytes have. The exit code is 0 if all limits hold, 1 if any
+//! does not, and 2 for a refused command line.
 //!
-//! - [`bounds`]: random sets of DAGs that methods of analysis accept;
+//! - [`bounds`]: random sets of DAGs accepted by methods of analysis;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
-//! - [`native`]: the scheduler on this host's own processors;
+//! - [`native`]: the scheduler on the host's own processors;
 //! - [`sizes`]: the size of each part of an image.
 
 mod acceptance;

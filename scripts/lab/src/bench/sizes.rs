@@ -1,10 +1,10 @@
 //! The size of each part of an image.
 //!
-//! An instruction belongs to one part: of the functions that it was inlined from, the innermost in
-//! a file of ours decides, so code of the library counts for the part that uses it. A part is a
-//! folder or file right below a crate's `src`. Code from no file of ours, such as the code that
-//! drops a value, is listed apart, and so is everything other than code: constants, variables that
-//! do not begin as zeros, headers.
+//! An instruction belongs to a single part. Among the functions the instruction was inlined from,
+//! the innermost in a file of ours decides, so library code counts for the part that uses it. A
+//! part is a folder or file right below a crate's `src`. Code from no file of ours, such as the
+//! code for dropping values, is listed separately, and so is everything other than code: constants,
+//! variables with nonzero initial values, headers.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -76,8 +76,8 @@ fn weigh(app: &str) -> Result<bool, String> {
     Ok(stripped <= most)
 }
 
-/// Returns the bytes of each part. An instruction extends to the next one; the last one, and one
-/// before a gap, counts as one byte.
+/// Returns the bytes of each part. An instruction extends to the next instruction. The last
+/// instruction, and any before a gap, counts as one byte.
 fn parts(addresses: &[u64], frames: &Frames) -> BTreeMap<String, u64> {
     /// The length of the longest instruction (Intel SDM, volume 2, 2.3.11).
     const LONGEST: u64 = 15;

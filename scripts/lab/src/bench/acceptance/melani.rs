@@ -1,9 +1,10 @@
 //! Graphs by A. Melani's generator (A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela,
 //! G. Buttazzo, ECRTS 2015), with the numbers of awkernel's comparison of scheduling methods.
 //!
-//! A subtask is expanded into branches between a fork and a join, a branch again with a chance of
-//! 80 %, up to a depth. Then edges are added, each with a chance of 10 %, from a subtask to one of a
-//! later level, and those that a longer way makes needless are left out. WCETs are 1 to 100.
+//! A subtask is expanded into branches between a fork and a join. A branch is expanded again with a
+//! chance of 80 %, up to a depth. Then edges are added from subtasks to subtasks of later levels,
+//! each with a chance of 10 %; edges made needless by a longer way are left out. WCETs are 1 to
+//! 100.
 
 use random::Random;
 use sched_dag::analysis::Task;
@@ -12,7 +13,7 @@ use sched_dag::analysis::Task;
 const EXPANDED: u64 = 80;
 const ADDED: u64 = 10;
 
-/// Draws a graph with so many branches at most, and forks in forks up to a depth.
+/// Draws a graph with at most `branches` branches a fork, and forks in forks up to a depth.
 pub(super) fn graph(random: &mut Random, branches: usize, depth: i32) -> Task {
     let mut graph = NestedForks {
         levels: vec![depth, -depth],
@@ -29,9 +30,9 @@ pub(super) fn graph(random: &mut Random, branches: usize, depth: i32) -> Task {
     Task::new(1, 1, wcets, &edges).expect("edges lead to later levels")
 }
 
-/// A graph that grows.
+/// A growing graph.
 struct NestedForks {
-    /// By subtask, how deep below a fork the rest is; less than 0 after the joins.
+    /// For each subtask, the depth of forks still possible below; negative for joins.
     levels: Vec<i32>,
     successors: Vec<Vec<usize>>,
 }
@@ -58,7 +59,7 @@ impl NestedForks {
         }
     }
 
-    /// Adds edges, then takes out those that are implied.
+    /// Adds edges, then takes out implied edges.
     fn add_edges(&mut self, random: &mut Random) {
         let count = self.levels.len();
         for from in 0..count {
@@ -77,7 +78,7 @@ impl NestedForks {
         }
     }
 
-    /// Returns by subtask whether edges lead there.
+    /// Returns for each subtask whether edges lead there.
     fn reached(&self, from: usize) -> Vec<bool> {
         let mut reached = vec![false; self.levels.len()];
         let mut open = vec![from];

@@ -1,25 +1,25 @@
-//! The methods that are compared: ways to divide cores among DAGs, and a fluid bound.
+//! The compared methods: ways to divide cores among DAGs, and a fluid bound.
 //!
-//! - *Graham*: federated scheduling as the literature has it;
-//! - *multi-path*: federated scheduling by the multi-path bound, with light DAGs as V-Fed partitions
-//!   them, or else global fixed priorities;
+//! - *Graham*: federated scheduling as in the literature;
+//! - *multi-path*: federated scheduling by the multi-path bound, with light DAGs partitioned as in
+//!   V-Fed, or else global fixed priorities;
 //! - *V-Fed*: virtually-federated scheduling (X. Jiang, N. Guan, H. Liang, Y. Tang, L. Qiao, W. Yi,
 //!   RTSS 2021; with light DAGs: X. Jiang, H. Liang, N. Guan, Y. Tang, L. Qiao, Y. Wang, IEEE TPDS
 //!   34(1), 2023);
 //! - *lent*: the analysis of tables in `docs/bounds.md`, with tables of one DAG only;
-//! - *table*: the same with all tables, where the DAGs are periodic;
-//! - *fluid*: the density test of DAG-Fluid (F. Guan, L. Peng, J. Qiao, IEEE TC 71(8), 2022).
+//! - *table*: the same with all tables, for periodic DAGs;
+//! - *fluid*: the density test of DAG-Fluid (F. Guan, L. Peng, J. Qiao, IEEE TC 71(8), 2022);
+//! - *unrefuted*: no test: all DAGs released together meet their deadlines in a run under global
+//!   EDF on all cores. No test of global EDF can accept more.
 //!
-//! V-Fed and fluid stand here for comparison only: no scheduler of this project does what they
-//! assume. They were written after another implementation, and agree with the worked examples that
-//! its tests quote from the papers. V-Fed stands in both forms: in the second one a heavy DAG never
-//! executes on more of its cores than a *parallelism*, drawn for each DAG by a hash, as the paper
-//! draws it, from half its cores to all. Sums of fractions are floating-point numbers, so a set that a
-//! test accepts with equality may be refused.
-//! - *unrefuted*: no test: all DAGs released together meet their deadlines in a run under global EDF
-//!   on all cores. No test of global EDF can accept more.
+//! V-Fed and fluid are here for comparison only: no scheduler of this project fulfils their
+//! assumptions. Both were written after another implementation, and agree with the papers' worked
+//! examples, as quoted by the tests of that implementation. V-Fed comes in two forms: in the second
+//! form a heavy DAG never executes on more of its cores than a *parallelism*, drawn for each DAG by
+//! a hash from half its cores to all, as in the paper. Sums of fractions are floating-point
+//! numbers, so a set accepted by a test with equality may be refused.
 //!
-//! Assumes `D <= T`; `V` is the volume, `L` the length.
+//! All methods assume `D <= T`; `V` is the volume, `L` the length.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -91,9 +91,9 @@ pub(super) const METHODS: [Method; 8] = [
     },
 ];
 
-/// The shares of small sets on 4 cores, by deadlines and utilization in percent, of He's analysis of
-/// global static priorities (IEEE TPDS 30(10), 2019) in the library mive93/DAG-scheduling, commit
-/// 7ccd59d5, measured once on other draws.
+/// The shares of small sets on 4 cores accepted by He's analysis of global static priorities (IEEE
+/// TPDS 30(10), 2019), by deadlines and utilization in percent. Measured once, on other draws, with
+/// the library mive93/DAG-scheduling, commit 7ccd59d5.
 pub(super) const HE: [(Deadlines, u64, u64); 7] = [
     (Deadlines::Implicit, 50, 98),
     (Deadlines::Implicit, 60, 83),
@@ -104,14 +104,14 @@ pub(super) const HE: [(Deadlines, u64, u64); 7] = [
     (Deadlines::Constrained, 60, 6),
 ];
 
-/// The length of a run that may refute a set.
+/// The length of a run that may refute a set, in longest periods.
 const LONGEST_PERIODS: u64 = 10;
 
 const fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.relative_deadline_ns()
 }
 
-/// Divides the cores as a commit does, of DAGs with all offsets 0.
+/// Divides the cores as a commit does, for DAGs with all offsets 0.
 fn by_tables(tasks: &[&Task], cores: u32) -> bool {
     let terms = TableTerms {
         offset_ns: Some(0),
@@ -128,8 +128,8 @@ fn by_tables(tasks: &[&Task], cores: u32) -> bool {
 }
 
 /// Gives each heavy DAG the least number of cores by the multi-path bound, and partitions the light
-/// ones on the rest; or lets all share all cores by deadline-monotonic priorities, with the bound
-/// that clips interference but does not look at chains.
+/// DAGs on the rest. Or lets all DAGs share all cores by deadline-monotonic priorities, with the
+/// bound that clips interference but does not look at chains.
 fn by_multi_path(tasks: &[&Task], cores: u32) -> bool {
     let (heavy, light): (Vec<&Task>, Vec<&Task>) = tasks.iter().partition(|task| is_heavy(task));
     let left = heavy.iter().try_fold(cores, |left, task| {
@@ -147,17 +147,17 @@ fn by_multi_path(tasks: &[&Task], cores: u32) -> bool {
 /// The budget of a DAG on a core.
 #[derive(Clone, Copy)]
 struct CoreBudget {
-    /// The most that the owner executes of one job.
+    /// The longest execution of one of the owner's jobs on the core.
     budget_ns: u64,
-    /// The owner's.
+    /// The owner's period.
     period_ns: u64,
-    /// The owner's, by which its budget is spent.
+    /// The owner's deadline, by which the budget is spent.
     deadline_ns: u64,
 }
 
 impl CoreBudget {
-    /// Returns the least time that it leaves in any window of a length. The worst one begins as the
-    /// owner does, so late that it ends at its deadline.
+    /// Returns the least time that the budget leaves in any window of a length. The worst window
+    /// begins together with the owner's budget, spent so late that its end is at the deadline.
     fn supply_ns(self, window_ns: u64) -> u64 {
         let Some(after_ns) = window_ns.checked_sub(self.budget_ns) else {
             return 0;
@@ -170,12 +170,12 @@ impl CoreBudget {
     }
 }
 
-/// The time that budgets leave: a *passive virtual processor*.
+/// The time left by budgets: a *passive virtual processor*.
 #[derive(Clone)]
 enum PassiveProcessor {
-    /// Of a core with a budget.
+    /// The time left on a core with a budget.
     Left(CoreBudget),
-    /// Of a core that its owner does not need beside as many others as its parallelism.
+    /// A whole core: the owner has as many other cores as its parallelism.
     Whole,
     /// An equal part of the cores of an owner, for as many processors as its parallelism.
     Shared(Rc<[CoreBudget]>, u64),
@@ -197,8 +197,8 @@ impl PassiveProcessor {
     }
 }
 
-/// Takes processors for a DAG, the first that are of use, until `V <= base + sum of (supply - L)`;
-/// at least one. If they are too few, none is taken.
+/// Takes processors for a DAG, the first useful ones, until `V <= base + sum of (supply - L)`; at
+/// least one. If there are too few, takes none.
 fn takes(pool: &mut Vec<PassiveProcessor>, task: &Task, base_ns: u64) -> bool {
     let (deadline_ns, length_ns) = (task.relative_deadline_ns(), task.length_ns());
     let mut have_ns = u128::from(base_ns);
@@ -219,7 +219,7 @@ fn takes(pool: &mut Vec<PassiveProcessor>, task: &Task, base_ns: u64) -> bool {
     is_enough
 }
 
-/// Returns a heavy DAG's parallelism: of the cores that it needs by federated scheduling half to all.
+/// Returns a heavy DAG's parallelism: half to all of the cores needed by federated scheduling.
 fn parallelism(task: &Task) -> u64 {
     let (volume_ns, length_ns) = (task.volume_ns(), task.length_ns());
     let cores = (volume_ns - length_ns).div_ceil(task.relative_deadline_ns() - length_ns);
@@ -227,7 +227,8 @@ fn parallelism(task: &Task) -> u64 {
     Random::new(seed).within(cores.div_ceil(2)..=cores)
 }
 
-/// Divides cores by virtually-federated scheduling, with the fewest for heavy DAGs that do.
+/// Divides cores by virtually-federated scheduling, with the fewest sufficient cores for heavy
+/// DAGs.
 fn virtually_federated(tasks: &[&Task], cores: u32, most: fn(&Task) -> u64) -> bool {
     let (mut heavy, mut light): (Vec<&Task>, Vec<&Task>) =
         tasks.iter().partition(|task| is_heavy(task));
@@ -255,8 +256,8 @@ fn virtually_federated(tasks: &[&Task], cores: u32, most: fn(&Task) -> u64) -> b
     are_partitioned(light, cores - count)
 }
 
-/// Gives heavy DAGs budgets on cores, and to those for which these are too few what others' budgets
-/// leave. Returns the passive processors that nobody has taken; `most` is the parallelism of a DAG.
+/// Gives heavy DAGs budgets on cores. A DAG with too few cores also takes time left by others'
+/// budgets. Returns the passive processors still free; `most` is the parallelism of a DAG.
 fn own_processors(
     heavy: &[&Task],
     cores: u32,
@@ -291,7 +292,7 @@ fn own_processors(
             pool.extend((0..parallelism).map(|_| shared.clone()));
         }
         if unserved_ns > 0 {
-            // The cores are spent: this one has some, those after it none.
+            // The cores are spent: the present DAG has some, later DAGs have none.
             let is_served = takes(&mut pool, task, volume_ns - unserved_ns)
                 && tasks.all(|task| takes(&mut pool, task, task.length_ns()));
             return is_served.then_some(pool);
@@ -300,12 +301,13 @@ fn own_processors(
     Some(pool)
 }
 
-/// Partitions light DAGs, by deadline, each on the fullest core (by utilization) that takes it by
-/// the approximate demand under EDF (S. Baruah, N. Fisher, RTSS 2005).
+/// Partitions light DAGs in the order of deadlines. Each goes to the fullest core (by utilization)
+/// with room for it, by the approximate demand under EDF (S. Baruah, N. Fisher, RTSS 2005).
 fn are_partitioned(mut light: Vec<&Task>, cores: u32) -> bool {
     let utilization = |task: &Task| task.volume_ns() as f64 / task.period_ns() as f64;
     light.sort_by_key(|task| task.relative_deadline_ns());
-    // By core, the sums of utilizations, and of the demands V - u D before those grow by u a time.
+    // For each core, the sums of the utilizations u and of V - u D. The demand by a time t is the
+    // second sum, plus t times the first.
     let mut bins = vec![(0.0, 0.0); cores as usize];
     light.into_iter().all(|task| {
         let (volume, of_task) = (task.volume_ns() as f64, utilization(task));
@@ -313,7 +315,7 @@ fn are_partitioned(mut light: Vec<&Task>, cores: u32) -> bool {
         let fits = |&&mut (sum, base): &&mut (f64, f64)| {
             base + sum * deadline + volume <= deadline && sum + of_task <= 1.0
         };
-        // Of equally full ones the first.
+        // Among equally full cores the first.
         let fullest = bins.iter_mut().rev().filter(fits);
         let Some((sum, base)) = fullest.max_by(|one, other| one.0.total_cmp(&other.0)) else {
             return false;
@@ -324,8 +326,8 @@ fn are_partitioned(mut light: Vec<&Task>, cores: u32) -> bool {
     })
 }
 
-/// Reports whether no DAG is late in a run of some of the longest periods under global EDF, with
-/// WCETs, all released at once.
+/// Reports whether no DAG is late in a run of [`LONGEST_PERIODS`] longest periods under global EDF,
+/// with WCETs and all DAGs released at once.
 fn is_unrefuted(tasks: &[&Task], cores: u32) -> bool {
     let specs: Vec<DagSpec> = tasks.iter().map(|task| spec(task)).collect();
     let policy = Policy::Edf;
@@ -349,7 +351,7 @@ fn is_unrefuted(tasks: &[&Task], cores: u32) -> bool {
     dags.all(|dag| run.scheduler_of(dag).statistics(dag).misses == 0)
 }
 
-/// Returns a DAG as a commit states it.
+/// Returns a DAG's specification for a commit.
 pub(super) fn spec(task: &Task) -> DagSpec {
     let subtask = |&wcet_ns: &u64| SubtaskSpec {
         wcet_ns: Some(wcet_ns),
@@ -364,17 +366,18 @@ pub(super) fn spec(task: &Task) -> DagSpec {
     }
 }
 
-/// Sums up the densities that DAGs have if each segment of them gets a constant share of the cores.
+/// Reports whether the DAGs' densities sum up to at most the number of cores. A density is for
+/// segments that each get a constant share of the cores.
 fn fluid(tasks: &[&Task], cores: u32) -> bool {
     let densities: Option<Vec<f64>> = tasks.iter().map(|task| density(task)).collect();
     densities.is_some_and(|densities| densities.iter().sum::<f64>() <= f64::from(cores))
 }
 
-/// Returns the density of a DAG, or `None` if it has none.
+/// Returns the density of a DAG, or `None` if a heavy DAG is longer than its deadline.
 ///
-/// A heavy DAG is cut into segments, in each of which the same subtasks execute if there are cores
-/// for all. A segment that is too narrow for the density of the rest executes at full speed, and the
-/// others share evenly what time is left.
+/// A heavy DAG is cut into segments: within a segment the same subtasks execute, given a core for
+/// each. A segment too narrow for the density of the rest executes at full speed, and the other
+/// segments share the remaining time evenly.
 fn density(task: &Task) -> Option<f64> {
     let (mut volume_ns, mut time_ns) = (task.volume_ns(), task.relative_deadline_ns());
     if is_heavy(task) {
@@ -391,7 +394,7 @@ fn density(task: &Task) -> Option<f64> {
 }
 
 /// Returns the segments of a DAG, each with the number of its subtasks and its length in
-/// nanoseconds, the narrowest first; `None` if it is longer than its deadline.
+/// nanoseconds, the narrowest first; `None` if the DAG is longer than its deadline.
 fn segments(task: &Task) -> Option<Vec<(u64, u64)>> {
     // With a core for each subtask all start as soon as they may.
     let limits_ns = vec![task.relative_deadline_ns(); task.subtask_count()];

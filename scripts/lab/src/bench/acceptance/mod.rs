@@ -2,10 +2,10 @@
 //!
 //! For each number of cores, for deadlines equal to periods and below them, and for each
 //! utilization, the same random sets are given to all methods. No time is measured, so the results
-//! are the same on every host. They are a table, a CSV file and a picture. Sets of a file can be
-//! counted in the same way, in the form of the oracle's reference files.
+//! are the same on every host: a table, a CSV file and a picture. Sets of a file can be counted in
+//! the same way, in the form of the oracle's reference files.
 //!
-//! - here: points, and what is written of them;
+//! - here: points, and their output;
 //! - `methods`: the methods; `sets`: how sets are drawn; `picture`: the curves.
 
 mod melani;
@@ -33,16 +33,16 @@ use tool::progress::Progress;
 const PERCENTS: Range<u64> = 20..100;
 const STEP: usize = 5;
 
-/// Sets that were counted, and how many of them each method accepts.
+/// The number of counted sets, and of sets accepted by each method.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct AcceptanceCounts {
     sets: u64,
-    /// In the order of the methods, of which the last ones may be left out.
+    /// In the order of the methods; the last methods may be left out.
     accepted: Vec<u64>,
 }
 
 impl AcceptanceCounts {
-    /// Returns none of all methods, or of all but the ceiling, which takes the most time.
+    /// Returns zero counts for all methods, or for all but the ceiling, which takes the most time.
     fn none(has_ceiling: bool) -> Self {
         Self {
             sets: 0,
@@ -50,13 +50,13 @@ impl AcceptanceCounts {
         }
     }
 
-    /// Returns the names of the methods that are counted, a column each.
+    /// Returns the names of the counted methods, a column each.
     fn columns(&self, column: impl Fn(&str) -> String) -> String {
         let counted = METHODS[..self.accepted.len()].iter();
         counted.map(|method| column(method.name)).collect()
     }
 
-    /// Counts a set, in which no DAG has `D > T`.
+    /// Counts a set without any DAG of `D > T`.
     fn add(&mut self, tasks: &[Task], cores: u32) {
         let tasks: Vec<&Task> = tasks.iter().collect();
         self.sets += 1;
@@ -126,8 +126,8 @@ fn points(cores: &[u32], has_ceiling: bool) -> Vec<AcceptancePoint> {
 }
 
 impl AcceptancePoint {
-    /// Draws sets and counts them. They depend on the seed and on the kind of the point, not on what
-    /// other points there are.
+    /// Draws sets and counts them. The sets depend on the seed and on the kind of the point, not on
+    /// other points.
     fn count(&mut self, generator: Generator, sets: u64, seed: u64) {
         let kind = u64::from(self.cores) << 16 | self.percent << 8 | self.deadlines as u64;
         let mut random = Random::new(nth(seed, kind));
@@ -180,7 +180,7 @@ fn table(points: &[AcceptancePoint]) -> String {
     table.text()
 }
 
-/// The sets of a file, which is as the oracle's of assignments, with or without answers.
+/// The sets of a file in the form of the oracle's assignments, with or without answers.
 pub(super) struct SetFile {
     name: String,
     sets: Vec<AssignmentCase>,
@@ -191,7 +191,7 @@ impl SetFile {
     ///
     /// # Errors
     ///
-    /// In words: it cannot be read, or no method is for one of its sets.
+    /// In words: the file cannot be read, or no method is for one of its sets.
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let name = files::shown_path(path);
         if path.is_dir() || path.extension().is_some_and(|of| of == "dag") {

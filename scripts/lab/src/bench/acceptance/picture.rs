@@ -2,7 +2,8 @@
 //! with a curve for each method.
 //!
 //! Methods differ by colour and by dashes. The lent cores' curve is the widest and lies below the
-//! others, so that one which coincides with it shows on it. A curve may be told from elsewhere.
+//! others, so a coinciding curve stays visible on top. A curve may also come from a measurement
+//! elsewhere.
 
 use super::methods::METHODS;
 use super::sets::Deadlines;
@@ -18,7 +19,7 @@ pub(super) const CORNER: (u64, u64) = (64, 128);
 /// The utilizations, in percent, at the ends of a field.
 const ENDS: (u64, u64) = (PERCENTS.start, 100);
 
-/// How the methods' curves are drawn: in the order of the methods.
+/// The styles of the methods' curves, in the order of the methods.
 const STYLES: [&str; METHODS.len()] = [
     "stroke=\"#7f7f7f\" stroke-width=\"1.6\" stroke-dasharray=\"2 3\"",
     "stroke=\"#0072b2\" stroke-width=\"1.8\" stroke-dasharray=\"7 3\"",
@@ -29,15 +30,15 @@ const STYLES: [&str; METHODS.len()] = [
     "stroke=\"#1b1b1b\" stroke-width=\"1.3\"",
     "stroke=\"#7f7f7f\" stroke-width=\"1.3\" stroke-dasharray=\"9 4\"",
 ];
-/// The curve that lies below the others.
+/// The curve below the others.
 const LOWEST: usize = 4;
-/// A curve that is told from elsewhere: deadlines, and utilization and share in percent.
+/// A curve measured elsewhere: deadlines, and utilization and share in percent.
 type Told = [(Deadlines, u64, u64)];
-/// The style of a told curve.
+/// The style of a curve measured elsewhere.
 const ELSEWHERE: &str = "stroke=\"#c1121f\" stroke-width=\"2.2\" stroke-dasharray=\"4 2\"";
 
-/// Draws points, which are in the order of their cores, deadlines and utilizations, and a method that
-/// was measured elsewhere.
+/// Draws points, given in the order of their cores, deadlines and utilizations, and a method
+/// measured elsewhere.
 pub(super) fn draw(points: &[AcceptancePoint], told: &Told) -> String {
     let mut svg = Svg::default();
     let sets = points.first().map_or(0, |point| point.counts.sets);

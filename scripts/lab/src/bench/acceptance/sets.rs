@@ -1,11 +1,11 @@
 //! Random sets of DAGs of a given utilization.
 //!
-//! A graph is a fork-join of 2 to 8 branches, or 3 to 5 layers of 1 to 5 subtasks with an edge to and
-//! from each, or one of 6 to 18 subtasks with 15 % of the edges that there can be. WCETs are
-//! multiples of 10 up to 1,000. Others' graphs are drawn by [`melani`]. The DAGs of a set share its
-//! utilization so that each division is as likely as any other, as UUniFast does (E. Bini, G. Buttazzo,
-//! Real-Time Systems 30, 2005); sets in which a DAG would need more than its volume over its longest
-//! path are thrown away.
+//! A graph is a fork-join of 2 to 8 branches, or has 3 to 5 layers of 1 to 5 subtasks with an edge
+//! to and from each, or has 6 to 18 subtasks with 15 % of all possible edges. WCETs are multiples
+//! of 10 up to 1,000. [`melani`] draws another author's graphs. The DAGs of a set share its
+//! utilization, and each division is as likely as any other, as in UUniFast (E. Bini, G. Buttazzo,
+//! Real-Time Systems 30, 2005). Sets in which a DAG would need more than its volume over its
+//! longest path are thrown away.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -18,13 +18,14 @@ use super::melani;
 /// The kind of random sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::bench) enum Generator {
-    /// Graphs of ours, and periods that follow from shares of the utilization.
+    /// Graphs of ours, with periods that follow from shares of the utilization.
     Ours,
     /// The same, with periods on a grid, and WCETs in proportion.
     Grid,
     /// Eight of Melani's graphs, of up to 8 branches, three deep.
     Melani,
-    /// Four of them, of up to 4 branches, two deep: sets as large as other implementations take.
+    /// Four of Melani's graphs, of up to 4 branches, two deep: sets as large as other
+    /// implementations take.
     Small,
 }
 
@@ -33,7 +34,7 @@ impl Generator {
     pub(in crate::bench) const WORDS: &[&str] = &["ours", "grid", "melani", "small"];
     const ALL: [Self; 4] = [Self::Ours, Self::Grid, Self::Melani, Self::Small];
 
-    /// Returns the kind of a word; ours, if there is none.
+    /// Returns the kind of a word; ours, if the word is unknown.
     pub(in crate::bench) fn of_word(word: &str) -> Self {
         let place = Self::WORDS.iter().position(|known| *known == word);
         Self::ALL[place.unwrap_or(0)]
@@ -57,10 +58,10 @@ impl Generator {
     }
 }
 
-/// The grid of periods, in microseconds: of a robot's rates.
+/// The grid of periods, in microseconds, from a robot's rates.
 const GRID: [u64; 6] = [5_000, 10_000, 20_000, 40_000, 50_000, 100_000];
 
-/// How deadlines relate to periods.
+/// The relation of deadlines to periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Deadlines {
     /// `D = T`.
@@ -72,7 +73,7 @@ pub(super) enum Deadlines {
 impl Deadlines {
     pub(super) const ALL: [Self; 2] = [Self::Implicit, Self::Constrained];
 
-    /// Returns the name in a file, and the one in a picture.
+    /// Returns the names in a file and in a picture.
     pub(super) const fn names(self) -> (&'static str, &'static str) {
         match self {
             Self::Implicit => ("implicit", "D = T"),
@@ -81,10 +82,10 @@ impl Deadlines {
     }
 }
 
-/// The parts of a core that shares are counted in.
+/// The parts of a core, in which shares are counted.
 const PARTS: u64 = 1 << 32;
 
-/// How many divisions of the utilization are tried before other graphs are drawn.
+/// The number of divisions of the utilization tried before other graphs are drawn.
 const TRIES: u32 = 300;
 
 /// Draws a set for some cores, with a utilization of `percent` of the cores, below 100.
@@ -119,8 +120,8 @@ pub(super) fn draw(
     }
 }
 
-/// Gives a graph the period by which it uses a share of a core, in parts, and a deadline; `None` if
-/// its longest path does not allow that.
+/// Gives a graph a deadline, and the period for using a share of a core, in parts; `None` if the
+/// longest path is too long for such a period.
 fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
     let (volume, length) = (graph.volume_ns(), graph.length_ns());
     let work = u128::from(volume) * u128::from(PARTS);
@@ -131,7 +132,7 @@ fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) ->
     due(random, graph, period, deadlines)
 }
 
-/// Gives a graph a period of the grid, and WCETs by which it uses a share of a core at most.
+/// Gives a graph a period of the grid, WCETs for using at most a share of a core, and a deadline.
 fn on_grid(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
     let period = random.one_of(&GRID);
     let work = u128::from(share) * u128::from(period) / u128::from(PARTS);

@@ -1,9 +1,9 @@
-//! The boots that measure: the guest, its cores, and the reading of its figures.
+//! The measuring boots: the guest, its cores, and the reading of its figures.
 //!
 //! The workloads also run with growing numbers of cores and of subtasks. With counted time all
-//! cores share one clock, which each instruction of any of them advances. So a figure is the number
-//! of instructions that *all* cores have executed in between, waiting for a lock included; halted
-//! cores execute none. It measures work, not time: how much more there is to do for each instance.
+//! cores share one clock, advanced by each instruction of any core. So a figure is the number of
+//! instructions executed by *all* cores in between, waiting for a lock included; halted cores
+//! execute none. A figure measures work, not time: how much more there is to do for each instance.
 
 use std::iter;
 use std::path::Path;
@@ -26,7 +26,7 @@ pub(super) const MOST_SUBTASKS: u64 = 1000;
 /// More cores than a host is sure to have: with so many, figures of time mean nothing.
 const MANY: u64 = 8;
 
-/// The guest that measures.
+/// The measuring guest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// The app.
@@ -71,8 +71,8 @@ pub(super) fn machine_line(figure: &Figure, mode: Mode) -> String {
 }
 
 impl HandOffBoot {
-    /// Describes a boot with DAGs of up to `subtasks` subtasks. Each needs a stack, each core two,
-    /// and the kernel sets a quarter of the memory aside for stacks.
+    /// Describes a boot with DAGs of up to `subtasks` subtasks. Each subtask needs a stack, each
+    /// core two, and the kernel sets a quarter of the memory aside for stacks.
     pub(super) fn new(kind: Kind, cores: u64, subtasks: u64, words: impl Into<String>) -> Self {
         Self {
             kind,
@@ -150,7 +150,7 @@ const MOST_GROWTH_PERCENT: u64 = 3;
 ///
 /// # Errors
 ///
-/// In words: a guest failed, or an instance costs more than it may.
+/// In words: a guest failed, or an instance costs more than allowed.
 pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
     let count = |sizes: &[u64], boot: &dyn Fn(u64) -> HandOffBoot| {
         let counted = sizes.iter().map(|&size| {
@@ -190,7 +190,7 @@ pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
 ///
 /// # Errors
 ///
-/// In words: it does, and by how much.
+/// In words: the cost grows too much, and from which number to which.
 fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     let cost = |figures: &[Figure]| {
         let one = figures.iter().find(|figure| figure.figure == "instance")?;
@@ -214,7 +214,8 @@ fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns a table with a row for each size; workload `layered` stands for the one of that size.
+/// Returns a table with a row for each size; the workload `layered` stands for the graph of the
+/// row's size.
 fn table(what: &str, of: BootColumns, rows: &[(u64, Vec<Figure>)]) -> String {
     let of_figures = of.iter().map(|(_, _, heading)| format!("|{heading}:20"));
     let columns = format!("{what}:8") + &of_figures.collect::<String>();

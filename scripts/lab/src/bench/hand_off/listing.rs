@@ -1,9 +1,10 @@
 //! The instructions of one hop: from one subtask's call to its successor's.
 //!
 //! A chain of 64 empty bodies is booted with every instruction logged. The log is cut at the calls
-//! of subtasks' functions, where `Body::run` of `fass` polls a future. A *hop* is the part between
-//! two of them; the one listed has the length that occurs most often. Each of its instructions
-//! belongs to a file of ours: that of the innermost of the functions that it was inlined from.
+//! of subtasks' functions, where `SubtaskCode::run` of `fass` polls a future. A *hop* is the part
+//! between two calls; the listed hop has the most frequent length. Each instruction belongs to a
+//! file of ours: among the functions the instruction was inlined from, the innermost of ours
+//! decides.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -17,7 +18,7 @@ use tool::qemu::{Mode, QemuEnd};
 use tool::{files, system};
 use views::protocol::Status;
 
-/// Boots, prints how many instructions each file contributes to a hop, and writes all of them to a
+/// Boots, prints how many instructions each file contributes to a hop, and writes the hop to a
 /// file.
 ///
 /// # Errors
@@ -86,8 +87,8 @@ fn addresses(mut log: impl BufRead) -> Vec<u64> {
     addresses
 }
 
-/// Returns the address at which subtasks' futures are polled: the one indirect call of `plan.rs`
-/// that was executed, wherever it is inlined.
+/// Returns the address where subtasks' futures are polled: the only executed indirect call of
+/// `plan.rs` from a function `run`, wherever it is inlined.
 fn the_call(calls: &Frames) -> Result<u64, String> {
     let is_poll = |frames: &Vec<Frame>| {
         let line = frames.first().map_or("", |frame| &frame.line);

@@ -1,8 +1,8 @@
 //! The way from a completion to its successor's first instruction, measured.
 //!
 //! The app `hand-off` runs DAGs of empty bodies that take time stamps, and prints the differences.
-//! In deterministic mode a nanosecond is an instruction, so every run gives the same figures, which
-//! can be compared with those in the repository: `tests/baselines/hand-off.json`.
+//! In deterministic mode a nanosecond is an instruction. So every run gives the same figures,
+//! comparable with those in the repository: `tests/baselines/hand-off.json`.
 //!
 //! - `boots`: the app and the number of cores of each boot, and the cost of cores and subtasks;
 //! - `listing`: one hop, instruction by instruction.
@@ -63,7 +63,7 @@ struct HandOffPlan {
     saves: bool,
     /// Whether the cost of cores and subtasks is counted instead.
     scale: bool,
-    /// The file for the instructions of one hop, if these are listed instead.
+    /// The file for the instructions of one hop, if a listing is wanted instead.
     listing: Option<PathBuf>,
 }
 
@@ -72,7 +72,7 @@ impl HandOffPlan {
     ///
     /// # Errors
     ///
-    /// The options exclude each other: one line that says why.
+    /// The options exclude each other: one line with the reason.
     fn new(options: &Arguments) -> Result<Self, String> {
         let all = [
             name::LISTING,
@@ -172,7 +172,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     for (boot, over) in boots.into_iter().zip(0..) {
         progress.show(over);
         for figure in boot.measure(mode, image)? {
-            // A figure that is counted in a later boot is put next to its workload.
+            // A figure counted in a later boot goes next to its workload.
             let end = figures.iter().rposition(|other| {
                 (other.cores, &other.workload) == (figure.cores, &figure.workload)
             });

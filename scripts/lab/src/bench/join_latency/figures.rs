@@ -1,10 +1,10 @@
 //! From a condition's raw times to metrics, and from samples to figures and files.
 //!
 //! The file of a condition begins with a comment that states everything the times depend on. A file
-//! with another first line is another condition's, and is measured anew.
+//! with a different first line is another condition's, and is measured anew.
 //!
-//! *Publication* i of a topic is that of job i. The *last publication* of i is the time when all
-//! parallel subtasks have published it. `docs/paper.md` explains the metrics, and which of
+//! *Publication* i of a topic is the publication of job i. The *last publication* of i is the time
+//! when all parallel subtasks have published i. `docs/paper.md` explains the metrics, and which of
 //! them can be compared.
 
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ use views::units::shown;
 /// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, N + 1 is the join.
 const COLUMNS: &str = "what,subtask,index,ready_ns,start_ns,finish_ns,joined_indices";
 
-/// Returns the times that a guest has printed as CSV, under a first line `# {statement}`.
+/// Returns the times printed by a guest, as CSV under a first line `# {statement}`.
 ///
 /// # Errors
 ///
@@ -45,7 +45,7 @@ pub(super) fn write(
             _ => line.number_at("subtask").ok_or_else(damaged)?,
         };
         let index = counts.entry(subtask).or_default();
-        // Batches are numbered, so that a lost line does not go unnoticed.
+        // Batches are numbered, lest a lost line go unnoticed.
         if line.number_at("first") != Some(*index) {
             return Err(format!("a batch before serial line {number} is missing"));
         }
@@ -120,7 +120,7 @@ pub(super) const PERIOD_NS: u64 = 25_000_000;
 pub(super) const METRICS: [&str; 4] = ["join_latency", "cover_delay", "join_to_start", "response"];
 
 /// The names of the counts: jobs released; joins that happened; joins of values of one job and of
-/// several; joins that never happened (fewer than jobs); jobs that no join covers.
+/// several; missing joins (fewer than jobs); jobs covered by no join.
 pub(super) const COUNTS: [&str; 6] = [
     "jobs",
     "joins",

@@ -1,10 +1,10 @@
 //! The paper's evaluation: join latency by a DAG, by equal and by close stamps.
 //!
-//! A *condition* is a policy that joins, the number N of parallel subtasks, and a seed. Each is one
-//! boot of the app `join-latency`, which prints the times of all executions and joins. They are
-//! kept as one file for each condition, from which everything else is computed: samples, summary,
-//! pictures, table. So an interruption loses nothing, and a file is not measured again as long as
-//! it was measured under the same conditions (image, QEMU, all options).
+//! A *condition* is a joining policy, the number N of parallel subtasks, and a seed. Each condition
+//! is one boot of the app `join-latency`, which prints the times of all executions and joins. The
+//! times are kept in one file for each condition; everything else is computed from the files:
+//! samples, summary, pictures, table. So an interruption loses nothing, and a file is not measured
+//! again as long as the circumstances stay the same (image, QEMU, all options).
 //!
 //! - here: the plan, the conditions and their boots;
 //! - `figures`: from the guest's lines to figures, and their output.
@@ -57,7 +57,7 @@ fn measure_all(plan: &JoinPlan) -> Result<(), String> {
         let statement = setting.statement(condition);
         let file = folder.join(format!("{}.csv", condition.file_stem()));
         let read = |text: String| figures::read(&text, &statement, condition.subtasks);
-        // A file of other conditions, or a damaged one, reads as none.
+        // A file from other circumstances, or a damaged file, reads as none.
         let samples = match fs::read_to_string(&file).ok().and_then(read) {
             Some(samples) => samples,
             None => {
@@ -67,7 +67,7 @@ fn measure_all(plan: &JoinPlan) -> Result<(), String> {
             }
         };
         measured.push((*condition, ConditionFigures::of(&samples)));
-        // After each condition: an interruption leaves figures for those measured so far.
+        // After each condition, so an interruption leaves the figures measured so far.
         let summary = figures::summary_json(&setting, &measured);
         write_whole(&plan.out.join("summary.json"), &summary)?;
         write_whole(
@@ -84,7 +84,7 @@ fn measure_all(plan: &JoinPlan) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes a file whole or not at all: an interruption leaves the old one.
+/// Writes a file whole or not at all: an interruption leaves the old file.
 fn write_whole(path: &Path, text: &str) -> Result<(), String> {
     let unfinished = path.with_extension("unfinished");
     files::write(&unfinished, text)?;
@@ -93,7 +93,7 @@ fn write_whole(path: &Path, text: &str) -> Result<(), String> {
     renamed.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
-/// The table of `bench join-latency`.
+/// The command-line table of `bench join-latency`.
 static TABLE: Command = Command {
     invocation: "./scripts/bench join-latency",
     about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
@@ -139,14 +139,14 @@ options! {
 #[derive(Clone, Debug)]
 struct JoinPlan {
     out: PathBuf,
-    /// For each N all policies, for each of them all seeds.
+    /// For each N all policies, for each policy all seeds.
     conditions: Vec<JoinCondition>,
     seeds: Vec<u64>,
     jobs: u64,
     queue: u64,
     cores: u64,
     memory_mib: u64,
-    /// Whether the conditions are programs of this computer.
+    /// Whether the conditions run as programs on this computer.
     on_linux: bool,
     /// The named mode; `None`: the built image decides.
     named: Option<Mode>,
@@ -182,7 +182,7 @@ impl JoinPlan {
             policies.iter().flat_map(of_policy)
         };
         let conditions = subtasks.iter().flat_map(of_size).collect();
-        // A core each for source, join and parallel subtasks, so that none waits for one.
+        // A core each for source, join and parallel subtasks, so no subtask waits for a core.
         let cores = subtasks.iter().max().map_or(1, |most| *most as u64) + 2;
         let folder = match on_linux {
             true => "target/join-latency-on-linux",
@@ -204,7 +204,7 @@ impl JoinPlan {
     }
 }
 
-/// The policy that joins.
+/// The joining policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Policy {
     /// The scheduler of the DAG.
@@ -216,7 +216,7 @@ enum Policy {
 }
 
 impl Policy {
-    /// Reads a list of names with commas between.
+    /// Reads a list of names separated by commas.
     fn list(text: &str) -> Result<Vec<Policy>, String> {
         let policy = |name| {
             Policy::from_name(name).ok_or_else(|| {
@@ -240,7 +240,7 @@ impl Policy {
         all.find(|policy| policy.to_string() == name)
     }
 
-    /// Returns its name for people.
+    /// Returns the policy's name for people.
     fn title(self) -> String {
         match self {
             Policy::Fass => "FasS (DAG)".into(),
@@ -269,12 +269,12 @@ struct JoinCondition {
 }
 
 impl JoinCondition {
-    /// Returns the name of its file, without the ending.
+    /// Returns the name of the condition's file, without the ending.
     fn file_stem(&self) -> String {
         format!("{}-n{}-seed{}", self.policy, self.subtasks, self.seed)
     }
 
-    /// Returns its words for the guest.
+    /// Returns the condition's words for the guest.
     fn guest_words(&self, jobs: u64, queue: u64) -> String {
         // Inputs of the parallel subtasks must hold their backlog, which grows more slowly than the
         // jobs.
@@ -319,7 +319,7 @@ impl<'p> MachineSetting<'p> {
     ///
     /// # Errors
     ///
-    /// In words: it cannot be built, or the named mode does not work.
+    /// In words: the program cannot be built, or the named mode does not work.
     fn new(plan: &'p JoinPlan) -> Result<(Self, Option<String>), String> {
         let mut setting = Self {
             plan,
@@ -354,13 +354,13 @@ impl<'p> MachineSetting<'p> {
         self.mode.map_or("linux", Mode::name)
     }
 
-    /// Says in one sentence how far the times can be trusted.
+    /// Returns a sentence on how far the times can be trusted.
     fn meaning(&self) -> &'static str {
         let on_linux = "real nanoseconds on real processors, whatever else this computer does";
         self.mode.map_or(on_linux, Mode::meaning)
     }
 
-    /// Returns a statement of everything that a condition's times depend on.
+    /// Returns a statement of all circumstances that a condition's times depend on.
     fn statement(&self, condition: &JoinCondition) -> String {
         let (version, checksum) = (&self.version, &self.checksum);
         let Some(mode) = self.mode else {
@@ -392,12 +392,13 @@ impl<'p> MachineSetting<'p> {
         }
     }
 
-    /// Measures one condition, and returns its times. In deterministic mode it boots until two
-    /// boots agree, or [`MOST_BOOTS`] times; then it says so and returns the first boot's times.
+    /// Measures a condition, and returns its times. In deterministic mode, boots until two boots
+    /// agree. After [`MOST_BOOTS`] boots without agreement, says so and returns the first boot's
+    /// times.
     ///
-    /// Two boots agree because the kernel removes the host's influence from counted time (its
-    /// `machine::counted_time`). That depends on the implementation of QEMU 7.2, so it is checked
-    /// wherever figures are made.
+    /// Boots agree because the kernel removes the host's influence from counted time (its
+    /// `machine::counted_time`). The removal depends on the implementation of QEMU 7.2, so
+    /// agreement is checked wherever figures are made.
     fn measure(&self, condition: &JoinCondition) -> Result<String, String> {
         // Real times never repeat, so a second boot could not confirm them.
         let is_sure = self.mode != Some(Mode::Deterministic);

@@ -1,13 +1,13 @@
-//! Workloads on two cores: a join across them, and two clusters of one core each.
+//! Workloads on two cores: a join across cores, and two clusters of one core each.
 //!
 //! *The join*: from the last predecessor's return to the sink's start. Two branches compute for 2
 //! us, each on its own core; the core whose branch returns last starts the sink. The bodies
-//! themselves read the times, as their last and as their first act. The cost of reading the clock
-//! is measured, too, and subtracted once: each stamp encloses half of it.
+//! themselves read the times, in their first and last action. The cost of reading the clock is
+//! measured, too, and subtracted once: each stamp encloses half a reading.
 //!
-//! *The clusters*: each runs a graph of its own, as often as it can; one core alone is measured for
-//! comparison. A *window* is some rounds of the first cluster, and includes the work of the second
-//! one in the same time. So no time counts in which only one of them had its processor.
+//! *The clusters*: each runs a graph of its own, as often as possible; one core alone is measured
+//! for comparison. A *window* is some rounds of the first cluster, and includes the second
+//! cluster's work in the same time. So no time counts in which only one cluster had its processor.
 
 use std::hint::{black_box, spin_loop};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -65,8 +65,8 @@ pub(super) fn join(jobs: u64) -> Result<Vec<NativeRow>, String> {
     ])
 }
 
-/// Returns a body that computes for `work_ns` by reading the clock, and stamps its first and its
-/// last reading.
+/// Returns a body that computes for `work_ns` by reading the clock, and stamps the first and last
+/// reading.
 fn body(work_ns: u64, mut pen: StampPen) -> Tick {
     Box::new(move |_| {
         let begun_ns = fass::now_ns();
@@ -137,7 +137,7 @@ fn clock() -> Figure {
     Figure::new((1, "", "reading the clock"), READINGS, readings_ns)
 }
 
-/// The number of turns of one and two clusters: a change of the host's speed meets both.
+/// The number of turns of one and two clusters: a change of the host's speed then affects both.
 const PASSES: usize = 6;
 
 /// The approximate number of instances of a round: some 50 us, less than a host's time slice.
@@ -149,8 +149,8 @@ const WINDOW: usize = 4;
 /// Rounds are counted in millionths.
 const PARTS: u64 = 1_000_000;
 
-/// Measures both, with at least `windows` windows each, adds the figures to `rows`, and returns for
-/// each graph the throughput of two clusters relative to one core.
+/// Measures one core and two clusters, with at least `windows` windows each. Adds the figures to
+/// `rows`, and returns for each graph the throughput of two clusters relative to one core.
 pub(super) fn clusters(
     windows: usize,
     rows: &mut Vec<NativeRow>,
@@ -202,8 +202,8 @@ fn pass(graph: MeasuredGraph, windows: usize, clusters: u32) -> Result<Vec<u64>,
     Ok(of_windows(&times_ns))
 }
 
-/// Returns for each window of the first cluster that lies within the others' times, in nanoseconds,
-/// the time in which all clusters together did the instances of [`WINDOW`] rounds.
+/// Returns, for each window of the first cluster within the others' times, the time in nanoseconds
+/// in which all clusters together did the instances of [`WINDOW`] rounds.
 fn of_windows(times_ns: &[Vec<u64>]) -> Vec<u64> {
     let [first, others @ ..] = times_ns else {
         return Vec::new();
@@ -221,8 +221,8 @@ fn of_windows(times_ns: &[Vec<u64>]) -> Vec<u64> {
     windows.filter_map(of_window).collect()
 }
 
-/// Returns how many rounds were over at a time, in [`PARTS`] of one; `None` before the first and
-/// after the last.
+/// Returns how many rounds were over at a time, in [`PARTS`] of a round; `None` before the first
+/// round and after the last.
 fn parts_by(times_ns: &[u64], at_ns: u64) -> Option<u64> {
     let next = times_ns.partition_point(|&time_ns| time_ns <= at_ns);
     let over = next.checked_sub(1)?;

@@ -1,12 +1,12 @@
 //! The instructions of one step on Linux, counted by Valgrind's tool callgrind.
 //!
-//! The program `rounds` of the app `hand-off` runs a graph on one worker. callgrind counts each thread
-//! by itself, and at the begin of each round it writes the worker's count and begins anew. So a sample
-//! is all that the worker executes in a round, from the source of a job to the source of a later one.
-//! Neither the start and the end of the run are in it, nor the thread that releases jobs, nor the
-//! kernel's instructions. Valgrind hides the kernel's page of fast calls: where the platform asks
-//! Linux for the time, a system call stands for that page's instructions. Rounds differ only by code
-//! that goes by the time.
+//! The program `rounds` of the app `hand-off` runs a graph on one worker. callgrind counts each
+//! thread by itself. At the beginning of each round, callgrind writes the worker's count and begins
+//! anew. So a sample is everything the worker executes in a round, from the source of a job to the
+//! source of a later job. A sample includes neither the start and the end of the run, nor the
+//! thread releasing jobs, nor the kernel's instructions. Valgrind hides the kernel's page of fast
+//! calls: where the platform asks Linux for the time, a system call replaces the page's
+//! instructions. Rounds differ only by code depending on the time.
 
 use std::fs;
 use std::path::Path;

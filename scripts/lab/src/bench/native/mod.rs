@@ -1,16 +1,16 @@
 //! The cost of the scheduler on the host's own processors.
 //!
-//! The kernel's engine runs on threads of Linux that poll, with the graphs of `bench hand-off` and
-//! empty bodies; only the source does something: once a round it reads the clock. Nothing is
+//! The kernel's engine runs on polling threads of Linux, with the graphs of `bench hand-off` and
+//! empty bodies. Only the source does something: once a round it reads the clock. Nothing is
 //! emulated, so the figures can be compared with those of libraries that run task graphs on
 //! threads.
 //!
-//! Other work on the host affects them. Therefore each figure is measured in many short *rounds*,
-//! spread over several passes, and given as minimum, median and 99th percentile: the minimum is the
-//! cost of the code, the others include the host's disturbance.
+//! Other work on the host affects the figures. Therefore each figure is measured in many short
+//! *rounds*, spread over several passes, and given as minimum, median and 99th percentile: the
+//! minimum is the cost of the code; median and percentile include the host's disturbance.
 //!
 //! - here: rounds of jobs, back to back, and the time of one step;
-//! - `counted`: the instructions of one step, which other work does not affect;
+//! - `counted`: the instructions of one step, unaffected by other work;
 //! - `across_cores`: from the last return to the sink's start, and the throughput of two clusters.
 
 mod across_cores;
@@ -148,7 +148,7 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     counted::BASELINE.check(&counted::count(&MeasuredGraph::ALL)?, list)
 }
 
-/// Measures and prints. Returns whether no figure has grown: a time has no limit.
+/// Measures and prints. Returns whether no figure has grown; times have no limit.
 fn measure(plan: &NativePlan) -> Result<bool, String> {
     if plan.counts {
         install::ensure(&install::VALGRIND)?;
@@ -240,13 +240,13 @@ fn machine_line((figure, runner): &NativeRow) -> String {
         .into_text()
 }
 
-/// The number of turns of each runner: a change of the host's speed meets them all.
+/// The number of turns of each runner: a change of the host's speed then affects all runners.
 const PASSES: usize = 3;
 
 /// The approximate number of instances of a round: some hundred microseconds.
 const INSTANCES_A_ROUND: usize = 20_000;
 
-/// The way in which the bodies are run.
+/// The way of running the bodies.
 #[derive(Clone, Copy)]
 enum BodyRunner {
     /// A loop over the functions.
@@ -351,7 +351,7 @@ fn pass(
     Ok(rounds_ns.skip(times_ns.len() / 10).collect())
 }
 
-/// A graph that is measured.
+/// A measured graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct MeasuredGraph {
     name: &'static str,
@@ -409,7 +409,7 @@ fn nanoseconds(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// The times at which rounds begin and end, in nanoseconds since the first one.
+/// The times at which rounds begin and end, in nanoseconds since the first reading.
 #[derive(Clone, Debug, Default)]
 struct RoundTimes(Arc<Mutex<Vec<u64>>>);
 
@@ -436,10 +436,10 @@ impl RoundTimes {
     }
 }
 
-/// A period longer than any job, with which releases are back to back.
+/// A period longer than any job. As idle time is skipped, releases are back to back.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Makes a machine of `workers` threads that poll. Jobs follow one another without a pause, and no
+/// Makes a machine of `workers` polling threads. Jobs follow one another without a pause, and no
 /// events are recorded. Only one thread of the program may measure at a time.
 fn machine(policy: Policy, workers: u32) -> Result<Linux, String> {
     let linux = Linux::new(workers, Mechanism::Poll).map_err(|why| why.to_string())?;
