@@ -329,13 +329,13 @@ pub fn run(plan: &SoakPlan, mut show: impl FnMut(u64)) -> Result<SoakReport, Str
             let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image);
             scope.spawn(move || {
                 loop {
-                    // Each worker takes the next round, so that none waits for a slow one.
+                    // Each worker takes the next round, so no worker waits for a slow one.
                     let round = next.fetch_add(1, Ordering::Relaxed);
                     if round >= plan.rounds.end {
                         return;
                     }
                     let booted = boot(plan, qemu, path, round);
-                    // The receiver is gone once another guest did not start.
+                    // The receiver is gone if the guest of another round did not start.
                     if send.send((round, booted)).is_err() {
                         return;
                     }

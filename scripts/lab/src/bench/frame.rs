@@ -52,7 +52,7 @@ pub(super) fn judged<T>(
     let judgement = outcome.judge().map_err(|fault| fault.reason);
     let found = judgement.and_then(|()| read(&outcome));
     let found = found.map_err(|why| format!("{what} failed: {why}\n{}", outcome.tail()))?;
-    // The log is ours; one that cannot be removed harms nothing.
+    // Failing to remove our own log harms nothing.
     let _ = fs::remove_file(&log);
     Ok(found)
 }
@@ -179,7 +179,7 @@ pub(super) fn draw(script: &str, out: &Path) -> Result<(), String> {
     for picture in before.into_iter().flatten().flatten() {
         let path = picture.path();
         if path.extension().is_some_and(|ending| ending == "svg") {
-            // A picture of earlier figures would be wrong; a new one may fail.
+            // Drawing may fail, and a picture of earlier figures would then be wrong.
             let _ = fs::remove_file(path);
         }
     }

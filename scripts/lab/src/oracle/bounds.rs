@@ -37,8 +37,8 @@
 //! ```
 //!
 //! Bounds under fixed priorities are in the order of `dm_order`. A lone `-` marks a test that does
-//! not accept the set or does not apply. The module `older_bounds` has the bounds of the first kind
-//! replaced by multi-path bounds. `alone`, `peel` and `spread` bound a single job alone: by one
+//! not accept the set or does not apply. `older_bounds` holds those bounds of the first kind that
+//! multi-path bounds have replaced. `alone`, `peel` and `spread` bound a single job alone: by one
 //! path, by reserved chains, and with waits counted as execution. No choice of chains gives less
 //! than `least`, so neither `alone` nor `peel` may be smaller. The waits of a subtask are on a line
 //! of their own:
@@ -270,7 +270,7 @@ fn parse_quantities(
 
 /// Checks a quantity's form, and returns its name and value in normal form.
 fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malformed> {
-    // Numbers are printed again, so that spellings such as `007` compare equal.
+    // Numbers are printed again, so spellings such as `007` compare equal.
     let plain = |words: &[&str]| {
         let numbers = words.iter().map(|word| line.number::<u64>(word));
         Ok(list(&numbers.collect::<Result<Vec<_>, Malformed>>()?))
@@ -313,7 +313,7 @@ fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malf
             }
             list(&order)
         }
-        // Below here every quantity may be refused by its test.
+        // From here on a quantity may be `-`: its test does not accept the set, or does not apply.
         (_, ["-"]) => "-".to_owned(),
         ("gedf_capacity" | "bonifaci_gedf", _) => {
             let [verdict] = line.fixed()?;

@@ -10,9 +10,9 @@
 //! The differences between the model and a machine, and the measures against them:
 //!
 //! - *The kernel takes time*: microseconds for every decision and switch, more with more cores. The
-//!   delay shifts starts, and is most of the tolerance. Lest delays add up along chains of
-//!   instances, execution times include them: a segment counts from the latest unit of time on (the
-//!   app's word `grid_us`).
+//!   delay shifts starts, and is most of the tolerance. To keep delays from adding up along chains
+//!   of instances, execution times include them: a segment counts from the latest unit of time on
+//!   (the app's word `grid_us`).
 //! - *Simultaneous events* of the model come one after the other on a machine, in an arbitrary
 //!   order. A decision between two of them is right by the rules, but not the reference's: it would
 //!   start a different instance, and without preemption that instance keeps its core. The kernel
@@ -92,7 +92,7 @@ fn run_files(options: &Arguments, parse: Parse<Case>) -> Result<ExitCode, Refusa
     let mut cases = read(options.files(), parse).map_err(Refusal::Usage)?;
     let most_cores = options.number(name::CORES_UP_TO).unwrap_or(MOST_CORES);
     let all = cases.len();
-    // The number of cases left out is printed, lest they pass unseen.
+    // The number of cases left out is printed, so they do not pass unseen.
     cases.retain(|case| u64::from(case.cores) <= most_cores);
     if cases.len() < all {
         let left_out = all - cases.len();
@@ -333,7 +333,7 @@ fn boot_with(
         ..Qemu::default()
     };
     let outcome = boot(&qemu, image, &log, settings.limit(cases), |_| {});
-    // The file is ours; one that cannot be removed harms nothing.
+    // Failing to remove our own file harms nothing.
     let _ = fs::remove_file(&module);
     outcome
 }

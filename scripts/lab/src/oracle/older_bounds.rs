@@ -88,7 +88,8 @@ pub(crate) fn melani_edf(tasks: &[&Task], cores: u32) -> Option<Vec<u64>> {
                 let others = (0..tasks.len()).filter(|&other| other != dag);
                 let workloads = others.map(|other| {
                     let used = u64::from(cores);
-                    // No more than the jobs whose deadlines come no later can delay it under EDF.
+                    // Under EDF, only jobs with deadlines no later than the DAG's can delay the
+                    // DAG.
                     let limit = due(tasks[other], used, bounds[other], deadline);
                     workload(tasks[other], used, bounds[other], window).min(limit)
                 });
@@ -122,7 +123,7 @@ fn is_light(tasks: &[&Task], part: f64, density: f64) -> bool {
         let shorter = task.period_ns().min(task.relative_deadline_ns());
         task.volume_ns() as f64 / shorter as f64
     });
-    // Reals decide all but ties.
+    // Floating-point numbers decide all cases but ties, hence the tolerance.
     lengths.all(|(length, deadline)| length as f64 <= part * deadline as f64 + 1e-9)
         && volumes.sum::<f64>() <= density + 1e-9
 }

@@ -19,8 +19,8 @@
 //! ```
 //!
 //! Under static priorities a response time does not depend on the deadlines; nor does it under EDF
-//! if all deadlines are later by the same time. So a set is first compared with later deadlines,
-//! lest a bound exceed its deadline. Then the set is compared as stated: a bound may be missing if
+//! if all deadlines are later by the same time. So a set is first compared with later deadlines, to
+//! keep bounds within the deadlines. Then the set is compared as stated: a bound may be missing if
 //! another bound is late, but none may be below or above the expected range. Pinned DAGs are
 //! refused: nothing here pins.
 

@@ -11,7 +11,7 @@ use tool::image::package_name;
 
 use super::{SourceFile, none_of};
 
-/// Groups of folders, each with the folders that none of its packages may stand on.
+/// Groups of folders, each with the folders none of its packages may stand on.
 const NEVER: [(&[&str], &[&str]); 4] = [
     (
         &["sched-dag", "fass", "kernel", "boot", "apps"],

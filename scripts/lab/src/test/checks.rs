@@ -249,7 +249,7 @@ const NEEDED_MIB: u64 = 3 << 10;
 ///
 /// One sentence: the missing space, its place, and the remedy.
 pub(super) fn check() -> Result<(), String> {
-    // The tool itself lies in the target folder, wherever that is.
+    // The running program lies in the target folder, so `df` is asked about its disk.
     let tool = env::current_exe().unwrap_or_default();
     let folder = tool.parent().unwrap_or(Path::new("."));
     let answer = Command::new("df").arg("-Pk").arg(folder).output();

@@ -84,7 +84,7 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
             leave_out(PROVEN, install::ensure(&install::COQ), &mut host, tally);
         }
         run(plan, "tests on the host", host, tally);
-        // Doctests need cargo to compile each, which is not quick.
+        // Cargo compiles each doctest separately, which is not quick.
         if !plan.quick {
             // The kernel on Linux shares sources with the kernel; their examples name the latter
             // and are tested there, and `--doc` ignores a library's wish not to test examples.
@@ -103,7 +103,7 @@ fn cargo(options: &[&str], words: &str, plan: &TestPlan) -> Command {
     let mut command = system::cargo();
     let words = words.split_whitespace();
     command.args(options).args(words).args(&plan.filter);
-    // A tool that tests start must resolve paths from their folder.
+    // A tool started by tests must resolve paths from the tests' folder, not from the caller's.
     command.env_remove("TOOL_CALLED_IN");
     command
 }
@@ -187,11 +187,12 @@ fn follow(plan: &TestPlan, mut command: Command, show: &mut dyn FnMut(&str)) -> 
     command.stdin(Stdio::null()).stdout(file);
     command.envs(plan.blessed.iter().map(|list| (golden::BLESSED, list)));
     let mut child = Child::start(&mut command).map_err(error)?;
-    // Each program has a limit of its own; this one is for doctests, and for cargo itself.
+    // Each program has a limit of its own in the runner; this limit is for doctests, and for cargo
+    // itself.
     let limit = Duration::from_secs(4 * 3600);
     match child.follow(limit, &log, show, None, |_| Some(0))?.waited {
         WaitEnd::Ended(status) if status.success() => {
-            // The file is ours; one that cannot be removed harms nothing.
+            // Failing to remove our own file harms nothing.
             let _ = fs::remove_file(&log);
             Ok(())
         }
@@ -243,7 +244,7 @@ impl TestProgram {
             failed.for_each(|it| tally.fail(&format!("{}: {it}", self.name), "see its output"));
             self.has_failed |= is_failure;
             self.has_result = true;
-            // Most programs have no test that a filter wants.
+            // With a filter, most programs have no wanted test: their lines would be noise.
             if !result.starts_with("ok. 0 passed") {
                 println!("{}: {result}", self.name);
             }

@@ -156,8 +156,9 @@ struct CoreBudget {
 }
 
 impl CoreBudget {
-    /// Returns the least time that the budget leaves in any window of a length. The worst window
-    /// begins together with the owner's budget, spent so late that its end is at the deadline.
+    /// Returns the least time that the budget leaves in any window of a length. In the worst
+    /// window, the owner spends a budget first, ending at the deadline, and the next budget right
+    /// after the release.
     fn supply_ns(self, window_ns: u64) -> u64 {
         let Some(after_ns) = window_ns.checked_sub(self.budget_ns) else {
             return 0;
@@ -269,7 +270,8 @@ fn own_processors(
     while let Some(task) = tasks.next() {
         let (deadline_ns, volume_ns) = (task.relative_deadline_ns(), task.volume_ns());
         let slack_ns = deadline_ns - task.length_ns();
-        // The first core is the DAG's until the deadline, the others as long as its path may wait.
+        // The DAG owns the first core until the deadline, and each other core for the slack of its
+        // longest path.
         let (mut budget_ns, mut unserved_ns) = (deadline_ns, volume_ns);
         let mut budgets = Vec::new();
         while left > 0 && unserved_ns > 0 {
@@ -366,8 +368,8 @@ pub(super) fn spec(task: &Task) -> DagSpec {
     }
 }
 
-/// Reports whether the DAGs' densities sum up to at most the number of cores. A density is for
-/// segments that each get a constant share of the cores.
+/// Reports whether the DAGs' densities sum up to at most the number of cores. Each segment of a DAG
+/// gets a constant share of the cores.
 fn fluid(tasks: &[&Task], cores: u32) -> bool {
     let densities: Option<Vec<f64>> = tasks.iter().map(|task| density(task)).collect();
     densities.is_some_and(|densities| densities.iter().sum::<f64>() <= f64::from(cores))
@@ -396,7 +398,7 @@ fn density(task: &Task) -> Option<f64> {
 /// Returns the segments of a DAG, each with the number of its subtasks and its length in
 /// nanoseconds, the narrowest first; `None` if the DAG is longer than its deadline.
 fn segments(task: &Task) -> Option<Vec<(u64, u64)>> {
-    // With a core for each subtask all start as soon as they may.
+    // With a core for each subtask, all start as soon as their predecessors have finished.
     let limits_ns = vec![task.relative_deadline_ns(); task.subtask_count()];
     let schedule = ListSchedule::within(task, &limits_ns)?;
     let all = || schedule.cores.iter().flatten();

@@ -102,7 +102,7 @@ pub(super) fn draw(
             .map(|_| generator.graph(random))
             .collect();
         for _ in 0..TRIES {
-            // The distances of random points are uniform among all that have this sum.
+            // The gaps between sorted random points are uniform among all divisions of the whole.
             let points = (1..graphs.len()).map(|_| random.within(0..=whole));
             let mut points: Vec<u64> = points.collect();
             points.extend([0, whole]);
@@ -120,8 +120,8 @@ pub(super) fn draw(
     }
 }
 
-/// Gives a graph a deadline, and the period for using a share of a core, in parts; `None` if the
-/// longest path is too long for such a period.
+/// Gives a graph a deadline, and the period at which its work takes a share of a core, in parts;
+/// `None` if the longest path does not fit in.
 fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
     let (volume, length) = (graph.volume_ns(), graph.length_ns());
     let work = u128::from(volume) * u128::from(PARTS);
@@ -132,7 +132,7 @@ fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) ->
     due(random, graph, period, deadlines)
 }
 
-/// Gives a graph a period of the grid, WCETs for using at most a share of a core, and a deadline.
+/// Gives a graph a period of the grid, a deadline, and WCETs scaled to a share of a core at most.
 fn on_grid(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
     let period = random.one_of(&GRID);
     let work = u128::from(share) * u128::from(period) / u128::from(PARTS);

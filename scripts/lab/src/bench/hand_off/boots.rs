@@ -190,7 +190,7 @@ pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
 ///
 /// # Errors
 ///
-/// In words: the cost grows too much, and from which number to which.
+/// In words: the cost grows too much, from which number to which.
 fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     let cost = |figures: &[Figure]| {
         let one = figures.iter().find(|figure| figure.figure == "instance")?;

@@ -63,7 +63,7 @@ fn executed(image: &Path) -> Result<Vec<u64>, String> {
         let (said, log) = (running.complaints(), serial.display());
         return Err(format!("{ending} {said}; its serial log is {log}"));
     }
-    // The log is ours; one that cannot be removed harms nothing.
+    // Failing to remove our own log harms nothing.
     let _ = fs::remove_file(&serial);
     Ok(addresses)
 }

@@ -45,7 +45,7 @@ pub(super) fn write(
             _ => line.number_at("subtask").ok_or_else(damaged)?,
         };
         let index = counts.entry(subtask).or_default();
-        // Batches are numbered, lest a lost line go unnoticed.
+        // Batches are numbered, so a lost line does not go unnoticed.
         if line.number_at("first") != Some(*index) {
             return Err(format!("a batch before serial line {number} is missing"));
         }
