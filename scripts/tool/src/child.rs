@@ -1,13 +1,15 @@
-//! A child process with a time limit: it is waited for, watched, and killed by its own process id
-//! at the limit or when it is dropped. A child that can end in order is asked to first.
+//! Child processes with a time limit. The tool waits for a child, watches its output, and kills it
+//! by process id at the limit or when the [`Child`] is dropped. A child able to end in order is
+//! asked to do so before the kill.
 //!
-//! It is asked at its limit, and when a *signal* asks us to end, such as ctrl-C. After its limit it
-//! may run on as long as it prints, and 10 s longer; the next signal kills it at once. A child that
-//! has not printed yet does not listen, so it is not asked. Its output goes to a file; each line of
-//! that is shown once, when it is complete.
+//! The request comes at the child's limit, or when a *signal* such as ctrl-C asks the tool to end.
+//! After its limit a child may run on as long as it prints, and then for 10 s of silence; the next
+//! signal kills it at once. A child without any output is not listening yet, so the request waits
+//! for the first byte. The output goes to a file, and each line of the file is shown once, when the
+//! line is complete.
 //!
-//! Where the program `setpriv` exists, the system kills the child also if the
-//! tool itself is killed, so nothing is left behind in any case.
+//! Where the program `setpriv` exists, the system kills the child even if the tool itself is
+//! killed, so nothing is left behind in any case.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -25,33 +27,33 @@ use views::protocol::written;
 /// The time between two looks at the process.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// A child process that was started.
+/// A started child process.
 #[derive(Debug)]
 pub struct Child {
     process: process::Child,
     started: Instant,
 }
 
-/// The reason why the wait for a child ended.
+/// Why the wait for a child ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WaitEnd {
-    /// It ended by itself.
+    /// The child ended by itself.
     Ended(ExitStatus),
-    /// Its time was over, and it was killed.
+    /// The time limit passed, and the child was killed.
     TimedOut,
     /// The watcher gave up, and the child was killed.
     GivenUp,
-    /// A person pressed ctrl-C again before it had ended, and it was killed.
+    /// A person pressed ctrl-C again before the child had ended, and the child was killed.
     Killed,
 }
 
-/// The end of a child that was followed.
+/// How a followed child ended, and its output.
 pub struct ChildEnd {
     /// Why the wait ended.
     pub waited: WaitEnd,
-    /// The reason why it was asked to end early, if it was.
+    /// The reason for asking the child to end early, if anybody asked.
     pub asked: Option<EndReason>,
-    /// Its whole output; bytes that are no UTF-8 are replaced.
+    /// The whole output; invalid UTF-8 is replaced.
     pub text: String,
 }
 
@@ -67,14 +69,14 @@ impl Child {
         Ok(Child { process, started })
     }
 
-    /// Waits for the end, for at most `limit` since the start. `watch` is called at each look; when
-    /// it returns `false`, the child is killed.
+    /// Waits for the end of the child, for at most `limit` since its start. Calls `watch` at each
+    /// look, and kills the child when `watch` returns `false`.
     pub fn wait(&mut self, limit: Duration, mut watch: impl FnMut() -> bool) -> WaitEnd {
         loop {
             match self.process.try_wait() {
                 Ok(Some(status)) => return WaitEnd::Ended(status),
                 Ok(None) => {}
-                // It is no longer a child of ours, so there is nothing left to kill.
+                // The process is no longer a child of ours, so there is nothing left to kill.
                 Err(_) => return WaitEnd::GivenUp,
             }
             if self.started.elapsed() >= limit {
@@ -89,10 +91,10 @@ impl Child {
         }
     }
 
-    /// Works like [`wait`](Self::wait), and shows each complete line of `log`, the child's output,
-    /// to `show` as it comes. `sent` gets the number of bytes in the log, and returns how many the
-    /// child has sent elsewhere, which is progress, too, or `None` to give the child up. `stop`, if
-    /// given, asks the child to end in order before it is killed.
+    /// Works like [`wait`](Self::wait), and passes each complete line of the child's output, read
+    /// from `log`, to `show` as soon as the line is there. `sent` gets the number of bytes in the
+    /// log. It returns the number of bytes sent elsewhere, counted as progress, too, or `None` to
+    /// give the child up. `stop`, if given, asks the child to end in order before the kill.
     ///
     /// # Errors
     ///
@@ -111,7 +113,7 @@ impl Child {
         // A child that can be asked to end outlives its limit; `ChildWatch` decides when it is killed.
         let of_wait = signals.as_ref().map_or(limit, |_| Duration::MAX);
         let waited = self.wait(of_wait, || {
-            // The log may not exist yet, and an error that lasts shows in `finish` below.
+            // The log may not exist yet, and a lasting error shows in `finish` below.
             let _ = tail.follow(show);
             let printed_bytes = tail.bytes();
             let Some(sent_bytes) = sent(printed_bytes) else {
@@ -156,19 +158,20 @@ impl Child {
         self.process.id()
     }
 
-    /// Returns another handle of the child's standard input, if that is a pipe and was not taken.
+    /// Returns a second handle of the child's standard input, if the input is a pipe and was not
+    /// taken.
     pub fn second_input(&self) -> Option<File> {
         let input = self.process.stdin.as_ref()?;
         let other = input.as_fd().try_clone_to_owned();
         other.ok().map(File::from)
     }
 
-    /// Takes the child's standard input, if that is a pipe and was not taken.
+    /// Takes the child's standard input, if the input is a pipe and was not taken.
     pub fn input(&mut self) -> Option<ChildStdin> {
         self.process.stdin.take()
     }
 
-    /// Takes the child's standard output, if that is a pipe and was not taken.
+    /// Takes the child's standard output, if the output is a pipe and was not taken.
     pub fn output(&mut self) -> Option<ChildStdout> {
         self.process.stdout.take()
     }
@@ -179,9 +182,9 @@ impl Child {
     }
 
     fn kill(&mut self) {
-        // It may have ended by itself in between; then there is nothing to kill.
+        // The child may have ended by itself in between; then there is nothing to kill.
         let _ = self.process.kill();
-        // Reaps the process, which would stay a zombie otherwise.
+        // Reaps the process; a zombie would stay otherwise.
         let _ = self.process.wait();
     }
 }
@@ -192,9 +195,9 @@ impl Drop for Child {
     }
 }
 
-/// Returns a command for `program` that the system kills when the calling thread dies, if `setpriv`
-/// is there to ask for it. `setpriv` executes the program in its own place, so the process id stays
-/// the same.
+/// Returns a command for `program` bound to the calling thread: the system kills the program when
+/// the thread dies, if `setpriv` is there to ask for that. `setpriv` executes the program in its
+/// own place, so the process id stays the same.
 pub fn bound_to_us(program: &Path) -> Command {
     if system::find_program("setpriv").is_none() {
         return Command::new(program);
@@ -204,15 +207,15 @@ pub fn bound_to_us(program: &Path) -> Command {
     command
 }
 
-/// The longest silence of a child that was asked to end at its limit.
+/// The longest silence allowed to a child after the request to end at its limit.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// The reason why a child was asked to end.
+/// Why a child was asked to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndReason {
-    /// A person pressed ctrl-C, or this program was asked to end.
+    /// A person pressed ctrl-C, or asked this program to end.
     ByPerson,
-    /// It took longer than this limit.
+    /// The child took longer than this limit.
     ByLimit(Duration),
 }
 
@@ -223,9 +226,9 @@ enum Step {
     Wait,
     /// Ask the child to end.
     Ask(EndReason),
-    /// Kill it, as a person wants.
+    /// Kill the child, as a person wants.
     Kill,
-    /// Kill it, since its time is over.
+    /// Kill the child, since its time is over.
     TimeOut,
 }
 
@@ -249,7 +252,7 @@ impl ChildWatch {
         }
     }
 
-    /// Returns the reason why the child was asked to end, if it was.
+    /// Returns the reason for asking the child to end, if anybody asked.
     fn why(&self) -> Option<EndReason> {
         self.why.map(|(why, _)| why)
     }
@@ -262,18 +265,18 @@ impl ChildWatch {
             self.quiet_since = elapsed;
         }
         match self.why {
-            // Only signals after the request count: those that came with the first one are one
-            // wish.
+            // Only signals after the request count: several signals at the first look are one wish.
             Some((_, before)) if signals > before => return Step::Kill,
             None if signals > 0 => self.why = Some((EndReason::ByPerson, signals)),
             None if is_over => self.why = Some((EndReason::ByLimit(self.limit), signals)),
             _ => {}
         }
         match self.why {
-            // Until it prints, it is not listening; the request waits for its first byte.
+            // A child that has printed nothing is not listening; the request waits for its first
+            // byte.
             Some((why, _)) if !self.is_asked && printed_bytes > 0 => {
                 self.is_asked = true;
-                // The grace begins at the request, however long it was silent before.
+                // The grace begins at the request, however long the child was silent before.
                 self.quiet_since = elapsed;
                 Step::Ask(why)
             }
@@ -283,10 +286,10 @@ impl ChildWatch {
     }
 }
 
-/// A file that is being followed.
+/// A file read while another process writes it.
 struct FollowedFile<'p> {
     path: &'p Path,
-    /// The bytes that were read; `shown` of them have been shown.
+    /// The bytes read so far; the first `shown` of them have been shown.
     read: Vec<u8>,
     shown: usize,
 }
@@ -301,12 +304,12 @@ impl FollowedFile<'_> {
         }
     }
 
-    /// Returns how many bytes have been read.
+    /// Returns the number of bytes read so far.
     fn bytes(&self) -> u64 {
         self.read.len() as u64
     }
 
-    /// Shows the lines that have ended since the last call.
+    /// Shows the lines completed since the last call.
     fn follow(&mut self, show: &mut dyn FnMut(&str)) -> io::Result<()> {
         let mut file = File::open(self.path)?;
         file.seek(SeekFrom::Start(self.bytes()))?;
@@ -323,8 +326,7 @@ impl FollowedFile<'_> {
         Ok(())
     }
 
-    /// Shows the remaining lines, the last one even if it is incomplete, and returns the whole
-    /// text.
+    /// Shows the remaining lines, including an incomplete last line, and returns the whole text.
     fn finish(mut self, show: &mut dyn FnMut(&str)) -> io::Result<String> {
         self.follow(show)?;
         if self.shown < self.read.len() {

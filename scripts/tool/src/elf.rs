@@ -1,9 +1,10 @@
-//! The part of ELF that is needed to measure an image, and to tell it from a program for the host.
+//! Reads the parts of ELF needed to measure an image, and to tell an image from a program for the
+//! host.
 //!
-//! *Stripped size* is the size that `strip` would leave: the file's headers, every byte that is
-//! loaded or a note, and the table of the remaining sections with their names. Symbols and
-//! debugging data do not count. The sum is a few bytes above that of `strip`, never below, as
-//! padding is included.
+//! *Stripped size* is the size `strip` would leave: the file's headers, all loaded bytes and notes,
+//! and the table of the remaining sections with their names. Symbols and debugging data do not
+//! count. Because the sum includes padding, it is a few bytes above the result of `strip`, never
+//! below.
 
 /// Sizes and constants of 64-bit ELF headers and tables (System V ABI, AMD64 supplement; gabi,
 /// chapters 4 and 5).
@@ -12,7 +13,7 @@ const PROGRAM_HEADER_BYTES: u64 = 56;
 const SHF_ALLOC: u64 = 2;
 const PT_NOTE: u64 = 4;
 
-/// Xen's number for the note that holds the 32-bit entry address.
+/// Xen's number for the note with the 32-bit entry address.
 const XEN_ELFNOTE_PHYS32_ENTRY: u64 = 18;
 
 /// The mean length assumed for a section's name and its alignment.
@@ -22,7 +23,7 @@ const NAME_BYTES: u64 = 24;
 ///
 /// # Errors
 ///
-/// In words: it is no such file, or a table points outside it.
+/// In words: the file is no such ELF file, or a table points outside the file.
 pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
     check(file)?;
     let end = loaded_bytes(file)?;
@@ -35,8 +36,8 @@ pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
     Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
 }
 
-/// Cuts a file down to its loaded part: symbols and debugging data go, and the table of sections,
-/// which GRUB would load otherwise.
+/// Cuts a file down to its loaded part. Removes symbols, debugging data, and the table of sections;
+/// otherwise GRUB would load them.
 ///
 /// # Errors
 ///
@@ -48,13 +49,13 @@ pub fn loaded(mut file: Vec<u8>) -> Result<Vec<u8>, String> {
         return Err("a segment lies outside the file".into());
     }
     file.truncate(end);
-    // Clears `e_shoff`, and `e_shentsize`, `e_shnum` and `e_shstrndx`: there is no table any more.
+    // Clears `e_shoff`, and `e_shentsize`, `e_shnum` and `e_shstrndx`: the table is gone.
     file[40..48].fill(0);
     file[58..64].fill(0);
     Ok(file)
 }
 
-/// Returns the end of headers and segments in the file, in bytes.
+/// Returns the offset of the end of headers and segments in the file, in bytes.
 fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     let segments = table(file, 32, 56, PROGRAM_HEADER_BYTES)?;
     let mut end = 64 + PROGRAM_HEADER_BYTES * segments.len() as u64;
@@ -66,12 +67,13 @@ fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     Ok(end)
 }
 
-/// Makes sure that QEMU's `-kernel` can enter a file: a 64-bit ELF file with Xen's note
-/// of the 32-bit entry address ("x86/HVM direct boot ABI", `docs/misc/pvh.pandoc` of Xen).
+/// Makes sure that QEMU's `-kernel` can enter a file, namely a 64-bit ELF file with Xen's note of
+/// the 32-bit entry address ("x86/HVM direct boot ABI", `docs/misc/pvh.pandoc` of Xen).
 ///
 /// # Errors
 ///
-/// In words: it is none, it has no such note, or a table points outside it.
+/// In words: the file is no ELF file, has no such note, or contains a table pointing outside the
+/// file.
 pub fn check_bootable(file: &[u8]) -> Result<(), String> {
     let is_entry = |note: &Note| (note.owner, note.kind) == (*b"Xen\0", XEN_ELFNOTE_PHYS32_ENTRY);
     match notes(file)?.iter().any(is_entry) {
@@ -80,8 +82,8 @@ pub fn check_bootable(file: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Returns the name of the app of an image, which `kernel::entry!` notes there; `None` if there is
-/// no such note.
+/// Returns the name of an image's app, taken from the note written by `kernel::entry!`. Returns
+/// `None` if there is no such note.
 pub fn app_name(file: &[u8]) -> Option<String> {
     let notes = notes(file).ok()?;
     let note = notes.iter().find(|note| note.owner == *b"App\0")?;
@@ -95,11 +97,11 @@ pub fn app_name(file: &[u8]) -> Option<String> {
     is_name.then(|| String::from_utf8_lossy(name).into_owned())
 }
 
-/// A note whose owner's name has four bytes.
+/// A note with a four-byte owner's name.
 struct Note {
     owner: [u8; 4],
     kind: u64,
-    /// The offset of its content in the file.
+    /// The offset of the note's content in the file.
     content: u64,
     content_bytes: u64,
 }
@@ -113,7 +115,8 @@ fn notes(file: &[u8]) -> Result<Vec<Note>, String> {
         }
         let mut at = number(file, segment + 8, 8)?;
         let end = at.saturating_add(number(file, segment + 32, 8)?);
-        // A note has the lengths of name and content, its type, and both, padded to 4 bytes.
+        // A note consists of the lengths of name and content, its type, and both, padded to 4
+        // bytes.
         while at < end {
             let owner_bytes = number(file, at, 4)?;
             let content_bytes = number(file, at + 4, 4)?;
@@ -142,8 +145,8 @@ fn check(file: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Returns the offsets of a table's entries; `offset_at` and `count_at` are the positions of its
-/// offset and its length in the ELF header.
+/// Returns the offsets of a table's entries; `offset_at` and `count_at` are the positions of the
+/// table's offset and length in the ELF header.
 fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u64>, String> {
     let offset = number(file, offset_at, 8)?;
     let entries = number(file, count_at, 2)?;
@@ -156,7 +159,7 @@ fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u
 ///
 /// # Errors
 ///
-/// In words: it lies outside the file.
+/// In words: the number lies outside the file.
 fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
     let start = usize::try_from(at).unwrap_or(usize::MAX);
     let bytes = file.get(start..start.saturating_add(length));

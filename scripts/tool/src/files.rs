@@ -1,12 +1,12 @@
-//! Files that a person names: they are read with care and never overwritten by mistake.
+//! Reads files named by a person with care, and never overwrites such a file by mistake.
 //!
-//! An *input* is a file that a command reads, an *output* one that it writes. Before a command
-//! begins its work it calls [`check`], which promises: no output is also an input or another
-//! output, under whatever name, and each can be written. No file is emptied by the check; an output
-//! gets its new content when there is one.
+//! A command reads its *inputs* and writes its *outputs*. Before a command begins its work it calls
+//! [`check`]. The check promises that no output is also an input or another output, under whatever
+//! name, and that each output can be written. The check empties no file; an output gets its new
+//! content when the content is ready.
 //!
-//! Inputs are read by [`read`] alone, which refuses folders, devices and named pipes: those may
-//! have no end or no writer.
+//! Only [`read`] reads inputs. It refuses folders, devices and named pipes, as these may have no
+//! end or no writer.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -19,23 +19,23 @@ use text::visible;
 
 use crate::system;
 
-/// The most bytes of an input: far more than a guest or a reader can use.
+/// The most bytes of an input, far beyond the needs of a guest or a reader.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// The most bytes of a text that is read whole.
+/// The most bytes of a text read as a whole.
 const MOST_TEXT_BYTES: usize = 64 << 20;
 
-/// A file of a command line.
+/// A file named on a command line.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedFile<'n> {
-    /// The option that names it, without its dashes; empty: it is a positional word.
+    /// The option naming the file, without its dashes; empty for a positional word.
     pub option: &'n str,
-    /// Its name.
+    /// The file's name.
     pub path: &'n Path,
 }
 
 impl NamedFile<'_> {
-    /// Returns the words that name it, for a message.
+    /// Returns the words that name the file, for a message.
     fn words(&self) -> String {
         let NamedFile { option, path } = self;
         let place = shown_path(path);
@@ -46,7 +46,7 @@ impl NamedFile<'_> {
     }
 }
 
-/// Returns a file's whole name for a message, with control characters made visible.
+/// Returns a file's whole name for a message, making control characters visible.
 pub fn shown_path(path: &Path) -> String {
     visible(&path.to_string_lossy()).to_string()
 }
@@ -74,7 +74,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     if data.len() > MOST_BYTES {
         return Err(too_long());
     }
-    // One byte more than allowed: a pipe has no length that could be asked for before.
+    // One byte more than allowed: the length of a pipe is unknown beforehand.
     let all = file.take(MOST_BYTES + 1).read_to_end(&mut bytes);
     all.map_err(|error| cannot(&error))?;
     match bytes.len() as u64 > MOST_BYTES {
@@ -83,29 +83,29 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Reads an input that a message names by its path alone.
+/// Reads an input; a message names the input by its path alone.
 ///
 /// # Errors
 ///
-/// In words, with the file.
+/// In words, with the file's name.
 pub fn read_at(path: &Path) -> Result<Vec<u8>, String> {
     read(path).map_err(|why| format!("`{}`: {why}", shown_path(path)))
 }
 
-/// Reads the input that an option names.
+/// Reads the input named by an option.
 ///
 /// # Errors
 ///
-/// In words, with the option and the file.
+/// In words, with the option and the file's name.
 pub(crate) fn read_named(named: &NamedFile<'_>) -> Result<Vec<u8>, String> {
     read(named.path).map_err(|why| format!("{} {why}; name another file", named.words()))
 }
 
-/// Writes the file that an option names.
+/// Writes the file named by an option.
 ///
 /// # Errors
 ///
-/// In words, with the option and the file.
+/// In words, with the option and the file's name.
 pub(crate) fn write_named(
     option: &str,
     path: &Path,
@@ -116,11 +116,11 @@ pub(crate) fn write_named(
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
 }
 
-/// Returns why nothing more can be written to a file, if that is so.
+/// Returns the reason why a file cannot grow, if there is a reason.
 pub(crate) fn why_full(path: &Path) -> Option<String> {
     const MORE: usize = 4096;
     let length = fs::metadata(path).ok()?.len();
-    // Not by a trial: the system ends a program that goes beyond this limit.
+    // Read, not tried: the system ends a program exceeding this limit.
     let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
     let mut limits = limits.lines();
     let limit = limits.find_map(|line| line.strip_prefix("Max file size"));
@@ -131,44 +131,44 @@ pub(crate) fn why_full(path: &Path) -> Option<String> {
     let mut file = OpenOptions::new().append(true).open(path).ok()?;
     let written = file.write_all(&[b'\n'; MORE]);
     let written = written.and_then(|()| file.sync_all());
-    // What was written for the trial goes again.
+    // Removes the trial's bytes again.
     let _ = file.set_len(length);
     written.err().map(|error| error.to_string())
 }
 
-/// Writes a file of ours, and makes its folder if need be.
+/// Writes a file of ours, and makes its folder if necessary.
 ///
 /// # Errors
 ///
-/// In words, with the file.
+/// In words, with the file's name.
 pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), String> {
     let written = fs::create_dir_all(folder_of(path)).and_then(|()| fs::write(path, content));
     written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
-/// Calls `work` with the path of a new folder of ours, which is removed afterwards.
+/// Calls `work` with the path of a new folder of ours, and removes the folder afterwards.
 ///
 /// # Errors
 ///
-/// As of `work`, or as [`system::new_log`].
+/// The errors of `work` and of [`system::new_log`].
 pub(crate) fn in_folder<R>(
     name: &str,
     work: impl FnOnce(&Path) -> Result<R, String>,
 ) -> Result<R, String> {
     let folder = system::new_log(name)?.with_extension("folder");
     let result = work(&folder);
-    // The folder is ours; one that cannot be removed harms nothing.
+    // The folder is ours; a leftover folder harms nothing.
     let _ = fs::remove_dir_all(&folder);
     result
 }
 
-/// Reads an input that must be text, of at most 64 MiB. The byte order mark by which some editors
-/// begin UTF-8 is left out.
+/// Reads an input as text of at most 64 MiB. Leaves out the byte order mark that some editors put
+/// before UTF-8.
 ///
 /// # Errors
 ///
-/// In words that begin with the file, and with the line of bytes that are no text: as [`read`],
-/// that it is not UTF-8, or that it is too long.
+/// In words beginning with the file's name, and with the line number at bytes that are no text: an
+/// error of [`read`], text that is not UTF-8, or text that is too long.
 pub fn read_text(path: &Path) -> Result<String, String> {
     let refused = |line: &dyn Display, why: &dyn Display| {
         let place = shown_path(path);
@@ -190,17 +190,17 @@ pub fn read_text(path: &Path) -> Result<String, String> {
     Ok(text)
 }
 
-/// Makes sure that no output overwrites an input or another output, and that each can be written.
-/// Their content stays.
+/// Makes sure that no output overwrites an input or another output, and that each output can be
+/// written. The files keep their content.
 ///
 /// # Errors
 ///
-/// In words, with the offender: the two names of one file, or the output that cannot be written.
+/// In words, with the offender: two names of one file, or an output that cannot be written.
 pub fn check(inputs: &[NamedFile<'_>], outputs: &[NamedFile<'_>]) -> Result<(), String> {
     for (position, output) in outputs.iter().enumerate() {
         let before = inputs.iter().chain(&outputs[..position]);
         let own = identity(output.path);
-        // A device keeps nothing, so several outputs may go to one.
+        // A device keeps nothing, so several outputs may share a device.
         let is_kept = fs::metadata(output.path).map_or(true, |data| data.is_file());
         for other in before.filter(|_| is_kept) {
             if own.is_some() && own == identity(other.path) {
@@ -215,15 +215,15 @@ pub fn check(inputs: &[NamedFile<'_>], outputs: &[NamedFile<'_>]) -> Result<(), 
     outputs.iter().try_for_each(try_output)
 }
 
-/// Makes sure that no input is given twice, since it would count twice.
+/// Makes sure that no input is given twice and so counted twice.
 ///
 /// # Errors
 ///
-/// In words, which two are one file.
+/// In words, with the two names of one file.
 pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), String> {
     let mut before: Vec<(&Path, FileIdentity)> = Vec::new();
     for path in inputs {
-        // A file in a folder that is not there is refused when it is read.
+        // A file in a missing folder is refused later, by the read.
         let Some(own) = identity(path) else {
             continue;
         };
@@ -236,12 +236,12 @@ pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), Stri
     Ok(())
 }
 
-/// The identity of a file, equal for all its names.
+/// The identity of a file, equal for all of its names.
 #[derive(PartialEq, Eq)]
 enum FileIdentity {
-    /// It exists: its device and its inode.
+    /// An existing file: its device and its inode.
     There(u64, u64),
-    /// It does not exist yet: its folder and its name there.
+    /// A file to be created: its folder and its name there.
     ToCome(PathBuf),
 }
 
@@ -261,7 +261,7 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Makes sure that an output can be written.
+/// Makes sure that an output can be written, without changing its content.
 fn try_output(output: &NamedFile<'_>) -> Result<(), String> {
     let path = output.path;
     let there = fs::metadata(path).ok();
@@ -269,27 +269,27 @@ fn try_output(output: &NamedFile<'_>) -> Result<(), String> {
         let words = output.words();
         format!("{words}: cannot be written: {why}; name another file")
     };
-    // Opening a named pipe would wait for a reader; a pipe of the shell's `>(...)` has one.
+    // Opening a named pipe would wait for a reader; a pipe of the shell's `>(...)` has a reader.
     if fs::symlink_metadata(path).is_ok_and(|data| data.file_type().is_fifo()) {
         return Err(cannot(&"it is a named pipe"));
     }
-    // `append` keeps the content; the trial writes nothing.
+    // `append` keeps the content, and the trial writes nothing.
     let opened = OpenOptions::new().append(true).create(true).open(path);
     opened.map_err(|error| cannot(&error))?;
     if there.is_none() {
-        // It was made by the trial. A dangling link has made it at the link's other end.
+        // The trial has made this file; through a dangling link, at the other end of the link.
         let made = path.canonicalize().map_err(|error| cannot(&error))?;
         fs::remove_file(made).map_err(|error| cannot(&error))?;
     }
     Ok(())
 }
 
-/// Makes sure that files can be written into a folder, which need not exist yet; nothing
-/// is left behind.
+/// Makes sure that files can be written into a folder, which need not exist yet. Leaves nothing
+/// behind.
 ///
 /// # Errors
 ///
-/// In words, with the offender.
+/// In words, with the offending file or folder.
 pub fn check_folder(output: &NamedFile<'_>) -> Result<(), String> {
     let there = output.path.ancestors().find_map(|folder| {
         let folder = match folder.as_os_str().is_empty() {
@@ -319,12 +319,12 @@ pub fn check_folder(output: &NamedFile<'_>) -> Result<(), String> {
     Err(format!("{}: {why}; name another folder", output.words()))
 }
 
-/// A file of ours, removed when this value is dropped.
+/// A file of ours, removed when this value is dropped; `None` for no file.
 #[derive(Debug)]
 pub(crate) struct TemporaryFile(pub(crate) Option<PathBuf>);
 
 impl TemporaryFile {
-    /// Returns its path; empty if there is no file.
+    /// Returns the file's path; empty if there is no file.
     pub(crate) fn path(&self) -> &Path {
         self.0.as_deref().unwrap_or(Path::new(""))
     }
@@ -332,7 +332,7 @@ impl TemporaryFile {
 
 impl Drop for TemporaryFile {
     fn drop(&mut self) {
-        // The file is ours; one that cannot be removed harms nothing.
+        // The file is ours; a leftover file harms nothing.
         let _ = self.0.take().map(fs::remove_file);
     }
 }

@@ -1,10 +1,9 @@
-//! Images: building them with cargo, finding the file, measuring its size.
+//! Builds images with cargo, finds their files, and measures their sizes.
 //!
-//! An *image* is the freestanding ELF file that a package under `apps/` (or
-//! the guest side of the boot tests) is linked into; it bears the package's
-//! name. Images that run are built in release, those for a debugger by a profile of their own.
-//! Cargo itself is asked for the file's path, so no setting of cargo's can make us boot a stale
-//! one.
+//! An *image* is a freestanding ELF file. It is linked from a package under `apps/` (or from the
+//! guest side of the boot tests) and bears the package's name. Images for running are built in
+//! release, images for a debugger by a profile of their own. The tool asks cargo itself for the
+//! file's path, so no setting of cargo's can make the tool boot a stale image.
 
 use std::env;
 use std::fs::{self, File, TryLockError};
@@ -20,7 +19,7 @@ use crate::progress::ProgressNote;
 use crate::system;
 use views::json::Value;
 
-/// The most bytes that a stripped image may have.
+/// The most bytes of a stripped image.
 pub const MOST_STRIPPED_BYTES: u64 = 984 << 10;
 
 /// The folder of the apps.
@@ -39,18 +38,18 @@ pub fn apps(folder: &str) -> Vec<String> {
     names
 }
 
-/// Reads the name of a package; `None` for the manifest of a workspace alone.
+/// Returns the name of a manifest's package; `None` for the manifest of a workspace alone.
 pub fn package_name(manifest: &str) -> Option<String> {
     let package = manifest.split("[package]").nth(1)?;
     let line = package.lines().find(|line| line.starts_with("name"))?;
     Some(line.split('"').nth(1)?.into())
 }
 
-/// Makes sure that `name` is an app.
+/// Makes sure that `name` is the name of an app.
 ///
 /// # Errors
 ///
-/// One line that names it and the apps that exist.
+/// One line naming the rejected app and the existing apps.
 pub fn check_app(name: &str) -> Result<(), String> {
     let apps = apps(APPS);
     if apps.iter().any(|app| app == name) {
@@ -65,11 +64,12 @@ pub fn check_app(name: &str) -> Result<(), String> {
     ))
 }
 
-/// Makes sure that a file is an image, and returns the name of its app, if it has a note of it.
+/// Makes sure that a file is an image. Returns the name of its app, if the image has a note of the
+/// name.
 ///
 /// # Errors
 ///
-/// One line with the reason, and the files that are images.
+/// One line with the reason, and with the place of images.
 pub fn check_file(path: &Path) -> Result<Option<String>, String> {
     let app = files::read(path).and_then(|bytes| {
         let bootable = elf::check_bootable(&bytes);
@@ -88,13 +88,13 @@ pub fn check_file(path: &Path) -> Result<Option<String>, String> {
 ///
 /// # Errors
 ///
-/// As of [`check_file`].
+/// The errors of [`check_file`], with another remedy.
 pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
     let name = path
         .file_name()
         .and_then(|name| name.to_str()?.strip_suffix("-linux"));
     let is_image = |bytes: Vec<u8>| elf::check_bootable(&bytes).is_ok();
-    // An image for the bare machine may bear such a name, too; it does not run on Linux.
+    // An image for the bare machine may bear such a name, too, but does not run on Linux.
     match (name, files::read(path).map(is_image)?) {
         (Some(app), false) => Ok(Some(app.into())),
         _ => Err(
@@ -105,8 +105,8 @@ pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
     }
 }
 
-/// Builds the image of a package in release, and returns the file. Cargo's progress and errors go
-/// to standard error as they come.
+/// Builds the image of a package in release, and returns the image's path. Cargo prints its
+/// progress and errors to standard error meanwhile.
 ///
 /// # Errors
 ///
@@ -119,7 +119,7 @@ pub fn build(package: &str) -> Result<PathBuf, String> {
 ///
 /// # Errors
 ///
-/// One line that names the apps that have one.
+/// One line naming the apps that have such a program.
 pub fn check_linux(app: &str) -> Result<(), String> {
     let has_program = |app: &String| {
         let program = format!("{APPS}/{app}/examples/{}.rs", linux_name(app));
@@ -141,8 +141,8 @@ fn linux_name(app: &str) -> String {
     format!("{app}-linux")
 }
 
-/// Builds an app's program for Linux, as [`build`] does its image. A `folder` is that of a package
-/// elsewhere.
+/// Builds an app's program for Linux, as [`build`] builds the image. `folder` is the folder of a
+/// package elsewhere; `None` means this workspace.
 ///
 /// # Errors
 ///
@@ -151,7 +151,7 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<PathBuf, String> 
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
-/// Builds the program that runs DAG files in virtual time.
+/// Builds the program for running DAG files in virtual time.
 ///
 /// # Errors
 ///
@@ -160,11 +160,11 @@ pub(crate) fn build_host() -> Result<PathBuf, String> {
     build_target("dag-file", "linux", ["--example", "dag-file-host"], None)
 }
 
-/// The profile of the page's engine, which alone is no program of this computer or an image.
+/// The profile of the page's engine, whose target is neither this computer nor the bare machine.
 pub(crate) const PAGE_PROFILE: &str = "page";
 
-/// Flags beyond those of a profile, to make an image small: its addresses are constants, since the
-/// linker script fixes them; no loop is padded; a jump table pays from eight cases on.
+/// Compiler flags beyond the profile's, to make images small. Addresses are constants, since the
+/// linker script fixes them; loops are not padded; jump tables need at least eight cases.
 const FOR_IMAGES: [&str; 4] = [
     "--",
     "-Crelocation-model=static",
@@ -172,7 +172,7 @@ const FOR_IMAGES: [&str; 4] = [
     "-Cllvm-args=-min-jump-table-entries=8",
 ];
 
-/// Builds one target of a package by a profile; `target` is its kind and name, as cargo takes them.
+/// Builds one target of a package by a profile; `target` is its kind and name, in cargo's notation.
 ///
 /// # Errors
 ///
@@ -188,7 +188,7 @@ pub fn build_target(
         _ if profile == PAGE_PROFILE => ("build", &["--target", WASM_TARGET][..]),
         // Only `cargo rustc` takes flags for the last crate alone.
         "--bin" => ("rustc", &FOR_IMAGES[..]),
-        // The kernel is in none of its features.
+        // None of the features of such a program contains the kernel.
         _ if name.ends_with("-host") => ("build", &["--no-default-features"][..]),
         _ => ("build", &[][..]),
     };
@@ -208,7 +208,7 @@ pub fn build_target(
     path.ok_or_else(|| failed("cargo built no binary of that name"))
 }
 
-/// Reports on standard error that another command builds images: cargo would wait for it silently.
+/// Reports on standard error that another command builds images: cargo would wait silently.
 fn say_if_cargo_waits(profile: &str) {
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
     let folder = system::workspace().join(target).join(profile);
@@ -219,12 +219,12 @@ fn say_if_cargo_waits(profile: &str) {
 }
 
 fn is_locked(file: &Path) -> bool {
-    // Without the file no one can hold the lock.
+    // Without the file no process can hold the lock.
     let locked = File::open(file).map(|file| file.try_lock_shared());
     matches!(locked, Ok(Err(TryLockError::WouldBlock)))
 }
 
-/// Returns the executable that one of cargo's messages announces, if it is ours.
+/// Returns the executable announced by a message of cargo, if its target has our name.
 fn executable(message: &Value, package: &str) -> Option<PathBuf> {
     let name = message.at(&["target", "name"]).and_then(Value::as_text)?;
     let path = message.get("executable").and_then(Value::as_text)?;

@@ -1,8 +1,9 @@
-//! Reading a file of another format, by `scripts/convert`.
+//! Reads DAG files in foreign formats, by running `scripts/convert`.
 //!
-//! The converter writes our format and ends each record with the line of the person's file, so a
-//! fault that a check of ours finds later has that line, too. Faults that the converter finds have
-//! their lines already. Parts of a file that are left out are told on standard error.
+//! The converter writes our format and ends each record with a comment naming the line in the
+//! person's file. So a fault found later by one of our own checks names the right line, too; faults
+//! found by the converter name theirs already. The converter reports left-out parts of a file on
+//! standard error.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -14,18 +15,18 @@ use super::ImportSettings;
 use crate::files;
 use crate::system::workspace;
 
-/// The comment by which the converter tells a record's line.
+/// The beginning of the converter's comment with a record's line.
 const LINE: &str = " # line ";
 
-/// Reads a file by the converter.
+/// Converts and reads a file.
 ///
 /// # Errors
 ///
-/// The converter's lines, or the reason why it did not run.
+/// The converter's lines, or the reason why the converter did not run.
 pub(super) fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<String>> {
     let mut convert = Command::new("timeout");
     let limit_s = import.limit_s.to_string();
-    // In the foreground, or ctrl-C would not reach it.
+    // In the foreground, or ctrl-C would not reach the converter.
     convert.args(["--foreground", &limit_s, "python3"]);
     convert.arg(workspace().join("scripts/convert"));
     convert.arg("--lines").stdin(Stdio::null());
@@ -35,7 +36,7 @@ pub(super) fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<
     if let Some(graph) = &import.graph {
         convert.args(["--graph", graph]);
     }
-    // No name begins with `-` once a folder stands before it.
+    // With a folder before the name, no name begins with `-`.
     let output = convert.arg(Path::new(".").join(path)).output();
     let output = output.map_err(|why| vec![format!("`timeout` did not start: {why}")])?;
     let refused = |why: &str| Err(vec![format!("{}: {why}", files::shown_path(path))]);
@@ -59,12 +60,12 @@ pub(super) fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<
     Ok(file)
 }
 
-/// Takes off what [`read`] has put before a path.
+/// Removes the folder put before the path by [`read`].
 fn without_folder(line: &str) -> &str {
     line.strip_prefix("./").unwrap_or(line)
 }
 
-/// Gives everything in a file the line of the person's file.
+/// Gives all parts of a file the lines of the person's file.
 fn locate(file: &mut DagFile, text: &str) {
     let told = |line: &str| line.rsplit_once(LINE)?.1.parse().ok();
     let lines: Vec<usize> = text.lines().map(|line| told(line).unwrap_or(1)).collect();

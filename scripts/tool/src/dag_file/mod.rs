@@ -1,16 +1,17 @@
-//! DAG files on the host: reading all formats, and preparing a run of one.
+//! Reads DAG files of all formats on the host, and prepares runs of them.
 //!
-//! The kernel reads one format, `docs/dag-file.md`. `scripts/convert` converts others to it:
+//! The kernel reads one format only, described in `docs/dag-file.md`. `scripts/convert` converts
+//! other formats to ours:
 //!
-//! - [`load()`]: reads a file of any format, and checks it as the commit will;
-//! - [`prepare()`]: the input of `./scripts/run --dag FILE`: the file that becomes the boot module,
-//!   words for the guest, and enough memory and time.
+//! - [`load()`] reads a file of any format and checks it as the commit will;
+//! - [`prepare()`] turns the file of `./scripts/run --dag FILE` into a boot module, words for the
+//!   guest, and sufficient memory and time.
 //!
-//! Every message about a file begins `FILE:LINE:`, with a line of the file that was named, even if
-//! the guest reads it in another form. The guest reads the file in our format, as it was written
-//! for it, and the commit knows names alone. So everything that can be checked before a boot is
-//! checked here, with the right lines; the rest are words for the guest that the host does not
-//! read, and a machine that is too small.
+//! Every message about a file begins with `FILE:LINE:` and a line of the file named by the person,
+//! even if the guest reads the file in another form. The guest gets the file rewritten in our
+//! format, and the commit knows names only. So this module checks everything that can be checked
+//! before a boot, with the right lines. Two kinds of faults are left to the guest: words for the
+//! guest, which the host does not read, and a machine too small for the file.
 
 mod foreign;
 
@@ -25,39 +26,40 @@ use crate::files;
 use crate::options::{Arguments, OptionName};
 use crate::run_options::name;
 
-/// The settings for reading a file.
+/// Settings for reading a file.
 #[derive(Clone, Debug)]
 pub struct ImportSettings {
-    /// The length of a unit, for formats whose numbers have none; by default the format's.
+    /// The length of a time unit, for formats with plain numbers; `None` means the format's
+    /// default.
     pub unit_ns: Option<u64>,
-    /// The only graph wanted of a set of task graphs.
+    /// The only graph wanted from a set of task graphs.
     pub graph: Option<String>,
     /// The number of cores for the run.
     pub cores: u32,
-    /// The division of the cores.
+    /// The division of the cores into clusters.
     pub clusters: CoreDivision,
     /// The length of the run.
     pub length: Length,
-    /// How long the conversion of another format may take, in seconds.
+    /// The longest time for converting another format, in seconds.
     pub limit_s: u64,
 }
 
-/// The formats that a file may have.
+/// The format of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     /// Our own.
     Ours,
-    /// One that `scripts/convert` reads.
+    /// A format read by `scripts/convert`.
     Foreign,
 }
 
-/// The endings of the names that a folder's files may have, ours first.
+/// The file name endings accepted in a folder, ours first.
 pub(crate) const ENDINGS: [&str; 9] = [
     "dag", "yaml", "yml", "json", "dot", "gv", "graphml", "xml", "tgff",
 ];
 
 impl Format {
-    /// Returns the format that a file's name states, in small or in capital letters; `None` if its
+    /// Returns the format stated by a file's name, in small or in capital letters; `None` if its
     /// ending is unknown.
     pub(crate) fn of(path: &Path) -> Option<Format> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -68,7 +70,7 @@ impl Format {
     }
 }
 
-/// Reads a file in the format that its name states, else in our own, and checks it as the commit
+/// Reads a file in the format stated by its name, else in our own, and checks it as the commit
 /// will.
 ///
 /// # Errors
@@ -88,7 +90,7 @@ fn located(path: &Path, faults: Vec<Malformed>) -> Vec<String> {
         .collect()
 }
 
-/// Reads a file as [`load`] does, without checks of its sets.
+/// Reads a file as [`load`] does, without checking its sets.
 fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<String>> {
     let place = files::shown_path(path);
     let text = files::read_text(path).map_err(|line| vec![line])?;
@@ -116,7 +118,7 @@ fn read(path: &Path, import: &ImportSettings) -> Result<DagFile, Vec<String>> {
 
 /// Checks all sets of a file as the commit will.
 fn check_sets(path: &Path, file: &DagFile, import: &ImportSettings) -> Result<(), Vec<String>> {
-    // A commit with static priorities makes all checks of one with EDF, and more.
+    // A commit with static priorities makes all checks of a commit with EDF, and more.
     let options = CommitOptions::new(Policy::StaticPriority, import.cores)
         .with_clusters(import.clusters.clone());
     for set in &file.sets {
@@ -125,7 +127,7 @@ fn check_sets(path: &Path, file: &DagFile, import: &ImportSettings) -> Result<()
     Ok(())
 }
 
-/// The options that only mean something together with `--dag`.
+/// The options that are meaningful only together with `--dag`.
 const COMPANIONS: [OptionName; 6] = [
     name::GRAPH,
     name::UNIT,
@@ -135,57 +137,58 @@ const COMPANIONS: [OptionName; 6] = [
     name::STRICT_DEADLINES,
 ];
 
-/// The longest periods of a run if nothing is said of its length, as for the guest.
+/// The length of a run without a stated length, in the longest periods; the guest's default is
+/// equal.
 const PERIODS: u64 = 50;
 
-/// Returns the guest's word with the kernel's worst overheads. The commit adds them to WCETs before
-/// it computes bounds.
+/// Returns the guest's word for the kernel's worst-case overheads. The commit adds them to the
+/// WCETs before computing bounds.
 fn overheads(cores: u64) -> String {
     let [switch, dispatch, interrupt, ready] = kernel_overheads_ns(cores);
     format!("overheads_ns={switch},{dispatch},{interrupt},{ready}")
 }
 
-/// Reports whether a command line states the kernel's overheads, or has them measured.
+/// Reports whether a command line states the kernel's overheads or orders a measurement of them.
 pub(crate) fn states_overheads(words: &str) -> bool {
     words
         .split_whitespace()
         .any(|word| word.starts_with("overheads_ns=") || word.starts_with("overheads="))
 }
 
-/// A file that is ready to be booted.
+/// A file ready to boot.
 #[derive(Debug)]
 pub struct PreparedFile {
-    /// Its name.
+    /// The file's name.
     pub path: PathBuf,
-    /// Its content.
+    /// The file's content.
     pub file: DagFile,
     /// The length of the run.
     pub length: Length,
-    /// The memory that it needs, in MiB.
+    /// The memory needed, in MiB.
     pub memory_mib: u64,
-    /// Words for the guest besides those of options.
+    /// Words for the guest besides the options' own.
     pub words: Vec<String>,
-    /// A time limit that is generous also where a job takes its real time, in seconds.
+    /// A time limit in seconds, generous even where jobs take their real time.
     pub limit_s: u64,
 }
 
 impl PreparedFile {
-    /// Translates a guest's refusal of the file into one as of [`load`], one line a fault; `None`
-    /// if it is about something else.
+    /// Translates a guest's refusal of the file into messages as from [`load`], one line a fault.
+    /// Returns `None` for a refusal about anything else.
     pub fn translate(&self, said: &str) -> Option<String> {
         translate(said, &self.path, &self.file)
     }
 }
 
-/// Reads the file that `--dag` names, if it is given.
+/// Reads the file named by `--dag`; returns `None` without this option.
 ///
 /// # Errors
 ///
-/// In lines for people: the faults of the options or of the file.
+/// Lines for people: the faults of the options or of the file.
 #[allow(clippy::too_many_lines, reason = "one option after the other")]
 pub fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Vec<String>> {
     let refuse = |line: String| vec![line];
-    // Without a file, an option that is about one is a mistake.
+    // Without a file, an option about DAG files is a mistake.
     let Some(path) = options.path(name::DAG) else {
         let without = options.check_without(&COMPANIONS, "needs `--dag FILE`; give that, too");
         return without.map(|()| None).map_err(refuse);
@@ -215,8 +218,8 @@ pub fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Vec<String>>
         length,
         limit_s: options.number(name::TIMEOUT).unwrap_or(600),
     };
-    // In virtual time neither a guest's memory nor its time is a limit, and of many sets one that is
-    // refused does not keep the others from being run: the program checks each.
+    // In virtual time neither a guest's memory nor its time is a limit. Among many sets, a refused
+    // set must not keep the others from running: the program checks each set itself.
     let is_booted = options.text(name::ON) != Some("host");
     let file = read(path, &import)?;
     if is_booted || file.sets.len() == 1 {
@@ -261,7 +264,8 @@ pub fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Vec<String>>
     }))
 }
 
-/// Reads the division of the cores. With `auto` the commit finds it, so here they are undivided.
+/// Reads the division of the cores. With `auto` the commit finds a division, so none is stated
+/// here.
 fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
     let Some(text) = text.filter(|text| *text != "auto") else {
         return Ok(CoreDivision::Undivided);
@@ -281,7 +285,7 @@ fn length(options: &Arguments) -> Length {
     }
 }
 
-/// Returns the number of records of a set in a run: its jobs, instances and waits.
+/// Returns the number of records written by a set in a run: its jobs, instances and waits.
 fn records(set: &Set, length: Length) -> u64 {
     let length = length.of(set);
     let of = |dag: &FileDag| {
@@ -292,11 +296,12 @@ fn records(set: &Set, length: Length) -> u64 {
     set.dags.iter().map(of).fold(0, u64::saturating_add)
 }
 
-/// The most memory in MiB: a guest has its stacks and its heap below 3 GiB.
+/// The most memory in MiB: a guest's stacks and heap lie below 3 GiB.
 const MOST_MEMORY_MIB: u64 = 3072;
 
-/// Returns the memory that a set's jobs in flight need at a time, in bytes: measured, a job takes
-/// 960 of the heap and an instance of it 260, for as many as a power of two.
+/// Returns the memory needed by a set's jobs in flight, in bytes. By measurement, a job takes 960
+/// bytes of the heap and each of its instances 260; the number of places for jobs is a power of
+/// two.
 fn in_flight_bytes(set: &Set, length: Length) -> u64 {
     const OF_A_JOB: u64 = 1024 * 4 / 3;
     const OF_AN_INSTANCE: u64 = 288 * 4 / 3;
@@ -314,12 +319,13 @@ fn in_flight_bytes(set: &Set, length: Length) -> u64 {
     set.dags.iter().map(of).fold(0, u64::saturating_add)
 }
 
-/// Returns the memory that a file needs, in MiB. A quarter of it becomes stacks, of which each
-/// subtask has one and each core a few; the rest is the heap, half of which records may take.
+/// Returns the memory needed by a file, in MiB. A quarter of the memory becomes stacks, one for
+/// each subtask and a few for each core; the rest is the heap, and records may take half of the
+/// heap.
 ///
-/// The guest has the file as text, and its content in the heap: measured, an edge takes some 210
-/// bytes and a sample some 17, while a line has 12 bytes and a sample 4. So the heap has 20 bytes
-/// for each byte of the text, and three quarters of the memory are the heap.
+/// The guest keeps the file as text, and its content in the heap. By measurement, an edge takes
+/// some 210 bytes and a sample some 17, while their text takes 12 bytes for a line and 4 for a
+/// sample. So the heap gets 20 bytes for each byte of text, and the memory is 4/3 of the heap.
 fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
     const OF_A_CORE: u64 = 4 * (336 << 10);
     const OF_A_SUBTASK: u64 = 4 * (65 << 10);
@@ -335,19 +341,20 @@ fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
     let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
         .saturating_add(file.sets.iter().map(of_jobs).max().unwrap_or(0))
         .saturating_add(cores.saturating_mul(OF_A_CORE))
-        // The text as the guest gets it, which may be longer than the person's file.
+        // The text as the guest gets it; it may be longer than the person's file.
         .saturating_add((file.to_string().len() as u64).saturating_mul(OF_A_BYTE));
     12 + bytes.div_ceil(MIB)
 }
 
-/// The longest run if no limit is given, in seconds: a day.
+/// The longest run without a stated limit, in seconds: a day.
 const MOST_S: u64 = 86_400;
 
-/// Returns the time limit of a run in seconds: two minutes, the time from the first release to the
-/// last, the time that all jobs would take on one core and wait, and a second for every 500 records.
+/// Returns the time limit of a run in seconds: the sum of two minutes, the time from the first
+/// release to the last, the time of all jobs with their waits on one core, and a second for every
+/// 500 records.
 fn limit_s(file: &DagFile, length: Length) -> u64 {
     const NS_PER_S: u128 = 1_000_000_000;
-    // In 128 bits: periods and numbers of jobs come from a file and may be of any size.
+    // In 128 bits: periods and numbers of jobs come from a file and may have any size.
     let mut seconds = 120_u128;
     for set in &file.sets {
         seconds += u128::from(records(set, length) / 500);
@@ -363,7 +370,7 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
             let period_ns = u128::from(spec.period_ns.unwrap_or(0));
             let last_ns =
                 period_ns.saturating_mul(jobs.saturating_sub(1)) + u128::from(spec.offset_ns);
-            // DAGs of a set run at the same time: the longest span counts, and the sum of the work.
+            // DAGs of a set run at the same time: the longest span counts, but all of the work.
             span_ns = span_ns.max(last_ns);
             busy_ns = busy_ns.saturating_add(of_job_ns.saturating_mul(jobs));
         }
@@ -372,8 +379,8 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
     u64::try_from(seconds).unwrap_or(u64::MAX)
 }
 
-/// Translates a guest's message: `path` and its lines take the place of the words `DAG file`, one
-/// line a fault; `None` if the message is not about the file.
+/// Translates a guest's message: puts `path` and its lines in place of the words `DAG file`, one
+/// line a fault. Returns `None` for a message about anything else.
 pub(crate) fn translate(said: &str, path: &Path, file: &DagFile) -> Option<String> {
     let place = path.display();
     let said = said.strip_prefix("DAG file")?;
@@ -391,9 +398,9 @@ pub(crate) fn translate(said: &str, path: &Path, file: &DagFile) -> Option<Strin
     Some(lines.join("\n"))
 }
 
-/// Returns the line of the person's file for a line of the guest's file.
+/// Finds the line of the person's file for a line of the guest's file.
 fn source_line(file: &DagFile, line: usize) -> Option<usize> {
-    // Parsed again, since only the parser knows the lines of the written form.
+    // Parsed again: only the parser knows the lines of the written form.
     let written = parse(&file.to_string()).ok()?;
     let dags = |file: &DagFile| -> Vec<Vec<usize>> {
         let dags = file.sets.iter().flat_map(|set| &set.dags);
@@ -406,7 +413,7 @@ fn source_line(file: &DagFile, line: usize) -> Option<usize> {
         .map(|(_, read)| *read)
 }
 
-/// Returns all lines of a DAG, in an order that does not depend on how it is written.
+/// Returns all lines of a DAG, in an order independent of how the DAG is written.
 fn lines(dag: &FileDag) -> Vec<usize> {
     let subtasks = dag.subtasks.iter().map(|subtask| subtask.line);
     let all = std::iter::once(dag.line).chain(subtasks);

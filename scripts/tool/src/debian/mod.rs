@@ -1,15 +1,15 @@
-//! Debian's Linux in QEMU, for our programs that need another kernel than this computer's: one with
-//! `sched_ext`, or one that grants SCHED_FIFO.
+//! Runs programs under Debian's Linux in QEMU. Some of our programs need another kernel than this
+//! computer's: a kernel with `sched_ext`, or one granting SCHED_FIFO.
 //!
-//! Kernel and tools are Debian's packages. The guest's files are in an archive that the kernel
-//! unpacks into memory: the program, its libraries, and a script that runs it. The program's output
-//! comes through a port of its own, as bytes and at any speed; its exit code through another one,
-//! into a file.
+//! Kernel and tools come from Debian's packages. The guest's files are in an archive, unpacked by
+//! the kernel into memory: the program, its libraries, and a script to run the program. The
+//! program's output comes through a port of its own, as bytes and at any speed. Its exit code comes
+//! through a second port into a file.
 //!
-//! The packages are unpacked next to this computer's system and not into it. `apt-get` fetches them
+//! The packages are unpacked beside this computer's system, never into it. `apt-get` fetches them
 //! with its own sources, lists and downloads below `target/debian`, and `dpkg` unpacks them there.
-//! They are trixie's, with a kernel of trixie's backports, on any Debian or Ubuntu; their programs
-//! are run by their own loader.
+//! They come from trixie, the kernel from trixie's backports, on any Debian or Ubuntu. Their own
+//! loader runs their programs.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -22,24 +22,24 @@ use crate::progress::ProgressNote;
 use crate::qemu::{self, Mode, PROGRAM, file_value};
 use crate::system::{self, find_program, run};
 
-/// The guest's first program, a script that runs the others.
+/// The guest's first program, a script to run the others.
 const INIT: &str = include_str!("init.sh");
 
-/// The policy of `sched_ext`, as source.
+/// The scheduling policy for `sched_ext`, as source.
 const POLICY: &str = "fass/linux/bpf/seats.bpf.c";
 
-/// Memory of a guest, in MiB.
+/// The memory of a guest, in MiB.
 const MEMORY_MIB: u64 = 1024;
 
 /// A program to run in a guest.
 pub struct GuestOrder<'a> {
     /// The program.
     pub program: &'a Path,
-    /// Its words. A word that begins with `module=` names a file of this computer.
+    /// The program's arguments. A word beginning with `module=` names a file of this computer.
     pub words: &'a [OsString],
-    /// Whether the policy is loaded first.
+    /// Whether the guest loads the policy first.
     pub with_policy: bool,
-    /// The number of programs that compute next to it.
+    /// The number of programs computing beside the program.
     pub busy: u64,
     /// The meaning of time in the guest.
     pub mode: Mode,
@@ -47,11 +47,11 @@ pub struct GuestOrder<'a> {
     pub cores: u64,
 }
 
-/// A guest that can be started: QEMU, and its arguments.
+/// A guest ready to start: QEMU and its arguments.
 pub struct Guest {
     /// QEMU.
     pub program: PathBuf,
-    /// Its words.
+    /// QEMU's arguments.
     pub words: Vec<OsString>,
     /// The file with the output of kernel and script.
     console: PathBuf,
@@ -61,12 +61,12 @@ pub struct Guest {
 }
 
 impl Guest {
-    /// Gets the packages, compiles the policy if it is wanted, and makes the archive. The guest's
-    /// own files lie next to `log`.
+    /// Gets the packages, compiles the policy if wanted, and makes the archive. The guest's own
+    /// files lie next to `log`.
     ///
     /// # Errors
     ///
-    /// In words: something cannot be had, or the policy does not compile.
+    /// In words: a package or tool cannot be had, or the policy does not compile.
     pub fn new(order: &GuestOrder<'_>, log: &Path) -> Result<Guest, String> {
         install::ensure_qemu()?;
         let packages = UnpackedPackages::get()?;
@@ -78,14 +78,15 @@ impl Guest {
             order.lay_out(folder, &packages)?;
             pack(folder, &packages, archive.path())
         })?;
-        // The file must exist: until the guest has written a code, it is empty and so none.
+        // The file must exist already: until the guest writes a code, it stays empty, meaning no
+        // code.
         write(end.path(), "")?;
         let mut words = qemu::words(match order.mode {
             // Two of Linux's instructions per nanosecond are nearer to a PC than one.
             Mode::Deterministic => "-icount shift=1,sleep=off -cpu max",
             other => other.arguments(),
         });
-        // Not by standard output: that port would close at the end of standard input.
+        // Not through standard output: QEMU would close that port at the end of standard input.
         for (port, path) in [("out", log), ("end", end.path())] {
             let file = file_value(&format!("file,id={port},path="), path);
             words.extend(["-chardev".into(), file]);
@@ -95,8 +96,8 @@ impl Guest {
              -device virtserialport,nr=1,chardev=out -device virtserialport,nr=2,chardev=end \
              -append",
         ));
-        // With counted instructions a computing processor keeps the emulator until a timer fires:
-        // with ticks apart, the processors wait less for each other.
+        // With counted instructions, a computing processor keeps the emulator until a timer fires.
+        // With ticks apart, the processors wait less for each other.
         words.push("console=ttyS0 quiet panic=-1 skew_tick=1".into());
         for (option, value) in [
             ("-smp", order.cores.to_string().into()),
@@ -116,8 +117,8 @@ impl Guest {
         })
     }
 
-    /// Returns the program's exit code; `None` if there is none: the guest did not get that far, or
-    /// Linux has ended the policy before the program's end.
+    /// Returns the program's exit code. Returns `None` if the guest did not get that far, or if
+    /// Linux ended the policy before the program's end.
     pub fn code(&self) -> Option<i32> {
         let end = fs::read_to_string(self.end.path());
         end.ok()?.trim().parse().ok()
@@ -166,8 +167,8 @@ impl GuestOrder<'_> {
     }
 }
 
-/// Packs a folder into an archive in cpio's format, which Linux unpacks into memory when it starts,
-/// with the folders that the script mounts. Every file is executable and root's.
+/// Packs a folder into a cpio archive, including the folders mounted by the script. Linux unpacks
+/// the archive into memory when it starts. Every file is executable and belongs to root.
 fn pack(folder: &Path, packages: &UnpackedPackages, archive: &Path) -> Result<(), String> {
     const LINES: &str = "set -e; mkdir proc sys dev tmp; chmod -R 755 .
         find . | \"$0\" cpio -o -H newc -R 0:0 >\"$1\"";
@@ -187,27 +188,27 @@ fn compile(packages: &UnpackedPackages, object: &Path) -> Result<(), String> {
     run(clang.arg("-o").arg(object)).map(drop)
 }
 
-/// The packages that are fetched besides the kernel, with their dependencies.
+/// The packages fetched besides the kernel, with their dependencies.
 const PACKAGES: [&str; 4] = ["busybox-static", "bpftool", "clang-19", "libbpf-dev"];
 
-/// The keys by which the lists of packages are signed.
+/// The keys for checking the signatures of the package lists.
 const KEYS: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
-/// The preferred kernel version: the policy was tried with it.
+/// The preferred kernel version, used to try the policy.
 const TRIED: [u32; 2] = [6, 18];
-/// The first version whose `sched_ext` has everything that the policy uses.
+/// The first kernel version whose `sched_ext` has every function used by the policy.
 const LEAST: [u32; 2] = [6, 13];
 
-/// The packages, unpacked.
+/// The unpacked packages.
 struct UnpackedPackages {
-    /// The folder that stands for a file system's root.
+    /// The folder used as the root of a file system.
     root: PathBuf,
     /// The kernel.
     kernel: PathBuf,
 }
 
 impl UnpackedPackages {
-    /// Makes sure that the packages are there.
+    /// Makes sure that the packages are there, and returns them.
     fn get() -> Result<UnpackedPackages, String> {
         let folder = system::workspace().join("target/debian");
         let parts = ["lists/partial", "cache/archives/partial", "root"];
@@ -220,7 +221,7 @@ impl UnpackedPackages {
         let locked = lock.and_then(|lock| lock.lock().map(|()| lock));
         let _lock = locked.map_err(|why| format!("cannot lock `{}`: {why}", folder.display()))?;
         let (root, ready) = (folder.join("root"), folder.join("kernel"));
-        // Written last of all, so it is there only if everything is unpacked.
+        // Written last, so this file is there only if everything is unpacked.
         if !ready.is_file() {
             let kernel = fetch(&folder)?;
             files::write(&ready, kernel)?;
@@ -236,7 +237,7 @@ impl UnpackedPackages {
         self.root.join("usr/lib64/ld-linux-x86-64.so.2")
     }
 
-    /// Returns the statically linked program of many tools.
+    /// Returns busybox, one statically linked program with many tools.
     fn busybox(&self) -> PathBuf {
         self.root.join("usr/bin/busybox")
     }
@@ -248,7 +249,7 @@ impl UnpackedPackages {
         command
     }
 
-    /// Returns the command that loads a program with the packages' libraries.
+    /// Returns the command for loading a program with the packages' libraries.
     fn loading(&self) -> Command {
         let mut command = Command::new(self.loader());
         let libraries = self.root.join("usr/lib/x86_64-linux-gnu");
@@ -256,7 +257,7 @@ impl UnpackedPackages {
         command
     }
 
-    /// Returns the libraries that programs are linked with, each once.
+    /// Returns the libraries linked to the programs, each once.
     fn libraries(&self, programs: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
         let mut found = Vec::new();
         for program in programs {
@@ -272,7 +273,7 @@ impl UnpackedPackages {
     }
 }
 
-/// Reads a line of the loader's such as `libz.so.1 => /lib/libz.so.1 (0x7f00)`.
+/// Returns the path in a line of the loader such as `libz.so.1 => /lib/libz.so.1 (0x7f00)`.
 fn library(line: &str) -> Option<PathBuf> {
     let (_, path) = line.split_once(" => ")?;
     let (path, _) = path.rsplit_once(" (")?;
@@ -331,14 +332,14 @@ fn fetch(folder: &Path) -> Result<String, String> {
                 .arg("-x")
                 .arg(&file)
                 .arg(folder.join("root")))?;
-            // It is unpacked, and can be fetched again.
+            // The file is unpacked, and can be fetched again.
             let _ = fs::remove_file(&file);
         }
     }
     Ok(kernel.replacen("linux-image-", "vmlinuz-", 1))
 }
 
-/// Returns a command of apt's that neither knows nor changes this computer's packages.
+/// Returns an apt command that neither knows nor changes this computer's packages.
 fn apt(program: &str, folder: &Path) -> Command {
     let mut command = Command::new(program);
     for (name, part) in [
@@ -364,7 +365,7 @@ fn apt(program: &str, folder: &Path) -> Command {
     command
 }
 
-/// Chooses a kernel for virtual machines: the latest of the tried version, or else the latest.
+/// Chooses a kernel for virtual machines: the latest of the tried version, else the latest of all.
 fn choose<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let version = |name: &str| -> Option<[u32; 3]> {
         let name = name.strip_prefix("linux-image-")?;
@@ -376,7 +377,7 @@ fn choose<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     };
     let rated = names.filter_map(|name| {
         let version = version(name)?;
-        // A version that was tried beats any other; among equals the latest wins.
+        // A tried version beats any other; among equals the latest wins.
         Some(((version[..2] == TRIED, version), name))
     });
     rated.max().map(|(_, name)| name)
