@@ -188,7 +188,7 @@ pub fn build_target(
         _ if profile == PAGE_PROFILE => ("build", &["--target", WASM_TARGET][..]),
         // Only `cargo rustc` takes flags for the last crate alone.
         "--bin" => ("rustc", &FOR_IMAGES[..]),
-        // None of the features of such a program contains the kernel.
+        // Only the default features bring the kernel, for which such a program has no use.
         _ if name.ends_with("-host") => ("build", &["--no-default-features"][..]),
         _ => ("build", &[][..]),
     };

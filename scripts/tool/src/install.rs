@@ -1,9 +1,9 @@
-//! Installing the programs that a command needs, by `apt-get`, a target of Rust, by `rustup`, and what
-//! tests need of PyPI, by `pip`.
+//! Installs the programs needed by a command with `apt-get`, a target of Rust with `rustup`, and
+//! the Python packages needed by tests with `pip`.
 //!
-//! A command that needs QEMU installs it if it is missing; one that needs GRUB, a firmware
-//! or Bochs does likewise. The tool downloads nothing itself. Without `apt-get` the person is told
-//! what to install.
+//! A command that needs QEMU installs it if it is missing; commands that need GRUB, a firmware or
+//! Bochs do likewise. The tool itself downloads nothing. Without `apt-get` a message tells the
+//! person which package to install.
 
 use std::fs::{self, File};
 use std::io;
@@ -13,18 +13,19 @@ use std::process::{Command, Stdio};
 use crate::qemu::{Loader, OVMF_FILE, PROGRAM};
 use crate::system::{self, find_program};
 
-/// Something of the host's that a command needs.
+/// A program or file of the host needed by a command.
 pub struct HostNeed {
-    /// Its name, and a description for messages.
+    /// The name, and a description for messages.
     name: &'static str,
     what: &'static str,
-    /// The parts by which it is recognized: programs on the `PATH`, and files or folders.
+    /// The parts that prove its presence: programs on the `PATH`, and files or folders.
     parts: &'static [&'static str],
-    /// Debian's packages that bring it, with blanks between; empty: a person installs it.
+    /// The names of Debian's packages with these parts, with blanks between; empty if a person
+    /// installs it.
     packages: &'static str,
 }
 
-/// The emulator that everything boots in, with the firmware that it brings.
+/// The emulator for all boots, with its firmware.
 pub static QEMU: HostNeed = HostNeed {
     name: "QEMU",
     what: "QEMU's system emulator for x86_64",
@@ -40,7 +41,7 @@ pub static GDB: HostNeed = HostNeed {
     packages: "gdb",
 };
 
-/// The programs that make an ISO, for BIOS and for UEFI.
+/// The programs for making an ISO, for BIOS and for UEFI.
 pub static GRUB: HostNeed = HostNeed {
     name: "GRUB",
     what: "GRUB for BIOS and for UEFI, xorriso and mtools",
@@ -54,7 +55,7 @@ pub static GRUB: HostNeed = HostNeed {
     packages: "grub-pc-bin grub-efi-amd64-bin xorriso mtools",
 };
 
-/// UEFI for QEMU.
+/// The UEFI firmware for QEMU.
 pub static OVMF: HostNeed = HostNeed {
     name: "OVMF",
     what: "the firmware that gives QEMU's machines UEFI",
@@ -62,7 +63,7 @@ pub static OVMF: HostNeed = HostNeed {
     packages: "ovmf",
 };
 
-/// The emulator that imitates a PC the most strictly.
+/// The strictest emulator of a PC.
 pub static BOCHS: HostNeed = HostNeed {
     name: "Bochs",
     what: "the emulator Bochs with its firmware and SDL's display",
@@ -74,7 +75,7 @@ pub static BOCHS: HostNeed = HostNeed {
     packages: "bochs bochs-sdl bochsbios vgabios",
 };
 
-/// The program that counts instructions on Linux.
+/// The program for counting instructions on Linux.
 pub static VALGRIND: HostNeed = HostNeed {
     name: "Valgrind",
     what: "a program that counts the instructions of others",
@@ -82,7 +83,7 @@ pub static VALGRIND: HostNeed = HostNeed {
     packages: "valgrind",
 };
 
-/// The runtime in which tests run the page's engine without a browser.
+/// The runtime for testing the page's engine without a browser.
 pub static NODE: HostNeed = HostNeed {
     name: "Node.js",
     what: "a runtime of JavaScript and WebAssembly",
@@ -90,7 +91,8 @@ pub static NODE: HostNeed = HostNeed {
     packages: "nodejs",
 };
 
-/// The prover that checks the proofs of bounds, and the compiler of the checker that it extracts.
+/// The prover that checks the proofs of bounds, and the compiler of the checker extracted by the
+/// prover.
 pub static COQ: HostNeed = HostNeed {
     name: "Coq",
     what: "a prover, with OCaml",
@@ -98,7 +100,7 @@ pub static COQ: HostNeed = HostNeed {
     packages: "coq ocaml-nox",
 };
 
-/// A browser, in which tests open the page. It is large, so it is not installed for them.
+/// The browser in which tests open the page. Its package is large, so tests do not install it.
 pub static CHROMIUM: HostNeed = HostNeed {
     name: "Chromium",
     what: "a browser",
@@ -106,7 +108,7 @@ pub static CHROMIUM: HostNeed = HostNeed {
     packages: "",
 };
 
-/// The reader of YAML for `scripts/convert`, which Debian's Python finds here.
+/// The reader of YAML for `scripts/convert`, in the folder of Debian's own Python.
 static YAML: HostNeed = HostNeed {
     name: "PyYAML",
     what: "Python's reader of YAML",
@@ -120,20 +122,20 @@ pub(crate) const WASM_TARGET: &str = "wasm32-wasip1";
 /// Packages of PyPI for tests: a router of Zenoh, and a reader of ROS 2's messages.
 const OF_PYPI: [&str; 2] = ["eclipse-zenoh==1.10.2", "rosbags==0.11.9"];
 
-/// Makes sure that QEMU is there, as [`ensure`] does.
+/// Makes sure that QEMU is there, and installs it if necessary.
 ///
 /// # Errors
 ///
-/// As [`ensure`].
+/// The errors of [`ensure`].
 pub fn ensure_qemu() -> Result<(), String> {
     ensure(&QEMU)
 }
 
-/// Makes sure that everything a loader needs besides QEMU is there, as [`ensure`] does.
+/// Makes sure that a loader has everything besides QEMU, and installs missing programs.
 ///
 /// # Errors
 ///
-/// As [`ensure`].
+/// The errors of [`ensure`].
 pub fn ensure_loader(loader: Loader) -> Result<(), String> {
     match loader {
         Loader::Pvh => Ok(()),
@@ -142,20 +144,20 @@ pub fn ensure_loader(loader: Loader) -> Result<(), String> {
     }
 }
 
-/// Makes sure that something is there, and installs it if it is not. The package manager's output
-/// goes to standard error.
+/// Makes sure that a program is there, and installs it if it is missing. The package manager's
+/// output goes to standard error.
 ///
 /// # Errors
 ///
-/// In words: the system is not known, or the installation failed, with the remedy by hand.
+/// In words: the system is not known, or the installation failed; with the remedy by hand.
 pub fn ensure(need: &HostNeed) -> Result<(), String> {
     let Some(part) = missing(need) else {
         return Ok(());
     };
     let [update, install] = plan(need, part, |name| find_program(name).is_some(), is_root())?;
     let name = need.name;
-    // One unreachable source fails the whole update, but the needed package may come from another:
-    // the installation decides.
+    // One unreachable source fails the whole update, but the needed package may come from another
+    // source: the installation decides.
     if let Err(why) = run(name, &update) {
         eprintln!("{why}");
     }
@@ -171,11 +173,11 @@ pub fn ensure(need: &HostNeed) -> Result<(), String> {
     }
 }
 
-/// Makes sure that Python can read YAML, as [`ensure`] does.
+/// Makes sure that Python can read YAML, and installs a reader if necessary.
 ///
 /// # Errors
 ///
-/// As [`ensure`], or that the Python on the `PATH` is another than Debian's.
+/// The errors of [`ensure`]; also, that the Python on the `PATH` is not Debian's.
 pub fn ensure_yaml() -> Result<(), String> {
     let import = || system::run(Command::new("python3").args(["-c", "import yaml"]));
     if import().is_ok() {
@@ -188,14 +190,14 @@ pub fn ensure_yaml() -> Result<(), String> {
         .map_err(|_| format!("the `python3` on the PATH has no PyYAML; {remedy}"))
 }
 
-/// Makes sure that Rust can compile for WebAssembly, and adds its target if it is missing.
+/// Makes sure that Rust can compile for WebAssembly, and adds the target if it is missing.
 ///
 /// # Errors
 ///
 /// In words, with the remedy by hand.
 pub fn ensure_wasm() -> Result<(), String> {
     let mut rustc = Command::new("rustc");
-    // In the workspace, since a toolchain is pinned there.
+    // In the workspace, which pins a toolchain.
     rustc.current_dir(system::workspace());
     let folder = system::run(rustc.args(["--print=target-libdir", "--target", WASM_TARGET]))?;
     if Path::new(folder.trim()).is_dir() {
@@ -207,12 +209,12 @@ pub fn ensure_wasm() -> Result<(), String> {
     })
 }
 
-/// Returns a Python with the packages that tests need, in `target/python`, which it installs if they
-/// are missing.
+/// Returns a Python with the packages needed by tests, in `target/python`. Installs missing
+/// packages.
 ///
 /// # Errors
 ///
-/// In words: there is no Python, or the packages are not to be had.
+/// In words: there is no Python, or the packages cannot be had.
 pub fn python() -> Result<PathBuf, String> {
     let folder = system::workspace().join("target/python");
     let python = folder.join("bin/python");
@@ -222,7 +224,7 @@ pub fn python() -> Result<PathBuf, String> {
             let file = File::create(folder.with_extension("lock"))?;
             file.lock().map(|()| file)
         };
-        // Until it is dropped, other processes wait here.
+        // Other processes wait here until this lock is dropped.
         let _lock = lock().map_err(|why| format!("`{}`: {why}", folder.display()))?;
         if system::run(Command::new(&python).args(["-c", "import zenoh, rosbags"])).is_ok() {
             return Ok(());
@@ -238,7 +240,7 @@ pub fn python() -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Returns the first part that is missing.
+/// Returns the first missing part.
 fn missing(need: &HostNeed) -> Option<&'static str> {
     let is_there = |part: &&str| match part.starts_with('/') {
         true => Path::new(part).exists(),
@@ -247,8 +249,8 @@ fn missing(need: &HostNeed) -> Option<&'static str> {
     need.parts.iter().copied().find(|part| !is_there(part))
 }
 
-/// Returns the beginnings of the commands that update the list of packages and that install some,
-/// from the programs that exist and whether we are root.
+/// Returns two commands: the first updates the list of packages, the second installs the packages.
+/// `exists` tells which programs are there, and `root` whether we are root.
 fn plan(
     need: &HostNeed,
     part: &str,
@@ -289,7 +291,7 @@ fn run(name: &str, line: &str) -> Result<(), String> {
     let mut words = line.split(' ');
     let mut command = Command::new(words.next().unwrap_or_default());
     command.args(words).current_dir(system::workspace());
-    // Packages of Debian would ask questions, which nobody answers here.
+    // Debian's packages would ask questions; nobody answers them here.
     command.env("DEBIAN_FRONTEND", "noninteractive");
     // A program may read our standard output.
     command.stdout(Stdio::from(io::stderr()));

@@ -1,32 +1,32 @@
-//! The host tool: one place that starts QEMU, one that reads the serial protocol.
+//! The host tool: the only place that starts QEMU and reads the serial protocol.
 //!
-//! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
-//! all it printed, lines for people and machine lines mixed. Its *ending* is
-//! how QEMU's process ended; its *verdict* is its own last line. The tool's
-//! *subcommands* (`run`, `image`, ...) are called by the scripts in `scripts/`.
+//! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is its whole output, a
+//! mixture of lines for people and machine lines. Its *ending* is the way QEMU's process ended; its
+//! *verdict* is its own last line. The scripts in `scripts/` call the tool's *subcommands* (`run`,
+//! `image`, ...).
 //!
-//! The library serves the program (`main.rs`), the laboratory (`scripts/lab`), and the tests, its
-//! own and the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
+//! The library serves the program (`main.rs`), the laboratory (`scripts/lab`), and two kinds of
+//! tests, its own and the boot tests in `tests/`; both judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`elf`], [`image`], [`medium`], [`places`]: images and media to boot;
 //! - [`child`], [`qemu`], [`outcome`]: the boot, and the judgement of its end;
 //! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
-//! - [`options`](mod@options): command lines by a table; [`files`]: the files they name; [`output`],
-//!   [`progress`]: printing without a panic, and progress of long work;
-//! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
+//! - [`options`](mod@options): command lines described by a table; [`files`]: files named there;
+//!   [`output`], [`progress`]: printing without a panic, and progress of long work;
+//! - [`mod@dag_file`]: DAGs described by files of any supported format;
 //! - [`trace`]: the events of a run, checked against the model's rules;
 //! - [`recordings`]: the inputs of a run, and conversion to and from other formats;
-//! - [`proof`]: the bounds of committed DAGs, and witnesses of these;
+//! - [`proof`]: the bounds of committed DAGs, and witnesses of these bounds;
 //! - [`page`](mod@page): the page that plays and shows runs;
 //! - [`run`](mod@run) with its [`run_options`], [`new_app`](mod@new_app): the subcommands.
 //!
-//! It guarantees that no guest runs without a limit, and that no run counts
-//! as good that did not say so twice. It uses the standard library only, and
-//! no `unsafe`.
+//! The library guarantees that no guest runs without a limit. A run counts as good only if both the
+//! guest's verdict and QEMU's exit status say so. Besides crates of this workspace, the library
+//! uses only the standard library, and no `unsafe`.
 
 #![forbid(unsafe_code)]
 
-// First: its macros hide the standard library's only in the modules after it.
+// First: the macros in this module hide the standard library's only in later modules.
 #[macro_use]
 pub mod output;
 

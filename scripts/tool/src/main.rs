@@ -1,7 +1,7 @@
-//! The host tool. The scripts in `scripts/` call its subcommands.
+//! The host tool's program. The scripts in `scripts/` call its subcommands.
 //!
-//! A subcommand takes the words after its name and returns the exit code:
-//! 0 all is well, 1 a failure, 2 a refused command line.
+//! A subcommand takes the words after its name and returns the exit code: 0 all is well, 1 a
+//! failure, 2 a refused command line.
 
 #![forbid(unsafe_code)]
 

@@ -1,12 +1,12 @@
-//! Boot media for a PC, and the subcommand `image`, which makes them.
+//! Makes boot media for a PC, also by the subcommand `image`.
 //!
-//! A medium is an ISO, for a stick or a disc. It holds the loaded part of the app's image, a file
-//! to leave in memory if there is one, GRUB for BIOS and for UEFI, and the commands by which GRUB
-//! boots the image with its words. `grub-mkrescue` makes it, with the few modules of GRUB that this
-//! takes. A [`StickImage`] is a stick for one boot: a file that QEMU shows as one, and that is removed
-//! afterwards. Everything is checked before anything is built.
+//! A medium is an ISO, for a stick or a disc. It contains the loaded part of the app's image,
+//! optionally a file to leave in memory, GRUB for BIOS and for UEFI, and commands for GRUB to boot
+//! the image with its words. `grub-mkrescue` makes the ISO, with the few modules of GRUB needed for
+//! the boot. A [`StickImage`] is a stick for a single boot: a temporary file shown by QEMU as a
+//! stick. Everything is checked before anything is built.
 //!
-//! Exit codes: 0 the file is there, 1 it could not be made, 2 a refused command line.
+//! Exit codes: 0 the file is there, 1 the file could not be made, 2 a refused command line.
 
 use std::ffi::OsString;
 use std::fs;
@@ -61,7 +61,7 @@ pub fn image(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Checks everything that can be refused, and returns the words for the guest.
+/// Checks everything a command line can get wrong, and returns the words for the guest.
 fn check(options: &Arguments) -> Result<String, String> {
     let outputs = options.named(&[name::ISO]);
     if outputs.is_empty() {
@@ -92,7 +92,7 @@ fn check(options: &Arguments) -> Result<String, String> {
     Ok(guest.guest_words)
 }
 
-/// Makes the ISO, and returns a line about it.
+/// Makes the ISO, and returns a line describing the file.
 fn make(options: &Arguments, words: &str) -> Result<String, String> {
     let image = match options.path(name::IMAGE) {
         Some(path) => path.into(),
@@ -110,17 +110,16 @@ fn make(options: &Arguments, words: &str) -> Result<String, String> {
     ))
 }
 
-/// The content of a stick; the file is removed when this value is dropped.
+/// The content of a stick, in a file removed when this value is dropped.
 pub struct StickImage(TemporaryFile);
 
 impl StickImage {
-    /// Makes the medium from which GRUB boots `image`, with `words`, and with `module` left in
-    /// memory.
+    /// Makes a medium from which GRUB boots `image` with `words`, leaving `module` in memory.
     ///
     /// # Errors
     ///
-    /// In words: a file cannot be read, the image is no ELF file, the words are refused, something
-    /// is missing, `grub-mkrescue` failed, or there is no room.
+    /// In words: a file cannot be read, the image is no ELF file, the words are refused, a tool is
+    /// missing, `grub-mkrescue` failed, or there is no room.
     pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<StickImage, String> {
         let loaded = elf::loaded(files::read_at(image)?);
         let loaded = loaded.map_err(|why| format!("`{}`: {why}", files::shown_path(image)))?;
@@ -137,19 +136,19 @@ impl StickImage {
     }
 }
 
-/// The modules of GRUB, besides those that it needs to read its own files. The kinds of partitions
-/// are those that it asks for at its start. A test uses `wrmsr` to leave a processor as some
-/// firmware does.
+/// The modules of GRUB beyond those for reading its own files. The `part_` modules are the kinds of
+/// partitions GRUB asks for at its start. A test uses `wrmsr` to leave a processor in the state
+/// left by some firmware.
 const MODULES: &str = "--install-modules=normal multiboot2 cpuid echo read wrmsr iso9660 \
                        all_video part_acorn \
                        part_amiga part_apple part_bsd part_dfly part_dvh part_gpt part_msdos \
                        part_plan part_sun part_sunpc";
 
-/// Makes sure that words reach the image through GRUB as they are.
+/// Makes sure that GRUB passes words to the image unchanged.
 ///
 /// # Errors
 ///
-/// In words, with the offender: it has a character that GRUB would change.
+/// In words, with the offending word: GRUB would change one of its characters.
 pub fn check_words(words: &str) -> Result<(), String> {
     let changes = |c: char| matches!(c, '\'' | '"' | '\\') || !(c.is_ascii_graphic());
     for word in words.split_whitespace() {
@@ -163,7 +162,7 @@ pub fn check_words(words: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the ISO `iso` that boots the image. Missing tools are installed.
+/// Writes to `iso` a medium for booting the image. Installs missing tools.
 fn write_iso(iso: &Path, image: &[u8], words: &str, module: Option<&[u8]>) -> Result<(), String> {
     check_words(words)?;
     install::ensure(&install::GRUB)?;
@@ -179,13 +178,13 @@ fn write_iso(iso: &Path, image: &[u8], words: &str, module: Option<&[u8]>) -> Re
     })
 }
 
-/// Returns GRUB's commands. A file stays as it is, compressed or not. GRUB itself reports a
-/// processor without 64 bits, on which the image cannot run a single instruction.
+/// Returns GRUB's commands. GRUB leaves every file as it is, compressed or not. It reports a
+/// processor without 64 bits, since the image cannot run a single instruction there.
 ///
-/// Under UEFI GRUB puts the first module at address 0. The firmware takes that address for a
-/// missing one and reads no file to it, unless GRUB reads through its cache, which depends on where
-/// the file lies. So a small module comes first, which always goes through the cache. Without the
-/// drivers of screens GRUB would leave the image none under UEFI.
+/// Under UEFI, GRUB puts the first module at address 0. The firmware takes this address for a
+/// missing address and reads no file to it, unless GRUB reads through its cache; whether GRUB does
+/// so depends on the place of the file. So a small module, always read through the cache, comes
+/// first. Without GRUB's screen drivers, the image would have no screen under UEFI.
 fn commands(words: &str, has_module: bool) -> String {
     let quoted = words.split_whitespace().map(|word| format!(" '{word}'"));
     let quoted: String = quoted.collect();
@@ -208,7 +207,7 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
     let mut command = process::Command::new("grub-mkrescue");
     command.args(["--locales=", "--themes=", "--fonts=", MODULES]);
     let made = system::run(command.arg(output).arg(folder));
-    // Its success alone does not prove that the file is there.
+    // Success alone does not prove that the file is there.
     made.and_then(|_| match iso.is_file() {
         true => Ok(()),
         false => Err(format!(

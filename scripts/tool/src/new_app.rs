@@ -1,16 +1,17 @@
-//! The subcommand `new-app`: an app of one's own, under `apps/` or in a repository of its own.
+//! Makes an app of one's own, under `apps/` or in a repository of its own: the subcommand
+//! `new-app`.
 //!
-//! The *template* is a complete app: a library with the functions and their DAG, a program that
-//! boots it, the same as a program for Linux, and a test that runs it on the host in virtual time.
-//! A new app is a copy in which the template's name is replaced. Under `apps/` cargo finds it by
-//! the workspace's `apps/*`, so nothing else changes. A repository also gets its share of the
-//! workspace: profiles, the toolchain's version, the sources of the crates. Cargo's *runner* there
-//! boots images, so that `cargo run` and `cargo test` work as for any program.
+//! The *template* is a complete app: a library with the functions and their DAG, a program to boot
+//! them, the same program for Linux, and a test in virtual time on the host. A new app is a copy of
+//! the template with another name. The workspace's `apps/*` lets cargo find apps under `apps/`, so
+//! nothing else changes there. A repository also gets its share of the workspace: profiles, the
+//! toolchain's version, the sources of the crates. Cargo's *runner* there boots images, so
+//! `cargo run` and `cargo test` work as for any program.
 //!
-//! The name is that of a package, of a folder and, with `_` for `-`, of a crate. So it must be
-//! possible as each: no keyword, no library that every program has, no package of the workspace. A
-//! name that is not possible is refused before anything is written. If writing fails in the middle,
-//! the new folder is removed.
+//! The name becomes the name of a package, of a folder and, with `_` for `-`, of a crate. So it
+//! must be possible as each of them: no keyword, no library linked to every program, no package of
+//! the workspace. An impossible name is refused before anything is written. If writing fails in the
+//! middle, the new folder is removed.
 //!
 //! Exit codes: 0 the app is there, 1 its files could not be written, 2 a refused
 //! command line.
@@ -64,7 +65,7 @@ const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
 /// A file of an app: its path in the app's folder, and its text.
 type AppFile = (&'static str, &'static str);
 
-/// Returns a file of the template, which has this name there or another one.
+/// Returns a file of the template; its name there may differ from its name in the app.
 macro_rules! template {
     ($file:literal) => {
         template!($file, $file)
@@ -77,7 +78,7 @@ macro_rules! template {
 /// The manifest of an app under `apps/`.
 const MANIFEST: AppFile = template!("Cargo.toml", "manifest.toml");
 
-/// The template's other files, which every app has.
+/// The template's other files, included in every app.
 const FILES: &[AppFile] = &[
     template!("build.rs"),
     template!("src/lib.rs"),
@@ -87,7 +88,7 @@ const FILES: &[AppFile] = &[
     template!("tests/virtual_time.rs"),
 ];
 
-/// Texts of the template, and their replacements in an app.
+/// Texts of the template, and the texts to replace them in an app.
 type Changes = Vec<(String, String)>;
 
 /// Runs the subcommand with the words after its name.
@@ -118,7 +119,7 @@ fn make(options: &Arguments) -> Result<String, Refusal> {
 ///
 /// # Errors
 ///
-/// The name is refused, or a file cannot be written; nothing is left then.
+/// The name is refused, or a file cannot be written. Nothing is left in either case.
 pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
     check(workspace, name).map_err(Refusal::Usage)?;
     let folder = workspace.join("apps").join(name);
@@ -128,8 +129,8 @@ pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
     Ok(folder)
 }
 
-/// Makes an app's folder, which must not exist, and writes its files with the changes. `taken` is
-/// the error if the folder exists.
+/// Makes an app's folder, which must not exist, and writes the changed files into it. `taken` is
+/// the error for an existing folder.
 fn write_folder(
     folder: &Path,
     name: &str,
@@ -155,7 +156,8 @@ fn write_folder(
         files::write(&place, text)
     });
     written.map_err(|line| {
-        // A folder that cannot be written can perhaps not be removed either; the error names it.
+        // A folder that cannot be written can perhaps not be removed either; the error names the
+        // folder.
         let _ = fs::remove_dir_all(folder);
         Refusal::Failure(line)
     })
@@ -192,18 +194,18 @@ fn next_steps(name: &str) -> String {
     )
 }
 
-/// The longest name, in bytes: with it the template's lines stay within the width.
+/// The longest name, in bytes; with a longer name, lines of the template would exceed the width.
 const LONGEST: usize = 32;
 
-/// Names that cannot be crates, since they have a meaning: keywords, the compiler's own crates, and
-/// folders that cargo makes.
+/// Names that cannot be crates, because they have another meaning: keywords, the compiler's own
+/// crates, and folders made by cargo.
 const RESERVED: &str = "\
     abstract alloc as async await become box break build const continue core crate deps do dyn \
     else enum examples extern false final fn for gen if impl in incremental let loop macro \
     match mod move mut override priv proc-macro pub ref return self static std struct super \
     test trait true try type typeof unsafe unsized use virtual where while yield";
 
-/// Checks that a new app of a workspace can have a name.
+/// Checks whether a new app of a workspace can have a name.
 ///
 /// # Errors
 ///
@@ -232,11 +234,11 @@ fn refuse(name: &str, why: &str) -> Result<(), String> {
     Err(format!("{} cannot be an app's name: {why}", quoted(name)))
 }
 
-/// Checks that a name can be that of an app, wherever it is: of a package and of a crate.
+/// Checks whether a name is possible for any app: as a package and as a crate.
 ///
 /// # Errors
 ///
-/// As of [`check`].
+/// The name's fault, as in [`check`].
 fn check_word(name: &str) -> Result<(), String> {
     let is_allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     let is_right = (name.len() <= LONGEST && name.chars().all(is_allowed))
@@ -256,12 +258,12 @@ fn check_word(name: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the error that there is an app of that name.
+/// Returns the error for a name that an app already has.
 fn taken(name: &str) -> String {
     format!("there is an app `{name}` already; choose another name, or edit apps/{name}")
 }
 
-/// Returns the folder, within the workspace, of the package with this name.
+/// Returns the folder, within the workspace, of the package with a name.
 fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     let manifest = files_below(workspace, |_| true).into_iter().find(|file| {
         let text = || fs::read_to_string(file).unwrap_or_default();
@@ -271,19 +273,19 @@ fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     folder.ok().map(Path::to_path_buf)
 }
 
-/// The source of a repository's crates, and of cargo's runner.
+/// The source of a repository's crates and of cargo's runner.
 #[derive(Clone, Copy, Debug)]
 pub enum CrateSource<'a> {
     /// The root of a workspace in this file system.
     Folder(&'a Path),
-    /// A git repository, by its URL; the runner is installed.
+    /// The URL of a git repository; the runner is installed from there.
     Git(&'a str),
 }
 
-/// The workspace's root, as the template's files name it.
+/// The workspace's root, as written in the template's files.
 const WORKSPACE: &str = "/workspace";
 
-/// The packages that the template depends on, by their folders.
+/// The folders of the packages in the template's dependencies.
 const PACKAGES: [&str; 5] = [
     "fass",
     "kernel",
@@ -292,7 +294,7 @@ const PACKAGES: [&str; 5] = [
     "boot/link",
 ];
 
-/// The files that only an app in its own repository has.
+/// The files of an app in a repository, beyond those of every app.
 const OWN_FILES: [AppFile; 6] = [
     template!("Cargo.toml", "repository/manifest.toml"),
     template!(".cargo/config.toml", "repository/config.toml"),
@@ -309,11 +311,11 @@ const OWN_FILES: [AppFile; 6] = [
 ///
 /// # Errors
 ///
-/// The name or the folder is refused, or a file cannot be written; nothing is left then.
+/// The name or the folder is refused, or a file cannot be written. Nothing is left in any case.
 pub fn create_repository(out: &Path, name: &str, source: CrateSource<'_>) -> Result<(), Refusal> {
     check_word(name).map_err(Refusal::Usage)?;
     // Cargo could not tell the app from a dependency of the same name, however indirect. A git
-    // repository has the packages that this workspace has.
+    // repository has the same packages as this workspace.
     check_packages(system::workspace(), name).map_err(Refusal::Usage)?;
     let shown = quoted(&out.to_string_lossy()).to_string();
     let changes = match source {
@@ -338,10 +340,11 @@ pub fn create_repository(out: &Path, name: &str, source: CrateSource<'_>) -> Res
     write_folder(out, name, files, changes, &taken)
 }
 
-/// Returns the way from a folder to be made to another one, so that both may be moved together.
+/// Returns the relative path from a folder to be made to an existing folder, so that both may be
+/// moved together.
 fn way(from: &Path, to: &Path) -> Option<String> {
     let from = std::path::absolute(from).ok()?;
-    // Of the folders above those that are there: the rest has no links yet.
+    // Only existing folders above: the rest of the path has no links yet.
     let there = from.ancestors().find(|above| above.exists())?;
     let new = from.strip_prefix(there).ok()?;
     let (from, to) = (
@@ -354,7 +357,8 @@ fn way(from: &Path, to: &Path) -> Option<String> {
     way.to_str().map(String::from)
 }
 
-/// Returns the changes for crates of this workspace. Nothing is installed for them.
+/// Returns the changes for using the crates of this workspace. Nothing needs to be installed for
+/// them.
 fn from_folder(root: &str) -> Changes {
     // The runner is in the workspace, so the workflow need not install it.
     let install = "      - run: cargo install --locked --git /workspace tool\n";
@@ -366,7 +370,7 @@ fn from_folder(root: &str) -> Changes {
     changes.map(|(old, new)| (old.into(), new.into())).into()
 }
 
-/// Returns the changes for crates of this git repository.
+/// Returns the changes for using the crates of a git repository.
 fn from_git(url: &str) -> Changes {
     let by_path = |package| format!("path = \"{WORKSPACE}/{package}\"");
     let crates = PACKAGES.map(|package| (by_path(package), format!("git = \"{url}\"")));
@@ -379,7 +383,7 @@ fn from_git(url: &str) -> Changes {
     crates.into_iter().chain(others).collect()
 }
 
-/// Returns the next steps in the repository.
+/// Returns the next steps in the new repository.
 fn next_steps_there(out: &Path, source: CrateSource<'_>) -> String {
     let install = match source {
         CrateSource::Folder(_) => String::new(),

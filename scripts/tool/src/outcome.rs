@@ -1,8 +1,8 @@
-//! The outcome of one guest's run, and the judgement on it.
+//! Outcomes of guest runs, and the judgement of them.
 //!
 //! At the end of a run two witnesses must agree: QEMU's exit status and the verdict, the last line
 //! of the serial log. A run is good only if both are there and say success, no machine line is
-//! damaged, and no line reports a violation. One witness alone proves nothing: a guest could print
+//! damaged, and no line reports a violation. A single witness proves nothing: a guest could print
 //! success and then hang, or end in success without having printed anything.
 
 use std::fmt::Write;
@@ -19,7 +19,7 @@ use crate::system;
 use views::protocol::{MachineLine, Status, Transcript, Verdict};
 use views::record::Record;
 
-/// How many of the last serial lines are shown at a failure.
+/// The number of serial lines shown at a failure, counted from the end.
 const SHOWN_LINES: usize = 30;
 
 /// The outcome of one guest's run.
@@ -27,17 +27,17 @@ const SHOWN_LINES: usize = 30;
 pub struct Outcome {
     /// How QEMU ended.
     pub ending: QemuEnd,
-    /// The whole serial log; bytes that are no UTF-8 are replaced.
+    /// The whole serial log; invalid UTF-8 is replaced.
     pub serial: String,
-    /// The log taken apart.
+    /// The parsed log.
     pub transcript: Transcript,
-    /// The bytes of the record, by whichever way they came; empty if none was kept.
+    /// The bytes of the record, whichever way they came; empty if no record was kept.
     pub sent: Vec<u8>,
     /// The path of the log.
     pub log: PathBuf,
-    /// The path of the image that was booted.
+    /// The path of the booted image.
     pub image: PathBuf,
-    /// The reason why it was asked to end early, if it was.
+    /// The reason for asking the guest to end early, if anybody asked.
     pub asked: Option<EndReason>,
     /// The wall time from start to end.
     pub elapsed: Duration,
@@ -45,8 +45,8 @@ pub struct Outcome {
     pub complaints: String,
 }
 
-/// Boots `image`, shows each whole serial line to `show` as it comes, and
-/// waits for the end.
+/// Boots `image`, passes each whole serial line to `show` as soon as it is complete, and waits for
+/// the end.
 ///
 /// # Errors
 ///
@@ -61,12 +61,12 @@ pub fn boot(
     boot_with_input(qemu, image, log, limit, drop, show)
 }
 
-/// Works like [`boot()`], and passes the input of the guest's serial port, if it has one, to `talk`
-/// as soon as the guest runs.
+/// Works like [`boot()`]. As soon as the guest runs, passes the input of its serial port, if there
+/// is such a port, to `talk`.
 ///
 /// # Errors
 ///
-/// As [`boot()`].
+/// The errors of [`boot()`].
 pub fn boot_with_input(
     qemu: &Qemu,
     image: &Path,
@@ -99,12 +99,12 @@ const fn failure(reason: String) -> Verdict {
     Verdict { status, reason }
 }
 
-/// Judges the lines of a guest: no machine line is damaged, the verdict is success, and
-/// no line reports a violation.
+/// Judges the lines of a guest: no machine line may be damaged, the verdict must be success, and no
+/// line may report a violation.
 ///
 /// # Errors
 ///
-/// The guest's own verdict, or the first reason why it is not good.
+/// The guest's own verdict, or the first reason against success.
 pub fn judge_lines(transcript: &Transcript) -> Result<(), Verdict> {
     let verdict = transcript.verdict().map_err(failure)?;
     if let Some(fault) = transcript.faults.first() {
@@ -124,11 +124,11 @@ pub fn judge_lines(transcript: &Transcript) -> Result<(), Verdict> {
 }
 
 impl Outcome {
-    /// Returns the record of the boot, read.
+    /// Reads and returns the record of the boot.
     ///
     /// # Errors
     ///
-    /// In words: the fault of the record.
+    /// In words: the fault in the record.
     pub fn record(&self) -> Result<Record, String> {
         match self.sent.is_empty() {
             true => Record::of_log(&self.serial),
@@ -136,7 +136,7 @@ impl Outcome {
         }
     }
 
-    /// Makes the outcome of a guest that was not asked to end and did not complain.
+    /// Makes the outcome of a guest that nobody asked to end, without complaints of QEMU's.
     pub fn of(ending: QemuEnd, serial: String, log: &Path, image: &Path) -> Outcome {
         Outcome {
             ending,
@@ -155,9 +155,9 @@ impl Outcome {
     ///
     /// # Errors
     ///
-    /// The guest's own verdict, or the first reason why it is not good.
+    /// The guest's own verdict, or the first reason against success.
     pub fn judge(&self) -> Result<(), Verdict> {
-        // The kernel prints a verdict before it ends by the exit port. So a status of that port
+        // The kernel prints a verdict before it writes to the exit port. So a status from that port
         // without a verdict comes from the app.
         let is_odd =
             matches!(self.ending, QemuEnd::Status(status) if status > 1 && status % 2 == 1);
@@ -214,10 +214,10 @@ impl Outcome {
         }
     }
 
-    /// Returns the last serial lines, indented, and the path of the whole log. After a fault at an
-    /// address it adds the function.
+    /// Returns the last serial lines, indented, and the path of the whole log. Adds the function's
+    /// name after a fault at an address.
     pub fn tail(&self) -> String {
-        // Lines of the record are of no use to people.
+        // Lines of kind `record` are of no use to people.
         let lines = self.serial.lines();
         let lines = lines.filter(|line| !line.starts_with("{\"kind\":\"record\""));
         let lines: Vec<&str> = lines.collect();

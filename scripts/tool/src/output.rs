@@ -1,17 +1,17 @@
-//! Printing that survives a reader that has left.
+//! Prints without a panic, even after the reader has left.
 //!
-//! The standard library's printing macros panic when a write fails, and a write fails
-//! as soon as the reader of a pipe has left (`./scripts/oracle ... | head -1`). A reader that has
-//! left is no failure: the work goes on, and its exit code says how it ended. Any other write error
-//! on standard output, such as a full disk, is a failure; [`conclude`] reports it at the end.
+//! The standard library's printing macros panic when a write fails, and a write fails as soon as
+//! the reader of a pipe has left (`./scripts/oracle ... | head -1`). The loss of the reader is no
+//! failure: the work goes on, and its exit code tells its result. Any other write error on standard
+//! output, such as a full disk, is a failure; [`conclude`] reports it at the end.
 //!
-//! So this library has macros of the same names, which hide those of the standard library in
-//! all its modules, so that no caller can use the wrong ones.
+//! So this library has macros of the same names. They hide the standard library's macros in all
+//! modules, so no caller can use the wrong macro.
 //!
-//! A `Table` shows figures to people: columns of fixed widths, under their headings; `shown` and
-//! `briefly` write the times in it.
+//! A `Table` shows figures to people: columns of fixed widths, under their headings. `shown` and
+//! `briefly` format the times in such tables.
 
-/// Writes to standard output; as the standard library's, but it never panics.
+/// Writes to standard output, like the standard library's macro but without panics.
 #[macro_export]
 macro_rules! print {
     ($($what:tt)*) => {
@@ -19,7 +19,7 @@ macro_rules! print {
     };
 }
 
-/// Writes a line to standard output; as the standard library's, but it never panics.
+/// Writes a line to standard output, like the standard library's macro but without panics.
 #[macro_export]
 macro_rules! println {
     ($($what:tt)*) => {
@@ -27,7 +27,7 @@ macro_rules! println {
     };
 }
 
-/// Writes to standard error; as the standard library's, but it never panics.
+/// Writes to standard error, like the standard library's macro but without panics.
 #[macro_export]
 macro_rules! eprint {
     ($($what:tt)*) => {
@@ -35,7 +35,7 @@ macro_rules! eprint {
     };
 }
 
-/// Writes a line to standard error; as the standard library's, but it never panics.
+/// Writes a line to standard error, like the standard library's macro but without panics.
 #[macro_export]
 macro_rules! eprintln {
     ($($what:tt)*) => {
@@ -49,7 +49,7 @@ use std::mem;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
-/// The first write error of standard output, if there was one.
+/// The first write error of standard output, if any.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
 /// Writes to standard output; for the macros.
@@ -57,7 +57,7 @@ pub fn put(what: Arguments<'_>) {
     note(stdout().write_fmt(what));
 }
 
-/// Writes to standard error; for the macros. An error is ignored: there is no place to report it.
+/// Writes to standard error; for the macros. Ignores an error, as there is no place to report it.
 pub fn complain(what: Arguments<'_>) {
     let _ = stderr().write_fmt(what);
 }
@@ -66,13 +66,13 @@ fn note(written: io::Result<()>) {
     if let Err(error) = written
         && error.kind() != ErrorKind::BrokenPipe
     {
-        // Only the first error is kept: later ones mostly follow from it.
+        // Later errors mostly follow from the first, so only the first is kept.
         let _ = LOST.set(error);
     }
 }
 
 /// Returns the exit code of a program whose work has ended with `code`. If some output could not be
-/// written, says so and makes success a failure.
+/// written, reports the error and turns success into failure.
 pub fn conclude(program: &str, code: ExitCode) -> ExitCode {
     // Standard output buffers: the last write error shows only in a flush.
     note(stdout().flush());
@@ -87,18 +87,18 @@ pub fn conclude(program: &str, code: ExitCode) -> ExitCode {
     code
 }
 
-/// A table that grows row by row.
+/// A table built row by row.
 pub struct Table {
-    /// Whether the cells of a column begin at the left, how wide it is, and the decimals of its
+    /// For each column: whether its cells begin at the left, its width, and the decimals of its
     /// numbers.
     columns: Vec<(bool, usize, usize)>,
     text: String,
 }
 
 impl Table {
-    /// Makes a table, below a line if there is a `title`. A column is `heading:width`, or
-    /// `heading:width.decimals`, or `heading:<width` if its cells begin at the left; `|` stands
-    /// between.
+    /// Makes a table, below a line if there is a `title`. The columns are separated by `|`. Each is
+    /// `heading:width`, `heading:width.decimals`, or `heading:<width` for cells that begin at the
+    /// left.
     pub fn new(title: &str, columns: &str) -> Self {
         // The formats are literals of this crate; a missing number means no width or no decimals.
         let number = |digits: &str| digits.parse().unwrap_or(0);
@@ -130,13 +130,13 @@ impl Table {
         self.cells(cells);
     }
 
-    /// Adds a line between the rows, or after them.
+    /// Adds a line between or after the rows.
     pub fn line(&mut self, line: &str) {
         self.text += line;
         self.text.push('\n');
     }
 
-    /// Adds a row of cells that are text already.
+    /// Adds a row of ready-made text cells.
     pub fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
         let cells = cells.into_iter().zip(&self.columns);
         let cells = cells.map(|(cell, &(begins_left, width, _))| match begins_left {
@@ -147,7 +147,7 @@ impl Table {
         self.line(&line);
     }
 
-    /// Returns the table, or the part that was added since the last call.
+    /// Returns the table, or only the part added since the last call.
     pub fn text(&mut self) -> String {
         mem::take(&mut self.text)
     }

@@ -1,9 +1,10 @@
-//! The command `page`: one file for a browser, which plays DAG files and shows runs.
+//! Makes the page that plays DAG files and shows runs in a browser, as a single file: the
+//! subcommand `page`.
 //!
-//! Its HTML, CSS and JavaScript lie in `scripts/web`. Its *engine*, a program of WebAssembly, stands
-//! in it packed by gzip, in base 64, as do the records that it is to show; its examples stand in it
-//! as JSON. None of these can end the script that carries them, whatever a file, its name or its
-//! comments say. The page loads nothing from elsewhere.
+//! The page's HTML, CSS and JavaScript lie in `scripts/web`. Its *engine*, a WebAssembly program,
+//! is embedded in the page, packed by gzip and coded in base 64, as are the records to show. The
+//! examples are embedded as JSON. None of these data can end the script around them, whatever a
+//! file, its name or its comments say. The page loads nothing from elsewhere.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -48,14 +49,14 @@ pub fn page(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Files in a page, as the elements of two lists in JavaScript, with a comma behind each.
+/// Files in a page, as elements of two JavaScript lists, each followed by a comma.
 #[derive(Default)]
 pub(crate) struct PageFiles {
     examples: String,
     records: String,
 }
 
-/// Reads the files that the options name.
+/// Reads the files named by the options.
 fn read(options: &Arguments) -> Result<PageFiles, String> {
     let inputs = options.files().map(|path| NamedFile { option: "", path });
     files::check_once(options.files())?;
@@ -79,11 +80,11 @@ fn read(options: &Arguments) -> Result<PageFiles, String> {
     Ok(content)
 }
 
-/// Builds the engine, and returns the page; a live one follows the server that it came from.
+/// Builds the engine, and returns the page. A live page follows the run of the server it came from.
 ///
 /// # Errors
 ///
-/// In words: the sources are not there, or the engine cannot be built.
+/// In words: the sources are missing, or the engine cannot be built.
 pub(crate) fn html(content: &PageFiles, is_live: bool) -> Result<String, String> {
     let web = system::workspace().join("scripts/web");
     if !web.is_dir() {
@@ -101,7 +102,7 @@ pub(crate) fn html(content: &PageFiles, is_live: bool) -> Result<String, String>
     assembled(&system::run(&mut packed)?, content, is_live)
 }
 
-/// Puts all into one file.
+/// Puts all parts into the page's single file.
 fn assembled(engine: &str, content: &PageFiles, is_live: bool) -> Result<String, String> {
     let read = |name: &str| files::read_text(&system::workspace().join(name));
     let source = |name: &str| read(&format!("scripts/web/{name}"));
@@ -121,14 +122,14 @@ fn assembled(engine: &str, content: &PageFiles, is_live: bool) -> Result<String,
          const LIVE = {is_live};\n{}",
         scripts.concat()
     );
-    // To JavaScript `\/` in a string is `/`, and `\!` is `!`; HTML would see the end of the script in
-    // the one, and a comment that hides its end in the other.
+    // To JavaScript, `\/` in a string is `/`, and `\!` is `!`. To HTML, `</` could end the script,
+    // and `<!--` could begin a comment hiding that end.
     let script = script.replace("</", "<\\/").replace("<!--", "<\\!--");
     let html = format!("{before}{after}").replacen("/*STYLE*/", &source("page.css")?, 1);
     Ok(html.replacen("/*SCRIPT*/", &script, 1))
 }
 
-/// Returns a DAG file with the words by which it is played.
+/// Returns a DAG file with its words for the play.
 fn example(path: &Path, text: &str, words: &str) -> String {
     let words = words.split(' ').filter_map(|word| word.split_once('='));
     let words = words.fold(Object::new(), |words, (name, value)| {

@@ -1,20 +1,21 @@
-//! Places in code: the function of an image that an address lies in, and the calls to it.
+//! Finds places in code: the function of an image around an address, and the calls leading there.
 //!
-//! A guest that reports a fault knows the address of the instruction, but its image has no names
-//! that it could read. So when the tool shows a line of kind `panic` or `fault` whose `place` is an
-//! address, it adds a line that names the function, and the app's source line if there is one.
+//! A guest reporting a fault knows the address of the instruction, but its image contains no
+//! readable names. So when the tool shows a line of kind `panic` or `fault` with an address as its
+//! `place`, the tool adds a line naming the function, and the app's source line if there is one.
 //! After a line of kind `backtrace` it lists the calls. The guest's own lines stay as they are.
 //!
-//! Names and lines are found by `addr2line`, which reads the image's symbols and
-//! debugging information and demangles names. It is part of binutils, which C compilers bring
-//! along. Where it is missing, or the image cannot be read, nothing is added: the report of a fault
-//! is no place for another one.
+//! The tool finds names and lines with `addr2line`, which reads the image's symbols and debugging
+//! information and demangles names. The program is part of binutils and comes with C compilers.
+//! Without `addr2line`, or with an unreadable image, nothing is added: the report of a fault is no
+//! place for a second fault.
 //!
-//! For a backtrace the guest prints, for each word of the stack that follows a call instruction,
-//! the return address and, if the instruction tells it, the callee. Some words are left over from
-//! calls that have returned. So the chain is followed from the innermost call outwards: the next
-//! call is the first that called the current function. If there is none, the function was called
-//! through a pointer or reached by a jump, and the next word is taken.
+//! For a backtrace, the guest examines the words of the stack. For each word that follows a call
+//! instruction it prints the return address and, if the instruction tells it, the callee. Some
+//! words are left over from calls that have returned. So the tool follows the chain from the
+//! innermost call outwards: the next call is the first that called the current function. Without
+//! such a call, the function was called through a pointer or reached by a jump, and the tool takes
+//! the next word.
 
 use std::collections::BTreeMap;
 use std::env;
@@ -27,18 +28,18 @@ use crate::system;
 use views::json::Value;
 use views::protocol::{MachineLine, read_line};
 
-/// The kinds whose `place` may be an address.
+/// The kinds of lines whose `place` may be an address.
 const KINDS: [&str; 3] = ["panic", "fault", BACKTRACE];
 
-/// The kind of lines with the calls on a stack.
+/// The kind of lines listing the calls on a stack.
 const BACKTRACE: &str = "backtrace";
 
-/// Folders of the workspace whose code is not the app's.
+/// Folders of the workspace with code outside the app.
 const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
 
-/// Returns the text to add to a line of the serial log of an image, if any, such as `0x20e0b8 is
-/// faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`. The image need not exist or be an
-/// ELF file.
+/// Returns the text to add to a line of an image's serial log, if any, such as
+/// `0x20e0b8 is faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`. The image need not
+/// exist or be an ELF file.
 pub fn explain(image: &Path, line: &str) -> Option<String> {
     let line = read_line(0, line)?.ok()?;
     let is_backtrace = line.kind == BACKTRACE;
@@ -65,17 +66,17 @@ pub fn explain(image: &Path, line: &str) -> Option<String> {
     Some(sentence(first, frames.get(&first)?))
 }
 
-/// A function that contains an address, called or inlined there.
+/// A function around an address, called or inlined there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// The function, `??` if it is not known.
+    /// The function's name; `??` if unknown.
     pub function: String,
-    /// File and line, as `FILE:LINE`; `?` or 0 for a line that is not known.
+    /// File and line, as `FILE:LINE`; `?` or 0 for an unknown line.
     pub line: String,
 }
 
-/// Returns the functions that contain each of the addresses in an image, the innermost first, by
-/// `addr2line` (`program`); nothing if it fails.
+/// Finds the functions around each of the addresses in an image, the innermost first, by running
+/// `addr2line` (`program`). Returns `None` if the program fails.
 pub fn frames(
     program: &Path,
     image: &Path,
@@ -84,7 +85,7 @@ pub fn frames(
     Some(NamedImage::open(program, image)?.frames(addresses)?.clone())
 }
 
-/// An `addr2line` that has an image open, and its answers.
+/// A running `addr2line` with an open image, and the answers so far.
 struct NamedImage {
     image: PathBuf,
     process: process::Child,
@@ -92,15 +93,16 @@ struct NamedImage {
     known: BTreeMap<u64, Vec<Frame>>,
 }
 
-/// The one for the lines of a log: it reads the whole debugging information when it starts.
+/// The `addr2line` for the lines of a log, kept because it reads the whole debugging information
+/// when it starts.
 static OF_LINES: Mutex<Option<NamedImage>> = Mutex::new(None);
 
-/// An address that is in no image: it ends the answer to the one before.
+/// An address outside every image, sent to mark the end of the preceding answer.
 const NOWHERE: &str = "0xffffffffffffffff";
 
 impl NamedImage {
     fn open(program: &Path, image: &Path) -> Option<Self> {
-        // `-a` repeats each address; `-i` names the inlined calls that contain it, each in two
+        // `-a` repeats each address; `-i` names the inlined calls around the address, each in two
         // lines (`-f`: function, file and line); `-C` makes names readable.
         let mut command = Command::new(program);
         command.args(["-aifC", "-e"]).arg(image);
@@ -114,7 +116,7 @@ impl NamedImage {
         })
     }
 
-    /// Returns the functions that contain each of the addresses, and those of before.
+    /// Returns the functions around each of the addresses, and around earlier addresses.
     fn frames(&mut self, addresses: &[u64]) -> Option<&BTreeMap<u64, Vec<Frame>>> {
         for address in addresses {
             if !self.known.contains_key(address) {
@@ -137,7 +139,7 @@ impl NamedImage {
     }
 }
 
-/// Reads the answer to an address, which comes before that to [`NOWHERE`].
+/// Reads the answer to an address, up to the answer to [`NOWHERE`].
 fn read_frames(lines: &mut impl Iterator<Item = String>) -> Option<Vec<Frame>> {
     // The address itself.
     lines.next()?;
@@ -149,7 +151,8 @@ fn read_frames(lines: &mut impl Iterator<Item = String>) -> Option<Vec<Frame>> {
             lines.next()?;
             return Some(frames);
         }
-        // ` (discriminator 2)` after the line tells copies of it apart; a path may contain blanks.
+        // ` (discriminator 2)` after the line tells copies of the line apart; a path may contain
+        // blanks.
         let line = place.split(" (discriminator ").next().unwrap_or(&place);
         frames.push(Frame {
             function,
@@ -160,12 +163,12 @@ fn read_frames(lines: &mut impl Iterator<Item = String>) -> Option<Vec<Frame>> {
 
 impl Drop for NamedImage {
     fn drop(&mut self) {
-        // It ends with its input, which this closes.
+        // The end of its input, closed here, ends the process.
         let _ = self.process.wait();
     }
 }
 
-/// Returns the address in a line's `place`, if its kind has one.
+/// Returns the address in a line's `place`, if the line's kind has addresses.
 fn address(line: &MachineLine) -> Option<u64> {
     let place = line.text_at("place")?;
     let digits = place.strip_prefix("0x")?;
@@ -174,7 +177,7 @@ fn address(line: &MachineLine) -> Option<u64> {
         .then(|| u64::from_str_radix(digits, 16).ok())?
 }
 
-/// Describes an address by its frames in one sentence.
+/// Describes an address and its frames in a sentence.
 fn sentence(address: u64, frames: &[Frame]) -> String {
     let function = frames.first().map_or("??", |frame| &frame.function);
     if function == "??" {
@@ -207,8 +210,9 @@ impl Frame {
     }
 }
 
-/// Returns a file and line if they are the app's: from the workspace's root, or from the current
-/// folder, which is the root of the app's own repository if cargo starts the tool there.
+/// Returns a file and line if they belong to the app. The path begins below the workspace's root,
+/// or below the current folder, which is the root of the app's own repository if cargo starts the
+/// tool there.
 fn line_of_app(frame: &Frame) -> Option<&str> {
     let below = |folder: &Path| frame.line.strip_prefix(folder.to_str()?)?.strip_prefix('/');
     let path = match below(system::workspace()) {
@@ -220,10 +224,10 @@ fn line_of_app(frame: &Frame) -> Option<&str> {
     (!path.ends_with(":?") && !path.ends_with(":0")).then_some(path)
 }
 
-/// The most lines of a backtrace that are shown.
+/// The most lines shown of a backtrace.
 const SHOWN: usize = 12;
 
-/// The functions that call into apps, and those that handle a panic: they are not shown.
+/// Functions hidden from backtraces: first the callers of apps, then the handlers of a panic.
 const OUTERMOST: [&str; 2] = ["executive::run::worker::work", "kernel::start::"];
 const OF_PANICS: [&str; 7] = [
     "executive::text::backtrace::",
@@ -243,7 +247,7 @@ struct Call {
 }
 
 impl Call {
-    /// Reads the list of a line of kind `backtrace`; malformed entries are left out.
+    /// Reads the list in a line of kind `backtrace`, skipping malformed entries.
     fn list(value: Option<&Value>) -> Vec<Call> {
         let texts = value.map_or(&[][..], Value::elements).iter();
         texts
@@ -266,7 +270,7 @@ impl Call {
         self.returns_to.saturating_sub(1)
     }
 
-    /// Returns the addresses whose functions the chain needs.
+    /// Returns the addresses whose functions are needed for the chain.
     fn addresses(self) -> impl Iterator<Item = u64> {
         [Some(self.instruction()), self.callee]
             .into_iter()
@@ -274,26 +278,26 @@ impl Call {
     }
 }
 
-/// Describes the chain of calls that leads to `place`, or to the innermost call, in one line each;
-/// `None` if no name is known.
+/// Describes the chain of calls leading to `place`, or to the innermost call, with a line for each
+/// call. Returns `None` if no name is known.
 fn tell(place: Option<u64>, calls: &[Call], frames: &BTreeMap<u64, Vec<Frame>>) -> Option<String> {
     let known = |address: u64| frames.get(&address).map_or(&[][..], Vec::as_slice);
     let mut lines: Vec<(String, usize)> = Vec::new();
     let chain = chain(place, calls, &known);
-    // A panic's own functions come first, and say nothing of its cause.
+    // A panic's own functions come first, and say nothing of the cause.
     let own = |frame: &&Frame| !OF_PANICS.iter().any(|of| frame.function.starts_with(of));
     let all = chain.into_iter().flat_map(known);
     let all = all.take_while(|frame| !OUTERMOST.iter().any(|of| frame.function.starts_with(of)));
     let all = all.skip_while(|frame| !own(frame));
     let mut all = all.filter(|frame| frame.function != "??").peekable();
     while let Some(frame) = all.next() {
-        // Of several library frames only the outermost is shown: the app called that one.
+        // Of several library frames only the outermost is shown: the app called that function.
         if frame.is_of_library() && all.peek().is_some_and(|outer| outer.is_of_library()) {
             continue;
         }
         let line = format!("{}, {}", brief(&frame.function), frame.file_and_line());
         match lines.last_mut() {
-            // A recursion fills the list with one line, so it is counted.
+            // A recursion would fill the list with a single line, so repetitions are counted.
             Some((last, times)) if *last == line => *times += 1,
             _ => lines.push((line, 1)),
         }
@@ -315,7 +319,7 @@ fn tell(place: Option<u64>, calls: &[Call], frames: &BTreeMap<u64, Vec<Frame>>) 
     Some(text)
 }
 
-/// Removes generic arguments from a function's name: they may be pages long.
+/// Removes generic arguments from a function's name, because they may be pages long.
 fn brief(function: &str) -> String {
     let mut depth = 0;
     let mut brief = String::new();
@@ -339,19 +343,19 @@ fn chain<'f>(
     mut calls: &[Call],
     known: &impl Fn(u64) -> &'f [Frame],
 ) -> Vec<u64> {
-    // An address' last frame is the function that was really called; the others are inlined.
+    // The last frame of an address is the function that was really called; the others are inlined.
     let function = |address: u64| known(address).last().map(|frame| frame.function.as_str());
     let mut chain: Vec<u64> = place.into_iter().collect();
     loop {
         let inner = chain.last().and_then(|&address| function(address));
         let called = |call: &Call| inner.is_some() && call.callee.and_then(function) == inner;
-        // No call fits: it came through a pointer or a jump, so the next word is taken.
+        // No call fits: the call came through a pointer or a jump, so the next word is taken.
         let next = calls.iter().position(called).unwrap_or(0);
         let Some(call) = calls.get(next) else {
             return chain;
         };
         chain.push(call.instruction());
-        // Words further in were passed over as left over, and stay so.
+        // Words further inside were skipped as left over, and stay so.
         calls = &calls[next + 1..];
     }
 }

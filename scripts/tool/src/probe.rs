@@ -1,11 +1,11 @@
-//! The probe for KVM, which decides the mode in which a guest is booted.
+//! Probes KVM, and chooses the mode for booting a guest.
 //!
-//! The device `/dev/kvm` may exist and not work: no permission, no hardware behind it, or hardware
-//! that runs a guest of a few instructions and no kernel. So the image is first booted with the
-//! word `probe=on`, on the machine that it is to have: it then only shows that its cores come up,
-//! take interrupts and calculate (`kernel/src/start/probe.rs`).
+//! The device `/dev/kvm` may exist and still be useless: there is no permission, no hardware behind
+//! the device, or hardware that runs a guest of a few instructions but no kernel. So the tool first
+//! boots the image with the word `probe=on`, on the machine chosen for the run. The guest then only
+//! shows that its cores come up, take interrupts and calculate (`kernel/src/start/probe.rs`).
 //!
-//! Every command that boots takes its mode from [`choose`].
+//! Every command that boots a guest takes the mode from [`choose`].
 
 use std::fs;
 use std::path::Path;
@@ -15,15 +15,16 @@ use crate::outcome::boot;
 use crate::qemu::{Loader, Mode, Qemu, QemuEnd};
 use crate::system;
 
-/// The time limit of the probe; a working KVM takes a tenth of it.
+/// The time limit of the probe, ten times the need of a working KVM.
 const LIMIT: Duration = Duration::from_secs(3);
 
-/// Chooses the mode in which `image` is booted on `machine`: the mode that the person has named;
-/// without one, KVM if it works and else `otherwise`, with the reason.
+/// Chooses the mode for booting `image` on `machine`: the mode named by the person, if any; else
+/// KVM if it works, and `otherwise` if not. Returns the reason for a choice between these two as
+/// well.
 ///
 /// # Errors
 ///
-/// In words: the person has named KVM, and it does not work.
+/// In words: the person has named KVM, but KVM does not work.
 pub fn choose(
     named: Option<Mode>,
     otherwise: Mode,
@@ -58,7 +59,7 @@ pub fn kvm(machine: &Qemu, image: &Path) -> Result<(), String> {
     run(&machine, image, LIMIT)
 }
 
-/// Boots the probe on `machine`, for at most `limit`, without a firmware, which would take longer.
+/// Boots the probe on `machine`, for at most `limit`, and without a firmware, to save time.
 ///
 /// # Errors
 ///
@@ -76,13 +77,13 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
     };
     let log = system::new_log("probe")?;
     let outcome = boot(&qemu, image, &log, limit, |_| {});
-    // The log is ours; one that cannot be removed harms nothing.
+    // The log is ours; a leftover log harms nothing.
     let _ = fs::remove_file(&log);
     let outcome = outcome?;
     let Err(fault) = outcome.judge() else {
         return Ok(());
     };
-    // The guest itself has found a fault, so its words say more than QEMU's.
+    // The guest itself has found a fault, and its words say more than QEMU's.
     if matches!(outcome.ending, QemuEnd::Guest(_)) {
         return Err(fault.reason);
     }

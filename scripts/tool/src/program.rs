@@ -1,7 +1,7 @@
-//! Runs an app as a Linux program of this computer and judges it like a guest.
+//! Runs an app as a Linux program of this computer, and judges the run like a guest's.
 //!
-//! Its standard output is the log. The verdict in it and the exit code must agree, as a guest's
-//! verdict and QEMU's status must.
+//! The program's standard output is the log. The verdict in the log and the exit code must agree,
+//! as do a guest's verdict and QEMU's status.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -18,28 +18,29 @@ use crate::qemu::QemuEnd;
 use crate::system;
 use views::protocol::{Status, Transcript};
 
-/// A program, and how it is run.
+/// A program and the way to run it.
 #[derive(Clone, Copy, Debug)]
 pub struct ProgramOrder<'a> {
     /// The program.
     pub program: &'a Path,
-    /// Its words.
+    /// The program's arguments.
     pub words: &'a [OsString],
-    /// Whether it inherits our standard input; if not, its input is empty.
+    /// Whether the program inherits our standard input; if not, its input is empty.
     pub is_live: bool,
-    /// Whether it ends in order at SIGINT, and so is asked before it is killed.
+    /// Whether the program ends in order at SIGINT; then the tool asks before it kills.
     pub stops: bool,
-    /// Where its output goes.
+    /// The file for the program's output.
     pub log: &'a Path,
-    /// How long it may take.
+    /// The longest time for the run.
     pub limit: Duration,
 }
 
-/// Runs a program until its end, or for its limit, and shows each whole line to `show` as it comes.
+/// Runs a program until its end or its limit, and passes each whole line to `show` as soon as it is
+/// complete.
 ///
 /// # Errors
 ///
-/// In words: it could not be started, or the log could not be written or read.
+/// In words: the program could not be started, or the log could not be written or read.
 pub fn run(order: &ProgramOrder<'_>, show: &mut impl FnMut(&str)) -> Result<Outcome, String> {
     run_for(order, show, ExitStatus::code)
 }
@@ -48,7 +49,7 @@ pub fn run(order: &ProgramOrder<'_>, show: &mut impl FnMut(&str)) -> Result<Outc
 ///
 /// # Errors
 ///
-/// As [`run`].
+/// The errors of [`run`].
 pub fn run_for(
     order: &ProgramOrder<'_>,
     show: &mut impl FnMut(&str),
@@ -71,7 +72,8 @@ pub fn run_for(
         .map_err(|error| format!("cannot write `{place}`: {error}; name a file elsewhere"))?;
     let mut command = bound_to_us(program);
     command.args(words).stdin(stdin).stdout(file);
-    // In the terminal's process group it gets ctrl-C from there, and could not read it elsewhere.
+    // A live program must stay in the terminal's process group: elsewhere it could not read the
+    // terminal. Only other programs leave the group, so that ctrl-C does not reach them twice.
     let is_apart = stops && !is_live;
     if is_apart {
         command.process_group(0);
@@ -80,7 +82,8 @@ pub fn run_for(
         .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
     let process = child.id();
     let mut ask = |why| {
-        // In our process group ctrl-C has reached it already; a second signal would end it at once.
+        // In our process group ctrl-C has reached the program already; a second signal would end it
+        // at once.
         if is_apart || why != EndReason::ByPerson {
             EndSignals::send(process);
         }
@@ -107,7 +110,7 @@ pub fn run_for(
 
 fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> QemuEnd {
     let has_verdict = transcript.of_kind("verdict").next().is_some();
-    // An exit code counts only with a verdict: a program may end with 0 and not have run the app.
+    // An exit code counts only with a verdict: a program may end with 0 without having run the app.
     match code.filter(|_| has_verdict) {
         Some(0) => QemuEnd::Guest(Status::Success),
         Some(1) => QemuEnd::Guest(Status::Failure),

@@ -1,5 +1,5 @@
-//! Progress of long work: the amount done and the time left, or a sign of life if the total is
-//! unknown.
+//! Progress of long work: the amount done and the time left, or a sign of life for work with an
+//! unknown total.
 
 use std::io::{Write, stderr};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -11,8 +11,8 @@ use crate::system;
 /// The longest time without a line, where lines do not renew themselves.
 pub const SILENCE: Duration = Duration::from_secs(5);
 
-/// Progress on standard error: one line that renews itself if that is a terminal, and
-/// otherwise a line whenever nothing was said for [`SILENCE`].
+/// Progress on standard error: on a terminal, a single line renewed in place; otherwise a new line
+/// after each silence of [`SILENCE`].
 pub struct Progress {
     /// The name of the counted units, such as `files`.
     unit: &'static str,
@@ -23,7 +23,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Starts at the first of `total` units.
+    /// Starts before the first of `total` units.
     pub fn new(total: u64, unit: &'static str) -> Progress {
         Progress {
             unit,
@@ -60,7 +60,7 @@ fn line(over: u64, total: u64, unit: &str, elapsed: Duration) -> String {
     if over == 0 {
         return format!("progress: 0 of {total} {unit}");
     }
-    // The rest is assumed to take as long per unit as the part that is done.
+    // The rest is assumed to take as long per unit as the finished part.
     let left_s = elapsed.as_secs().saturating_mul(left) / over;
     let left = in_words(left_s);
     format!("progress: {over} of {total} {unit}, {left} left")
@@ -76,8 +76,8 @@ fn in_words(seconds: u64) -> String {
 /// The longest pause between two lines.
 const MOST: Duration = Duration::from_secs(60);
 
-/// Repeats on standard error that work goes on, first after [`SILENCE`] and then with doubling
-/// pauses, until it is dropped.
+/// Reports repeatedly on standard error that work goes on, until this value is dropped: first after
+/// [`SILENCE`], then with doubling pauses.
 pub struct ProgressNote {
     _over: Sender<()>,
 }

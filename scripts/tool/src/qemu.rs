@@ -1,22 +1,22 @@
-//! Starting QEMU: the machine, the meaning of time, and the image.
+//! Starts QEMU: the board, the meaning of time, and the image.
 //!
-//! A [`Qemu`] is a description that becomes a command line; [`Qemu::start`] makes it a process
-//! ([`RunningQemu`]). The *mode* says what the guest's clock means, the *machine* is the board that
-//! QEMU imitates, and the *loader* brings the image into memory: QEMU itself, or a firmware, with
+//! A [`Qemu`] describes a guest and becomes a command line; [`Qemu::start`] turns it into a process
+//! ([`RunningQemu`]). The *mode* says what the guest's clock means, and the *machine* is the board
+//! imitated by QEMU. The *loader* brings the image into memory: QEMU itself, or a firmware, with
 //! GRUB or without. Everything a guest could see of the host is fixed or left out (`-nodefaults`,
-//! no display, no network), so that in [`Mode::Deterministic`] two runs give the same bytes.
+//! no display, no network), so two runs in [`Mode::Deterministic`] give the same bytes.
 //!
-//! Serial output goes to a file, which loses nothing, whereas a slow pipe drops bytes. The guest
-//! ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`QemuEnd`]. Input to
-//! the serial port comes from us by a pipe.
+//! Serial output goes to a file, because a file loses nothing, whereas a slow pipe drops bytes. The
+//! guest ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`QemuEnd`].
+//! Input to the serial port comes from us through a pipe.
 //!
-//! An [`QemuEnd`] is the end of the process, seen from outside. A guest writes a byte `v` to port
+//! A [`QemuEnd`] is the end of the process, seen from outside. A guest writes a byte `v` to port
 //! 0xf4, and QEMU's `isa-debug-exit` ends the process with status `(v << 1) | 1`: 33 for success,
 //! 35 for failure, 37 for a refused command line. No other status is a guest's own word.
 //!
 //! A QEMU started here does not outlive the tool, see [`crate::child`]. If its guest ends in order
-//! at ctrl-C, QEMU leaves the terminal's process group, so that ctrl-C does not reach it: we pass
-//! it on to the guest, by its serial port.
+//! at ctrl-C, QEMU leaves the terminal's process group. Then ctrl-C does not reach QEMU, and we
+//! pass the request on to the guest through its serial port.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -35,26 +35,27 @@ use crate::files::TemporaryFile;
 use crate::system;
 use views::protocol::Status;
 
-/// The name under which QEMU is looked for.
+/// The name of QEMU's program on the `PATH`.
 pub const PROGRAM: &str = "qemu-system-x86_64";
 
-/// The least memory that a guest gets, in MiB.
+/// The least memory of a guest, in MiB.
 pub const LEAST_MEMORY_MIB: u64 = 16;
 
-/// The most processors that a guest gets.
+/// The most processors of a guest.
 pub const MOST_CORES: u64 = text::MOST_CORES as u64;
 
 /// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SecondPort {
-    /// Forward the bytes written to [`RunningQemu`]'s input to this port; then the first one has none.
+    /// Forward the bytes written to [`RunningQemu`]'s input to this port; the first port then gets
+    /// none.
     pub is_live: bool,
-    /// The file for the bytes that the guest sends.
+    /// The file for the bytes sent by the guest.
     pub output: Option<PathBuf>,
 }
 
 impl SecondPort {
-    /// Returns QEMU's arguments for it.
+    /// Returns QEMU's arguments for the port.
     fn arguments(&self) -> [OsString; 4] {
         let device = match (&self.output, self.is_live) {
             (None, false) => "null,id=wire".into(),
@@ -67,19 +68,19 @@ impl SecondPort {
     }
 }
 
-/// A network, and the card in it.
+/// A network, and the guest's card on it.
 #[derive(Clone, Debug)]
 pub struct Network {
     /// QEMU's words for the network, such as `user,hostfwd=udp:127.0.0.1:17007-:5000`.
     pub words: String,
-    /// QEMU's name of the card.
+    /// QEMU's name for the card.
     pub card: &'static str,
-    /// The file for its traffic, in the form that Wireshark opens.
+    /// The file for the network's traffic, in the form read by Wireshark.
     pub traffic: Option<PathBuf>,
 }
 
 impl Network {
-    /// Returns QEMU's arguments for it.
+    /// Returns QEMU's arguments for the network and its card.
     fn arguments(&self) -> Vec<OsString> {
         let Self { words, card, .. } = self;
         let mut arguments = vec!["-netdev".into(), format!("{words},id=net").into()];
@@ -92,7 +93,7 @@ impl Network {
     }
 }
 
-/// A guest to be started.
+/// A description of the guest to start.
 #[derive(Clone, Debug)]
 pub struct Qemu {
     /// The QEMU to use: a name on the `PATH`, or a path.
@@ -101,7 +102,7 @@ pub struct Qemu {
     pub mode: Mode,
     /// The board.
     pub machine: Machine,
-    /// The way of the image into memory.
+    /// How the image gets into memory.
     pub loader: Loader,
     /// The number of processors.
     pub cores: u64,
@@ -109,13 +110,13 @@ pub struct Qemu {
     pub memory_mib: u64,
     /// The guest's command line.
     pub guest_words: String,
-    /// A file to leave in the guest's memory.
+    /// A file to load into the guest's memory.
     pub module: Option<PathBuf>,
-    /// The file for the bytes that the guest sends to QEMU's debug port; `None`: no such port.
+    /// The file for the bytes sent by the guest to QEMU's debug port; `None`: no such port.
     pub records: Option<PathBuf>,
     /// Forward the bytes written to [`RunningQemu`]'s input to the guest's serial port.
     pub has_input: bool,
-    /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
+    /// Send the guest ctrl-C at its first serial port before the kill, so that it ends in order.
     pub stops: bool,
     /// The connection of the second serial port; `None`: there is no such port.
     pub second: Option<SecondPort>,
@@ -123,7 +124,7 @@ pub struct Qemu {
     pub devices: String,
     /// The network; `None`: there is no card.
     pub network: Option<Network>,
-    /// Write the address of each instruction that is executed to [`RunningQemu`]'s output.
+    /// Write the address of each executed instruction to [`RunningQemu`]'s output.
     pub logs_instructions: bool,
     /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
     pub debugger: Option<OsString>,
@@ -154,8 +155,8 @@ impl Default for Qemu {
 }
 
 impl Qemu {
-    /// Returns QEMU's arguments for booting `image` with its serial output
-    /// going to `serial`. For a [`Loader`] with a firmware `image` is a whole stick.
+    /// Returns QEMU's arguments for booting `image` with its serial output going to `serial`. For a
+    /// [`Loader`] with a firmware, `image` is a whole stick.
     pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
         let (machine, mode, cores) = (self.machine, self.mode.arguments(), self.cores);
         let mut arguments = words(&format!(
@@ -193,7 +194,7 @@ impl Qemu {
         arguments
     }
 
-    /// Returns the arguments that load the image, with its words and module.
+    /// Returns the arguments for loading the image, with its words and module.
     fn loading(&self, image: &Path) -> Vec<OsString> {
         if self.loader.needs_stick() {
             let drive = file_value("if=none,id=stick,format=raw,readonly=on,file=", image);
@@ -202,7 +203,7 @@ impl Qemu {
             if self.loader == Loader::Uefi {
                 arguments.extend(["-bios", OVMF_FILE].map(OsString::from));
             }
-            // Words and module are on the stick already.
+            // Words and module are already on the stick.
             return arguments;
         }
         let mut arguments: Vec<OsString> = vec!["-kernel".into(), image.into()];
@@ -217,7 +218,7 @@ impl Qemu {
     ///
     /// # Errors
     ///
-    /// In words: it is too long.
+    /// In words: the command line is too long.
     pub fn check_words(&self) -> Result<(), String> {
         let bytes = self.guest_words.len();
         if bytes <= MOST_COMMAND_LINE_BYTES {
@@ -233,8 +234,8 @@ impl Qemu {
     ///
     /// # Errors
     ///
-    /// In words: the guest's command line is too long, a file could not be made, or QEMU
-    /// could not be started.
+    /// In words: the guest's command line is too long, a file could not be made, or QEMU could not
+    /// be started.
     pub fn start(&self, image: &Path, serial: &Path) -> Result<RunningQemu, String> {
         self.check_words()?;
         let program = crate::system::find_program(&self.program).ok_or_else(|| {
@@ -258,8 +259,8 @@ impl Qemu {
     }
 }
 
-/// Makes QEMU translate, and so log, each instruction by itself. Since version 8.1 that is an
-/// option of the accelerator.
+/// Makes QEMU translate, and so log, each instruction separately. Since version 8.1 the accelerator
+/// has an option for this purpose.
 fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
     let said = system::run(Command::new(program).arg("--version")).unwrap_or_default();
     let version = said.split_once("version ").map_or("", |(_, rest)| rest);
@@ -274,13 +275,13 @@ fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
     arguments.extend(words("-d exec,nochain -D /dev/stdout"));
 }
 
-/// Returns arguments without blanks in them, each a word of the text.
+/// Splits a text at its blanks into arguments.
 pub(crate) fn words(text: &str) -> Vec<OsString> {
     text.split_whitespace().map(OsString::from).collect()
 }
 
-/// Returns a value that ends in a file's name. QEMU's syntax ends the name at a comma unless it is
-/// doubled.
+/// Returns a value ending in a file's name. A comma in the name is doubled, because in QEMU's
+/// syntax a single comma would end the name.
 pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
     let parts = path.as_os_str().as_bytes().split(|byte| *byte == b',');
     let name = parts.collect::<Vec<_>>().join(&b",,"[..]);
@@ -290,7 +291,7 @@ pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
 /// The path of the firmware in Debian's package `ovmf`.
 pub const OVMF_FILE: &str = "/usr/share/ovmf/OVMF.fd";
 
-/// Makes an enumeration whose variants are written and read by names.
+/// Makes an enumeration whose variants are written and read by name.
 macro_rules! named {
     ($(#[$about:meta])* $kind:ident {
         $($(#[$what:meta])* $choice:ident = $name:literal,)*
@@ -302,10 +303,10 @@ macro_rules! named {
         }
 
         impl $kind {
-            /// The names, as they stand on command lines.
+            /// The names, as written on command lines.
             pub const NAMES: &[&str] = &[$($name),*];
 
-            /// Returns the choice of that name.
+            /// Returns the choice with a name.
             pub fn from_name(name: &str) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$choice),)*
@@ -334,7 +335,7 @@ named! {
     Mode {
         /// Real cores in real time, by the host's virtualization.
         Kvm = "kvm",
-        /// One instruction is one virtual nanosecond; every run is the same.
+        /// One instruction is one virtual nanosecond; all runs are equal.
         Deterministic = "deterministic",
         /// Emulated cores in real time, one host thread each.
         Threads = "threads",
@@ -358,7 +359,7 @@ impl Mode {
         }
     }
 
-    /// Returns QEMU's words for it.
+    /// Returns QEMU's arguments for the mode.
     pub(crate) fn arguments(self) -> &'static str {
         match self {
             Mode::Kvm => "-accel kvm -cpu host",
@@ -373,9 +374,9 @@ impl Mode {
 }
 
 named! {
-    /// The board that QEMU imitates, by QEMU's own name.
+    /// The board imitated by QEMU, by QEMU's own name.
     Machine {
-        /// The smallest one, which boots in a tenth of a second.
+        /// The smallest board, which boots in a tenth of a second.
         Microvm = "microvm",
         /// A PC with PCI Express, HPET and all.
         Q35 = "q35",
@@ -383,9 +384,9 @@ named! {
 }
 
 named! {
-    /// The way of the image into the guest's memory.
+    /// How the image gets into the guest's memory.
     Loader {
-        /// QEMU's `-kernel`: the image is there at the reset.
+        /// QEMU's `-kernel`: the image is in memory at the reset.
         Pvh = "pvh",
         /// GRUB, started by QEMU's BIOS from a stick.
         Bios = "bios",
@@ -395,12 +396,12 @@ named! {
 }
 
 impl Loader {
-    /// Reports whether the image is on a stick, which a PC's firmware reads.
+    /// Reports whether the image is on a stick, to be read by a PC's firmware.
     pub fn needs_stick(self) -> bool {
         self != Loader::Pvh
     }
 
-    /// Returns the least memory in MiB with which the loader has been seen to reach the image.
+    /// Returns the least memory, in MiB, with which the loader was seen to reach the image.
     pub fn least_memory_mib(self) -> u64 {
         match self {
             Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
@@ -409,14 +410,14 @@ impl Loader {
     }
 }
 
-/// The most bytes that a guest may print; beyond that it is taken to print without end.
+/// The most bytes a guest may print; a guest printing more is taken to print without end.
 const MOST_SERIAL_BYTES: u64 = 64 << 20;
 
-/// The byte that ends a guest's run in order (`console=stop`): ctrl-C on a serial line.
+/// The byte for ending a guest's run in order (`console=stop`): ctrl-C on a serial line.
 const CTRL_C: &[u8] = &[3];
 
-/// QEMU's messages when KVM cannot run the guest any further. QEMU then keeps the guest paused for
-/// ever, and none of its options makes it end.
+/// QEMU's messages when KVM cannot run the guest any further. After such a message QEMU keeps the
+/// guest paused for ever, and has no option to end instead.
 const KVM_FAILURES: [&str; 4] = [
     "KVM internal error",
     "KVM: entry failed",
@@ -427,26 +428,26 @@ const KVM_FAILURES: [&str; 4] = [
 /// How a QEMU process ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum QemuEnd {
-    /// The guest ended it with one of the agreed statuses.
+    /// The guest ended QEMU with one of the agreed statuses.
     Guest(Status),
     /// QEMU ended with another status; 0 is a reset or a shutdown.
     Status(i32),
-    /// A signal ended it.
+    /// A signal ended QEMU.
     Signal,
-    /// It did not end within this limit and was killed.
+    /// QEMU did not end within this limit and was killed.
     TimedOut {
         /// The limit.
         limit: Duration,
         /// How busy the host was then, in words.
         load: String,
     },
-    /// A person pressed ctrl-C again, and it was killed.
+    /// A person pressed ctrl-C again, and QEMU was killed.
     Killed,
-    /// KVM could not run the guest any further, and it was killed.
+    /// KVM could not run the guest any further, and QEMU was killed.
     KvmFailed,
-    /// It printed more than a run may and was killed.
+    /// The guest printed more than a run may, and QEMU was killed.
     TooMuchOutput,
-    /// It was no QEMU but a program of this computer; the words describe its end.
+    /// The process was no QEMU but a program of this computer; the words describe its end.
     Program(String),
 }
 
@@ -480,18 +481,19 @@ impl fmt::Display for QemuEnd {
     }
 }
 
-/// A QEMU that was started and not yet waited for.
+/// A started QEMU, running or ended.
 #[derive(Debug)]
 pub struct RunningQemu {
-    /// Its input is the guest's serial port, its output the log of instructions, if wanted.
+    /// The process. Its input is the guest's serial port, its output the log of instructions, if
+    /// wanted.
     pub child: Child,
     serial: PathBuf,
     complaints: TemporaryFile,
-    /// The file that the record goes to, if there is one.
+    /// The file for the record, if there is one.
     records: Option<PathBuf>,
-    /// The serial port through which the guest is asked to end, if it listens.
+    /// The serial port for asking the guest to end, if the guest listens.
     stop: Option<File>,
-    /// The reason why the guest was asked to end, if it was.
+    /// The reason for asking the guest to end, if anybody asked.
     pub(crate) asked: Option<EndReason>,
 }
 
@@ -508,7 +510,7 @@ impl RunningQemu {
             let path = path.display().to_string();
             move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
         };
-        // Created before QEMU opens it, so that a reader finds a file from the start.
+        // Created before QEMU opens it, so a reader finds a file from the start.
         File::create(serial).map_err(file_error(serial))?;
         let mut complaints = serial.as_os_str().to_owned();
         complaints.push(OsString::from(".qemu"));
@@ -537,8 +539,8 @@ impl RunningQemu {
         })
     }
 
-    /// Waits for the end, for at most `limit` since the start, and shows each whole serial line
-    /// to `show` as it comes. Returns also the serial log.
+    /// Waits for the end, for at most `limit` since the start, and passes each whole serial line to
+    /// `show` as soon as it is complete. Also returns the serial log.
     ///
     /// # Errors
     ///
@@ -552,14 +554,14 @@ impl RunningQemu {
         let mut kvm_failed = false;
         let records = self.records.as_deref();
         let sent = |bytes| {
-            // A short file, read at each look: QEMU does not end by itself after such a message.
+            // A short file, read at each look: after such a message QEMU does not end by itself.
             let said = fs::read(complaints).unwrap_or_default();
             let said = String::from_utf8_lossy(&said);
             kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
             let record = records.and_then(|path| fs::metadata(path).ok());
             (!kvm_failed && bytes <= MOST_SERIAL_BYTES).then(|| record.map_or(0, |file| file.len()))
         };
-        // The request may fail: a guest that has just ended does not listen.
+        // The request may fail: a guest near its end does not listen.
         let stop = self.stop.take();
         let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
         let ask: Option<&mut dyn FnMut(EndReason)> =

@@ -1,13 +1,13 @@
-//! The options of `run`: the one table behind its parser and its help text.
+//! The options of `run`, in one table for the parser and the help text.
 
 use sched_dag::Policy;
 
 use crate::options::{Command, OptionName, OptionValue, options};
 use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 
-/// The options that become words `name=value` on the guest's command line, if
-/// they are given: kernel and apps have defaults of their own, and not every app
-/// knows every word.
+/// The options that become words `name=value` on the guest's command line, if they are given. They
+/// have no default here: kernel and apps have defaults of their own, and not every app knows every
+/// word.
 pub(crate) const GUEST_WORDS: &[OptionName] = &[
     name::POLICY,
     name::PREEMPTION,

@@ -1,4 +1,5 @@
-//! The system that the tool runs on: its programs, the workspace's root, and the folder for logs.
+//! Access to the system under the tool: its programs, the workspace's root, and the folder for
+//! logs.
 
 use std::env;
 use std::ffi::OsStr;
@@ -13,8 +14,8 @@ use std::time::Duration;
 
 use views::json::{self, Value};
 
-/// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool was
-/// built, which is wrong once the workspace has been moved.
+/// Returns the root of the workspace: the folder stated by `scripts/tool/start`, or else the place
+/// of the tool's build, which is wrong after a move of the workspace.
 pub fn workspace() -> &'static Path {
     static ROOT: OnceLock<PathBuf> = OnceLock::new();
     ROOT.get_or_init(|| match env::var_os("TOOL_WORKSPACE") {
@@ -26,8 +27,8 @@ pub fn workspace() -> &'static Path {
     })
 }
 
-/// Returns the command that a person types here for a subcommand: a script of the workspace, or,
-/// where no script has started this tool, `fass-tool` as it is installed.
+/// Returns the command that a person types here for a subcommand: a script of the workspace, or, if
+/// no script has started this tool, the installed `fass-tool`.
 pub(crate) fn script(name: &str) -> String {
     let is_here = || env::current_dir().is_ok_and(|here| here == workspace());
     match env::var_os("TOOL_WORKSPACE") {
@@ -41,7 +42,7 @@ pub(crate) fn script(name: &str) -> String {
     }
 }
 
-/// Reports whether standard error is a terminal on which a line can renew itself.
+/// Reports whether standard error is a terminal able to renew a line in place.
 pub fn stderr_moves() -> bool {
     io::stderr().is_terminal() && can_move(env::var_os("TERM").as_deref())
 }
@@ -51,8 +52,8 @@ fn can_move(term: Option<&OsStr>) -> bool {
     term.is_some_and(|term| !term.is_empty() && term != "dumb")
 }
 
-/// Returns a command for the cargo that built us, or else the one on `PATH`,
-/// in the workspace's root.
+/// Returns a command for the cargo that built us, or else the cargo on `PATH`, in the workspace's
+/// root.
 pub fn cargo() -> Command {
     let program = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(program);
@@ -60,15 +61,15 @@ pub fn cargo() -> Command {
     command
 }
 
-/// Runs cargo, whose errors go to standard error as they come. Returns its JSON messages, and an
-/// error if it failed.
+/// Runs cargo, passing its errors to standard error as they come. Returns cargo's JSON messages,
+/// and an error if cargo failed.
 pub fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String>) {
     let output = match cargo.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
         Ok(output) => output,
         Err(error) => return (Vec::new(), Err(format!("cannot start cargo: {error}"))),
     };
     let said = String::from_utf8_lossy(&output.stdout);
-    // Lines that are no JSON are not messages of cargo's.
+    // Lines without JSON are not messages of cargo's.
     let messages = said.lines().filter_map(|line| json::parse(line).ok());
     let ended = match output.status.success() {
         true => Ok(()),
@@ -93,7 +94,7 @@ pub fn run(command: &mut Command) -> Result<String, String> {
     Err(format!("`{name}` failed ({}): {said}", output.status))
 }
 
-/// Returns the last lines that a program has printed: enough to see why it failed.
+/// Returns the last lines printed by a program, enough to see why the program failed.
 pub(crate) fn last_lines(said: &[u8]) -> String {
     const LINES: usize = 12;
     let said = String::from_utf8_lossy(said);
@@ -112,8 +113,8 @@ pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
     candidates.into_iter().find(|file| is_program(file))
 }
 
-/// Returns all files below a folder but the generated and hidden ones, sorted; `enters` decides for
-/// each folder whether to descend.
+/// Returns all files below a folder, sorted, except generated and hidden files; `enters` decides
+/// for each folder whether to descend.
 pub fn files_below(root: &Path, enters: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root.to_path_buf()];
@@ -140,7 +141,7 @@ fn is_program(file: &Path) -> bool {
     fs::metadata(file).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
-/// Describes how busy the host is, and the remedy: for a run that exceeded its time.
+/// Describes how busy the host is, and the remedy, for a run that exceeded its time.
 pub fn host_load() -> String {
     let averages = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = averages.split(' ').next().unwrap_or_default();
@@ -169,17 +170,17 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
 }
 
-/// The time for which files in the folder for logs are kept: longer than any run lasts.
+/// The storage time for files in the folder for logs, longer than any run.
 const KEPT: Duration = Duration::from_secs(7 * 86_400);
 
-/// Removes old files: logs of guests that failed, which a person has read by now, and files of
-/// processes that were killed.
+/// Removes old files: logs of failed guests, read by a person long ago, and files of killed
+/// processes.
 fn clear(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let changed = entry.metadata().and_then(|data| data.modified());
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
         if age > Some(KEPT) {
-            // The file is ours; one that cannot be removed harms nothing.
+            // The file is ours; a leftover file harms nothing.
             let _ = fs::remove_file(entry.path());
         }
     }

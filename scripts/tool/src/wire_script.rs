@@ -1,7 +1,7 @@
-//! Bytes with their times, in the form of a file for `run --input`.
+//! Reads bytes with their times from a file for `run --input`.
 //!
 //! Each line is a time of the run and bytes, as text in quotation marks or as hexadecimal pairs.
-//! Before the bytes it may name their wire, and, if they are a packet, whom it is from:
+//! The bytes may be preceded by the name of their wire and, for a packet, by its sender's address:
 //!
 //! ```text
 //! # A radar says how far the car ahead is.
@@ -10,9 +10,9 @@
 //! 5ms wire.commands 10.0.2.2:7 "stop"
 //! ```
 //!
-//! In quotation marks `\n`, `\r`, `\t`, `\0`, `\"`, `\'` and `\\` stand for bytes, and `\x` with two
-//! hexadecimal digits for any byte. Lines that begin with `#`, and empty lines, are ignored. Times
-//! must not decrease. The guest gets entries, whose form is in
+//! In quotation marks, `\n`, `\r`, `\t`, `\0`, `\"`, `\'` and `\\` mean single bytes, and `\x` with
+//! two hexadecimal digits means any byte. Empty lines and lines beginning with `#` are ignored.
+//! Times must not decrease. The guest gets entries in the form defined in
 //! `kernel/src/watch/background/endpoint/script.rs`.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
@@ -20,22 +20,22 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use fass_dag_file::time::parse_ns;
 use text::visible;
 
-/// The most bytes of a line: the guest takes them in one interrupt.
+/// The most bytes of a line: the guest takes all of them in one interrupt.
 const MOST_BYTES: usize = 1024;
 
-/// The most bytes of a packet: a frame of Ethernet has room for them.
+/// The most bytes of a packet, limited by the room in an Ethernet frame.
 const MOST_OF_PACKET: usize = 1472;
 
-/// Bytes that arrive at once.
+/// Bytes arriving at the same time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScriptEntry {
-    /// The number of its line.
+    /// The number of the entry's line.
     pub line: usize,
     /// The time of the run.
     pub at_ns: u64,
-    /// The name of the wire; `None`: the first one that has the file.
+    /// The name of the wire; `None` means the first wire connected to the file.
     pub wire: Option<String>,
-    /// Whom the packet is from; `None`: the bytes are of a port.
+    /// The packet's sender; `None` for the bytes of a port.
     pub from: Option<SocketAddrV4>,
     /// The bytes.
     pub bytes: Vec<u8>,
@@ -45,7 +45,7 @@ pub struct ScriptEntry {
 ///
 /// # Errors
 ///
-/// In words that begin with the number of the line: the fault and the remedy.
+/// In words, beginning with the number of the line: the fault and the remedy.
 pub fn read(text: &str) -> Result<Vec<ScriptEntry>, String> {
     let mut entries: Vec<ScriptEntry> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
@@ -54,7 +54,7 @@ pub fn read(text: &str) -> Result<Vec<ScriptEntry>, String> {
             continue;
         }
         let entry = entry(number, line).map_err(|why| format!("{number}: {why}"))?;
-        // The guest delivers them in order, so an earlier time could not be met.
+        // The guest delivers the entries in order, so an earlier time could not be met.
         if entries.last().is_some_and(|last| last.at_ns > entry.at_ns) {
             return Err(format!(
                 "{number}: this is before the line above; put the lines in the order of their times"
@@ -122,7 +122,7 @@ fn read_peer(word: &str) -> Result<SocketAddrV4, String> {
     })
 }
 
-/// Reads the text after a quotation mark, up to the closing one.
+/// Reads the text after a quotation mark, up to the closing mark.
 fn unescaped(text: &str) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     let mut rest = text.chars();
@@ -171,7 +171,7 @@ fn pair(digits: &str) -> Result<u8, String> {
     })
 }
 
-/// Returns the entries as the guest takes them.
+/// Returns the entries in the form for the guest.
 pub fn for_guest(entries: &[ScriptEntry]) -> Vec<u8> {
     let nobody = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
     let mut script = Vec::new();
@@ -182,7 +182,8 @@ pub fn for_guest(entries: &[ScriptEntry]) -> Vec<u8> {
         script.extend(from.ip().octets());
         script.extend(from.port().to_le_bytes());
         for length in [wire.len(), entry.bytes.len()] {
-            // Neither is longer, see `entry`; a command line is shorter than a name of that length.
+            // Both fit: `entry` limits the bytes, and the wire's name must fit into a command line,
+            // too.
             script.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
         }
         script.extend(wire);

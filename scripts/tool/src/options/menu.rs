@@ -1,4 +1,5 @@
-//! A first word that chooses a function for the words after it: `bench WHAT`, `oracle KIND`.
+//! Menus of words: the first word of a command line chooses the function for the rest, as in
+//! `bench WHAT` and `oracle KIND`.
 
 use std::env;
 use std::ffi::OsString;
@@ -9,13 +10,13 @@ use text::quoted;
 use super::{Refusal, nearest};
 use crate::output;
 
-/// The words to choose from.
+/// A menu of words, with its texts for `--help`.
 pub struct WordMenu {
     /// The command as a person types it, such as `./scripts/bench`.
     pub invocation: &'static str,
     /// The placeholder of the word in the help text, such as `WHAT`.
     pub word: &'static str,
-    /// One or more sentences that describe the command.
+    /// One or more sentences describing the command.
     pub about: &'static str,
     /// The words, in the order of the help text.
     pub choices: &'static [MenuWord],
@@ -23,19 +24,19 @@ pub struct WordMenu {
     pub notes: &'static str,
 }
 
-/// One of the words.
+/// A word of a menu.
 #[derive(Debug)]
 pub struct MenuWord {
     /// The word.
     pub name: &'static str,
     /// A few words for the help text.
     pub about: &'static str,
-    /// The function that gets the words after this one and returns the exit code.
+    /// The function called with the words after this word; returns the exit code.
     pub work: fn(&[OsString]) -> ExitCode,
 }
 
-/// Makes the choices of a [`WordMenu`]: each word with its help text and its function. A word that
-/// stands twice does not compile:
+/// Makes the choices of a [`WordMenu`]: each word with its help text and its function. A repeated
+/// word does not compile:
 ///
 /// ```compile_fail
 /// use std::process::ExitCode;
@@ -57,10 +58,10 @@ macro_rules! choices {
 pub use choices;
 
 impl WordMenu {
-    /// Runs the program that offers this menu, from the folder in which a script was called.
+    /// Runs the program with this menu, in the folder from which a script was called.
     pub fn carry_out(&self) -> ExitCode {
         if let Some(folder) = env::var_os("TOOL_CALLED_IN") {
-            // Set by `scripts/tool/start`. If the folder is gone, we stay where we are.
+            // Set by `scripts/tool/start`. If the folder is gone, we stay in the present folder.
             let _ = env::set_current_dir(folder);
         }
         let words: Vec<OsString> = env::args_os().skip(1).collect();
@@ -89,7 +90,7 @@ impl WordMenu {
             return Ok(choice);
         }
         let names: Vec<&str> = self.choices.iter().map(|choice| choice.name).collect();
-        // No choice begins with a dash, so a near one would only mislead.
+        // No choice begins with a dash, so a similar word would only mislead.
         let (what, near) = match word.starts_with('-') {
             true => ("option", None),
             false => (self.word, nearest(word, &names)),

@@ -1,17 +1,15 @@
-//! Command lines, described by a table and read by one function.
+//! Describes command lines by a table, and reads them all with the same function.
 //!
-//! A [`Command`] lists its [`Opt`]ions; the table is the whole truth: what is
-//! accepted, the range of each value, the default, and the text of `--help`
-//! all come from it. An option is written `--name value` or `--name=value`,
-//! a *flag* takes no value, and a *positional* is any word that is no option.
+//! A [`Command`] lists its [`Opt`]ions. This table decides everything: the accepted options, the
+//! range of each value, the default, and the text of `--help`. An option is written `--name value`
+//! or `--name=value`, a *flag* takes no value, and a *positional* is any word other than an option.
 //!
-//! A word that is not in the table is refused with one line that names it, says what is allowed
-//! and, where a name is near, suggests it. Nothing is guessed and nothing is done before the whole
-//! line is understood.
+//! A word missing from the table is refused with a single line. The line names the word, says what
+//! is allowed and suggests a similar name, if there is one. The tool guesses nothing and does
+//! nothing before it has understood the whole line.
 //!
-//! Words come as bytes of the operating system and need not be text. The name of a file
-//! may be anything; every other word must be UTF-8.
-//! A command line that was understood is [`Arguments`].
+//! Words come as bytes of the operating system and need not be text. The name of a file may be
+//! anything; every other word must be UTF-8. A fully checked command line becomes [`Arguments`].
 
 mod menu;
 
@@ -31,17 +29,17 @@ use crate::files::NamedFile;
 pub use menu::{MenuWord, WordMenu, choices};
 pub use sched_dag::nearest;
 
-/// The exit code of a run that a person has ended early, as a shell has it for ctrl-C.
+/// The exit code of a run ended early by a person, equal to a shell's exit code for ctrl-C.
 pub(crate) const BY_PERSON: u8 = 130;
 
 /// A subcommand of the tool.
 pub struct Command {
     /// The command as a person types it, such as `./scripts/run`.
     pub invocation: &'static str,
-    /// One sentence that describes the command.
+    /// One sentence describing the command.
     pub about: &'static str,
-    /// The positional words it takes, if any, and their help. One word, or any
-    /// number if the name that stands for it ends in `...`.
+    /// The positional words, if any are allowed, and their help: a single word, or any number of
+    /// words if the placeholder ends in `...`.
     pub positional: Option<(OptionValue, &'static str)>,
     /// The options, in the order of the help text.
     pub options: &'static [Opt],
@@ -49,16 +47,16 @@ pub struct Command {
     pub notes: &'static str,
 }
 
-/// The reason why a command did not do its work.
+/// Why a command did not do its work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// The help text, which the person asked for.
+    /// The help text, as the person asked.
     Help(String),
-    /// The command line, or a file that it names, is at fault: exit code 2.
+    /// The command line, or a file named there, is at fault: exit code 2.
     Usage(String),
     /// Another failure: exit code 1.
     Failure(String),
-    /// A person has ended a run that others were to follow: exit code 130.
+    /// A person has ended a run before the other runs of a series: exit code 130.
     ByPerson,
 }
 
@@ -89,8 +87,8 @@ impl Refusal {
 }
 
 impl Command {
-    /// Parses a command line, runs `work` on it, and returns the exit code. Help, refusals and
-    /// failures are printed here.
+    /// Parses a command line, runs `work` with the result, and returns the exit code. Prints help,
+    /// refusals and failures.
     pub fn carry_out(
         &self,
         words: &[OsString],
@@ -100,17 +98,17 @@ impl Command {
         done.unwrap_or_else(|refusal| self.report(refusal))
     }
 
-    /// Prints why the command did not do its work, each line under the command's name, and returns
-    /// the exit code.
+    /// Prints why the command did not do its work, with the command's name before each line.
+    /// Returns the exit code.
     pub(crate) fn report(&self, refusal: Refusal) -> ExitCode {
         refusal.report(self.invocation)
     }
 
-    /// Reads a command line (without the program's and the command's name).
+    /// Reads the words of a command line after the names of the program and the command.
     ///
     /// # Errors
     ///
-    /// The first word that the table does not allow; or the help text, if the line asks for it.
+    /// The first word not allowed by the table; or the help text, if the line asks for help.
     pub fn parse(&self, words: &[OsString]) -> Result<Arguments, Refusal> {
         let mut parsed = Arguments {
             options: self.options,
@@ -138,7 +136,7 @@ impl Command {
                 (OptionValue::Nothing, None) => OsStr::new("yes"),
                 (OptionValue::Nothing, Some(_)) => return Err(takes_no_value(name.as_str())),
                 (_, Some(value)) => value,
-                // A next word that is an option is no value: the value was forgotten.
+                // An option is no value: the person forgot the value.
                 (_, None) => words
                     .next_if(|next| !self.is_option(next))
                     .ok_or_else(|| Refusal::Usage(option.missing(words.peek().is_some())))?,
@@ -158,7 +156,7 @@ impl Command {
             )));
         };
         let name = takes.name();
-        // Positional words are stored as files whatever their type, so this sees the first one.
+        // Positional words are stored as files whatever their type, so this finds the first word.
         if let Some(first) = parsed.files().next()
             && !name.ends_with("...")
         {
@@ -176,7 +174,7 @@ impl Command {
         Ok(())
     }
 
-    /// Reports whether a word begins as an option does, or is the short form of one.
+    /// Reports whether a word begins like an option, or is the short form of an option.
     fn is_option(&self, word: &OsStr) -> bool {
         let is_short = |name: &str| self.named(name).is_some();
         word.as_bytes().starts_with(b"--") || word.to_str().is_some_and(is_short)
@@ -192,9 +190,9 @@ impl Command {
             })
     }
 
-    /// Finds the option of this name; `attached` is the value after its `=`, if any.
+    /// Finds the option with this name; `attached` is the value after its `=`, if any.
     fn find(&self, name: &OsStr, attached: Option<&OsStr>) -> Result<&'static Opt, Refusal> {
-        // A name that is no UTF-8 cannot match an option, so the lossy form serves only the
+        // A name that is not UTF-8 cannot match an option, so the lossy form serves only the
         // message.
         let name = name.to_string_lossy();
         if attached.is_some() && (name == "--help" || name == "-h") {
@@ -222,8 +220,8 @@ impl Command {
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{}\n", self.about);
         let _ = writeln!(text, "usage: {}{positional} [options]\n", self.invocation);
-        // The column of group names is as wide as the longest; it is absent if no option has a
-        // group.
+        // The column of group names is as wide as the longest name; without groups there is no such
+        // column.
         let groups = self.options.iter().map(|option| option.group.len());
         let indent = groups.max().filter(|longest| *longest > 0);
         // Two blanks stand between the longest group name and the headings.
@@ -254,7 +252,7 @@ impl Command {
 fn add_entry(text: &mut String, heading: &str, column: usize, sentence: &str) {
     const WIDTH: usize = 54;
     let mut line = heading.to_string();
-    // A heading that is too long gets a line of its own, so that the sentences stay aligned.
+    // A heading that is too long gets a line of its own, to keep the sentences aligned.
     if line.len() + 2 > column {
         let _ = writeln!(text, "{line}");
         line.clear();
@@ -288,7 +286,7 @@ fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
 pub struct OptionName(&'static str);
 
 impl OptionName {
-    /// Makes the name of an option, which is ASCII; empty for a positional word.
+    /// Makes the name of an option, in ASCII; empty for a positional word.
     pub const fn new(name: &'static [u8]) -> OptionName {
         match str::from_utf8(name) {
             Ok(name) => OptionName(name),
@@ -308,7 +306,7 @@ impl fmt::Display for OptionName {
     }
 }
 
-/// Returns the name of an option from that of its constant: small letters, and `-` for `_`.
+/// Turns the name of an option's constant into the option's name: small letters, and `-` for `_`.
 pub const fn typed<const LENGTH: usize>(constant: &str) -> [u8; LENGTH] {
     let mut name = [b'-'; LENGTH];
     let mut at = 0;
@@ -328,20 +326,20 @@ pub struct Opt {
     pub name: OptionName,
     /// The short form without its dash, such as `q`.
     pub short: Option<char>,
-    /// The kind of value that must follow.
+    /// The kind of value after the option.
     pub takes: OptionValue,
-    /// The value if the option is not given; empty: none.
+    /// The value of an omitted option; empty for none.
     pub default: &'static str,
     /// One sentence for the help text.
     pub help: &'static str,
-    /// The name of the group that this option starts in the help text; empty: none.
+    /// The name of the group started by this option in the help text; empty for none.
     pub group: &'static str,
 }
 
 /// Makes the options of a [`Command`], as the constant `OPTIONS`, and their names, as constants of
-/// a module `name`: a look-up of an option that no command has does not compile. The doc comment of
-/// each is its help sentence; then come the name, a short form, `in` and the group that it starts, a
-/// colon and the value it takes, and `or` with the default.
+/// a module `name`; so a look-up of an unknown option does not compile. The doc comment of each
+/// option is its help sentence. Then come the name, optionally a short form, `in` with the group
+/// started here, a colon, the kind of value, and `or` with the default.
 #[macro_export]
 macro_rules! options {
     ($(
@@ -375,20 +373,20 @@ macro_rules! options {
 }
 pub use options;
 
-/// A value that follows an option.
+/// The kind of value of an option.
 #[derive(Clone, Copy, Debug)]
 pub enum OptionValue {
     /// Nothing: the option is a flag.
     Nothing,
-    /// A decimal number, from the first of these to the second.
+    /// A decimal number, from the first bound to the second, inclusive.
     Number(u64, u64),
-    /// Such numbers, with commas between.
+    /// Several such numbers, with commas between.
     Numbers(u64, u64),
     /// One of these words.
     OneOf(&'static [&'static str]),
-    /// Any text; the word stands for it in the help text.
+    /// Any text; the word is its placeholder in the help text.
     Text(&'static str),
-    /// The name of a file or folder, of any bytes; the word stands for it in the help text.
+    /// The name of a file or folder, of any bytes; the word is its placeholder in the help text.
     File(&'static str),
 }
 
@@ -421,7 +419,7 @@ impl OptionValue {
 }
 
 impl Opt {
-    /// A flag without a name, which the others differ from.
+    /// A flag without a name, the base of all other options.
     pub const FLAG: Opt = Opt {
         name: OptionName(""),
         short: None,
@@ -431,12 +429,12 @@ impl Opt {
         group: "",
     };
 
-    /// Checks a value against the kind of value that the option takes.
+    /// Checks a value against the option's kind of value.
     fn check(&self, value: &OsStr) -> Result<(), String> {
         let text = value.to_str();
         let valid = match (self.takes, text) {
             (OptionValue::Nothing, _) => true,
-            // A file name may be any bytes; only an empty one, from `--name=`, is a mistake.
+            // A file name may be any bytes; only an empty name, from `--name=`, is a mistake.
             (OptionValue::File(_), _) => !value.is_empty(),
             // All other values are text.
             (_, None) => false,
@@ -462,7 +460,7 @@ impl Opt {
         Err(format!("`--{} {}`: {must}", self.name, shown(&value)))
     }
 
-    /// Reports that no value stands after the option. If an option follows, it may have been meant
+    /// Describes the missing value of an option. If an option follows, the person may have meant it
     /// as the value; then the message says how to attach it.
     fn missing(&self, is_followed: bool) -> String {
         let (name, allowed) = (self.name, self.takes.allowed());
@@ -475,7 +473,7 @@ impl Opt {
         format!("option `--{name}` lacks its value: {allowed}{remedy}")
     }
 
-    /// Returns the option as the help text writes it.
+    /// Returns the option as written in the help text.
     fn heading(&self) -> String {
         let short = self.short.map(|short| format!("-{short}, "));
         let heading = format!(
@@ -487,7 +485,7 @@ impl Opt {
         heading.trim_end().into()
     }
 
-    /// Returns the help text's sentence, with the allowed values and the default.
+    /// Returns the option's sentence for the help text, with the allowed values and the default.
     fn sentence(&self) -> String {
         let mut parts = Vec::new();
         match self.takes {
@@ -511,8 +509,8 @@ impl Opt {
     }
 }
 
-/// Returns the question whether the nearest of the names was meant, after a semicolon; empty if
-/// none is near.
+/// Returns a semicolon and the question whether the most similar name was meant; empty if none is
+/// similar.
 pub(crate) fn did_you_mean(name: &str, names: &[&str]) -> String {
     nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
@@ -523,7 +521,7 @@ fn is_number(text: &str, range: RangeInclusive<u64>) -> bool {
     is_plain && text.parse().is_ok_and(|number| range.contains(&number))
 }
 
-/// A command line that was parsed and checked.
+/// A parsed and checked command line.
 #[derive(Clone, Debug)]
 pub struct Arguments {
     options: &'static [Opt],
@@ -545,18 +543,18 @@ impl Arguments {
         (!option.default.is_empty()).then(|| OsStr::new(option.default))
     }
 
-    /// Returns the option's value or default; `None` if it has neither. For one that
-    /// takes a file there is [`path`](Self::path).
+    /// Returns the option's value or default; `None` without either. For an option that takes a
+    /// file, call [`path`](Self::path) instead.
     pub fn text(&self, name: OptionName) -> Option<&str> {
         self.value(name).and_then(OsStr::to_str)
     }
 
-    /// Returns the file that the option names, or its default; `None` if it has neither.
+    /// Returns the file named by an option, or its default; `None` without either.
     pub fn path(&self, name: OptionName) -> Option<&Path> {
         self.value(name).map(Path::new)
     }
 
-    /// Returns the files that these options name, of those that are given or have a default.
+    /// Returns the files named by these options, skipping options without a value or default.
     pub fn named(&self, options: &[OptionName]) -> Vec<NamedFile<'_>> {
         let named = options.iter().filter_map(|option| {
             let path = self.path(*option)?;
@@ -566,7 +564,7 @@ impl Arguments {
         named.collect()
     }
 
-    /// Returns a number's value or default; `None` if it has neither.
+    /// Returns a number's value or default; `None` without either.
     pub fn number(&self, name: OptionName) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
     }
@@ -577,7 +575,7 @@ impl Arguments {
         words.filter_map(|word| word.parse().ok()).collect()
     }
 
-    /// Makes sure that no value is repeated in the comma-separated lists of these options.
+    /// Makes sure that no comma-separated list of these options repeats a value.
     ///
     /// # Errors
     ///
@@ -597,7 +595,7 @@ impl Arguments {
         Ok(())
     }
 
-    /// Makes sure that of each pair of options at most one is given.
+    /// Makes sure that at most one option of each pair is given.
     ///
     /// # Errors
     ///
@@ -618,7 +616,7 @@ impl Arguments {
     ///
     /// # Errors
     ///
-    /// The name of one that is, and what `why` says of it.
+    /// The name of a given option, followed by `why`.
     pub fn check_without(&self, names: &[OptionName], why: &str) -> Result<(), String> {
         let given = self.given_of(names);
         given.map_or(Ok(()), |name| Err(format!("`--{name}` {why}")))
@@ -641,17 +639,17 @@ impl Arguments {
         self.positionals.first().and_then(|word| word.to_str())
     }
 
-    /// Returns the first positional word as a file, or else the question which file it is.
+    /// Returns the first positional word as a file.
     ///
     /// # Errors
     ///
-    /// The question: there is none.
+    /// The `question`, if there is no such word.
     pub fn file(&self, question: &str) -> Result<NamedFile<'_>, String> {
         let path = self.files().next().ok_or(question)?;
         Ok(NamedFile { option: "", path })
     }
 
-    /// Returns the files that the positional words name.
+    /// Returns the files named by the positional words.
     pub fn files(&self) -> impl ExactSizeIterator<Item = &Path> + Clone {
         self.positionals.iter().map(Path::new)
     }

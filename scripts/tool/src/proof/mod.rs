@@ -1,27 +1,27 @@
-//! Bounds of a run, recomputed on the host, next to the times that were observed.
+//! Bounds of a run, recomputed on the host, and shown next to the observed times.
 //!
-//! A record has everything that bounds follow from: the graphs with WCETs and priorities, the
-//! policy, the cores, the charge on each instance, and the bounds. From these the host runs the
-//! same analysis. So it also gets results for which the guest has no room, such as a witness, or
-//! the parts of a bound. If host and guest disagree about a bound, that is an error.
+//! A record contains everything needed to derive bounds: the graphs with WCETs and priorities, the
+//! policy, the cores, the charge on each instance, and the guest's bounds. From these data the host
+//! runs the same analysis. So the host also gets results too large for the guest, such as a witness
+//! or the parts of a bound. A disagreement between host and guest about a bound is an error.
 //!
-//! It also measures the execution times of the runs and the platform's own overheads
-//! ([`observed`]). The longest calls, with a margin, are WCETs that a later commit can take; the
-//! longest responses are shown next to the bounds.
+//! This module also measures the execution times of the runs and the platform's own overheads
+//! ([`observed`]). The longest calls, with a margin, become WCETs for later commits; the longest
+//! responses are shown next to the bounds.
 //!
-//! To attribute the slack of a bound, the same analysis is run again with less and less: without
-//! the platform's overheads, then with every subtask preemptible, then with the DAG alone. The
-//! difference that each step makes is the part of what it leaves out:
+//! To attribute the slack of a bound, the host repeats the analysis with less and less: without the
+//! platform's overheads, then with every subtask preemptible, then with the DAG alone. Each step
+//! leaves out one part, and the difference it makes is the size of that part:
 //!
 //! ```text
 //! bound = overheads + blocking + interference + own order + longest path
 //! ```
 //!
-//! *Own order* is the delay of the longest path by the DAG's other subtasks, *overheads* are those
-//! of all DAGs. The rest, from the longest observed response up to the longest path at its WCETs,
-//! is the pessimism of the WCETs.
+//! *Own order* is the delay of the longest path by the DAG's other subtasks; *overheads* are the
+//! overheads of all DAGs. The rest, from the longest observed response up to the longest path at
+//! its WCETs, is the pessimism of the WCETs.
 //!
-//! The witnesses of a guest's bounds go to files, for `./scripts/check-witness`.
+//! The witnesses of a guest's bounds go to files, to be checked by `./scripts/check-witness`.
 
 pub mod observed;
 
@@ -37,10 +37,10 @@ use views::json::Object;
 use views::record::{self, CommittedDags};
 use views::units::shown;
 
-/// One DAG of one commit.
+/// The proof of one DAG in one commit.
 #[derive(Clone, Debug)]
 pub struct ProofRow {
-    /// The file of the DAG, if there are several.
+    /// The file with the DAG, if there are several files.
     file: Option<String>,
     commit: usize,
     dag: String,
@@ -53,7 +53,7 @@ pub struct ProofRow {
 ///
 /// # Errors
 ///
-/// In words: a DAG was committed and not run.
+/// In words: a DAG was committed but has not run.
 pub fn rows(commits: &[CommittedDags], observed: &[OfDag]) -> Result<Vec<ProofRow>, String> {
     let mut rows = Vec::new();
     for commit in commits {
@@ -100,7 +100,7 @@ impl ProofRow {
 
     /// Returns the longest response in thousandths of the bound.
     fn permille(&self) -> Option<u64> {
-        // In 128 bits, since a response of 213 days times 1000 exceeds 64.
+        // In 128 bits, since a response of 213 days times 1000 exceeds 64 bits.
         let permille = u128::from(self.longest_ns) * 1000 / u128::from(self.bound_ns?.max(1));
         u64::try_from(permille).ok()
     }
@@ -162,7 +162,7 @@ pub(crate) fn ratio(permille: Option<u64>) -> String {
     })
 }
 
-/// Returns the number of proven DAGs, and of responses above their bounds.
+/// Returns a sentence with the number of proven DAGs and of responses above their bounds.
 pub fn summary(rows: &[ProofRow]) -> String {
     let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
     let above = rows.iter().filter(|row| row.exceeds()).count();
@@ -170,7 +170,8 @@ pub fn summary(rows: &[ProofRow]) -> String {
     format!("{proven} of {dags} DAGs proven, {above} responses above a bound")
 }
 
-/// Returns the complaint about a response above its bound, which makes the proof worthless.
+/// Returns the complaint about a response above its bound, as such a response makes the proof
+/// worthless.
 pub fn complaint(rows: &[ProofRow]) -> Option<String> {
     let row = rows.iter().find(|row| row.exceeds())?;
     Some(format!(
@@ -182,8 +183,9 @@ pub fn complaint(rows: &[ProofRow]) -> Option<String> {
     ))
 }
 
-/// The parts of a bound: the longest path at its WCETs, its own subtasks off that path, other DAGs'
-/// more urgent instances, less urgent ones that keep their cores, and the platform's overheads.
+/// The parts of a bound: the longest path at its WCETs, the DAG's own subtasks off that path, more
+/// urgent instances of other DAGs, less urgent instances keeping their cores, and the platform's
+/// overheads.
 const PARTS: [&str; 5] = [
     "longest_path_ns",
     "own_order_ns",
@@ -192,8 +194,8 @@ const PARTS: [&str; 5] = [
     "overheads_ns",
 ];
 
-/// These parts of a bound, in nanoseconds. A part is `None` if a bound that it is a difference of
-/// is not proven.
+/// The sizes of these parts, in nanoseconds. A part, as the difference of two bounds, is `None` if
+/// one of the two is not proven.
 pub type Slack = [Option<u64>; PARTS.len()];
 
 /// Splits the bound of a DAG of a commit into its parts.
@@ -212,10 +214,10 @@ pub fn slack(commit: &CommittedDags, dag: DagId) -> Slack {
     let specs = here().map(|(place, _)| &commit.specs[place]);
     let mut all: Vec<DagSpec> = specs.cloned().collect();
     (all.iter_mut()).for_each(|dag| dag.cluster = None);
-    // Its index among the DAGs of its cluster.
+    // The DAG's index among the DAGs of its cluster.
     let index = here().take_while(|(place, _)| *place < dag.index()).count();
     let full = commit.told.dags[dag.index()].bound_ns;
-    // The order of the steps decides which part gets an effect that two of them have.
+    // Some effects belong to two steps; the order of the steps decides which part gets them.
     let mut settings = commit.settings();
     let cores = task_set.cores_of(cluster, settings.cores).len();
     settings.cores = u32::try_from(cores).unwrap_or(u32::MAX);
@@ -228,10 +230,11 @@ pub fn slack(commit: &CommittedDags, dag: DagId) -> Slack {
     let preemptible = bound(&all, &settings, index);
     let own = all.swap_remove(index);
     let alone = bound(std::slice::from_ref(&own), &settings, 0);
-    // With a core for each subtask nothing delays the longest path.
+    // With a core for each subtask, nothing delays the longest path.
     settings.cores = u32::try_from(own.subtasks.len()).unwrap_or(u32::MAX).max(1);
     let length = bound(&[own], &settings, 0);
-    // What a table gives its DAGs, and leaves to others, is of no such parts.
+    // A time table gives time to its DAGs and leaves the rest to others; such time has no parts of
+    // these kinds.
     let has_table = task_set.tables().iter().any(|of| of.cluster == cluster);
     let part = |whole: Option<u64>, rest: Option<u64>| match has_table {
         true => None,
@@ -246,8 +249,8 @@ pub fn slack(commit: &CommittedDags, dag: DagId) -> Slack {
     ]
 }
 
-/// Writes the witness of each commit, and returns a line that names the files. Witnesses of later
-/// commits get files of their own, with the commit's number as the last extension.
+/// Writes the witness of each commit, and returns a line with the names of the files. Later commits
+/// get files of their own, with the commit's number as the last extension.
 ///
 /// # Errors
 ///

@@ -1,14 +1,14 @@
 //! Observed times of runs: execution times per subtask, response times per DAG, and the platform's
 //! overheads.
 //!
-//! Runs of other boots can be added: two DAGs are the same if the hashes of their names and edges
-//! are.
+//! Runs of several boots can be added up: two DAGs are equal if the hashes of their names and edges
+//! are equal.
 //!
 //! The overheads are measured from the journal of a run: `sched_dag::law::Costs` defines the
-//! measurement, `sched_dag::analysis::Overheads::measured` the charge for it.
+//! measurement, `sched_dag::analysis::Overheads::measured` the resulting charge.
 //!
-//! Observed WCETs go to files, for later commits. `sched_dag::wcets` has the format and its reader,
-//! which the guest's commit uses, too. Faults that can be seen without the DAGs are refused here;
+//! Observed WCETs go to files, for later commits. `sched_dag::wcets` defines the format and the
+//! reader, which the guest's commit uses, too. This module refuses faults visible without the DAGs;
 //! the commit reports the others.
 
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ use views::json::Object;
 use views::record::{Record, Run};
 use views::units::shown;
 
-/// A DAG of one shape, in all its runs.
+/// The observed times of a DAG, in all its runs.
 #[derive(Clone, Debug)]
 pub struct OfDag {
     /// Its name.
@@ -39,18 +39,19 @@ pub struct OfDag {
     pub subtasks: Vec<(String, Distribution)>,
 }
 
-/// Adds the times of a boot's runs to those seen before.
+/// Adds the times of a boot's runs to earlier times.
 ///
 /// # Errors
 ///
-/// In words: there are no times, or not of all DAGs.
+/// In words: there are no times, or some DAG's times are wrong.
 pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
     let mut is_told = false;
     for (place, times) in &record.times {
         let committed = &record.commits[*place];
         is_told |= !times.dags.is_empty();
         for (dag, times) in committed.told.dags.iter().zip(&times.dags) {
-            // A record is a file of a person and may combine a commit with the times of another.
+            // A record is a person's file and may combine a commit with the times of another
+            // commit.
             if times.subtasks.len() != dag.subtasks.len() {
                 return Err(format!(
                     "the times of dag `{}` are not of its subtasks",
@@ -118,11 +119,11 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
     all.iter().flat_map(of_dag)
 }
 
-/// Measures the overheads in the runs of a guest: the largest of all runs.
+/// Measures the overheads in a guest's runs, and returns the largest of all runs.
 ///
 /// # Errors
 ///
-/// In words: the log has no trace, or a damaged one.
+/// In words: the guest has run nothing.
 pub fn measure(runs: &[Run]) -> Result<MeasuredCosts, String> {
     let costs = runs.iter().map(of_run).reduce(|one, other| MeasuredCosts {
         dispatches: one.dispatches + other.dispatches,
@@ -134,7 +135,7 @@ pub fn measure(runs: &[Run]) -> Result<MeasuredCosts, String> {
 }
 
 fn of_run(run: &Run) -> MeasuredCosts {
-    // Without a tolerance nothing is a breach, and only the figures are needed.
+    // With an unlimited tolerance nothing is a breach; only the figures are needed.
     let figures = check(run, u64::MAX).figures;
     MeasuredCosts {
         dispatches: figures.instances as u64,
@@ -162,10 +163,10 @@ pub fn overheads_line(measured: &MeasuredCosts, margin_percent: u64) -> String {
         .into_text()
 }
 
-/// The margin on the longest call, in per cent of it, if no other is given.
+/// The default margin on the longest call, in per cent of the call.
 pub const MARGIN_PERCENT: u64 = 20;
 
-/// Returns a file of the longest calls with a margin. A subtask that never ran is left out.
+/// Returns a file of the longest calls with a margin, without subtasks that never ran.
 pub fn text(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::from(
         "# WCETs that were observed, by `./scripts/recording --observe`: a margin in per cent, then of\n\
@@ -194,7 +195,7 @@ fn with_margin(longest_ns: u64, margin_percent: u64) -> u64 {
     u64::try_from(ns.div_ceil(100)).unwrap_or(u64::MAX).max(1)
 }
 
-/// Reads a file of WCETs, and checks everything that does not depend on the DAGs.
+/// Reads a file of WCETs, and checks everything independent of the DAGs.
 ///
 /// # Errors
 ///
@@ -236,7 +237,7 @@ pub fn read(path: &Path) -> Result<String, String> {
         }
     }
     match (has_ended, has_dag) {
-        // A file that was cut off must not pass as one with fewer WCETs.
+        // A truncated file must not pass as a file with fewer WCETs.
         (false, _) => {
             let why = "the file does not end by `end`; is a part of it missing?";
             Err(refuse(last.max(1), why))
@@ -246,8 +247,8 @@ pub fn read(path: &Path) -> Result<String, String> {
     }
 }
 
-/// Translates a guest's refusal of the file into one with its name and line; `None` if the message
-/// is about something else.
+/// Translates a guest's refusal of the file into a message with the file's name and line; returns
+/// `None` for a message about anything else.
 pub fn translate(said: &str, path: &Path) -> Option<String> {
     let (before, rest) = said.split_once("line ")?;
     let (line, after) = rest.split_once(" of the WCETs: ")?;

@@ -1,22 +1,22 @@
-//! A recording as an MCAP file, by the specification on mcap.dev, version 0.
+//! Writes recordings as MCAP files, by the specification on mcap.dev, version 0.
 //!
-//! There is a channel for each of the recording's, named `/DAG/TOPIC`, and `/DAG/events` for other
-//! entries. A message is a JSON object of the job and the value; its log time is the completion of
-//! the instance, its publish time the job's nominal release. Messages are in chunks without
-//! compression, each with its index, so that a reader finds a time without reading everything.
+//! Each channel of the recording becomes a channel named `/DAG/TOPIC`; other entries go to
+//! `/DAG/events`. A message is a JSON object of the job and the value. Its log time is the
+//! completion of the instance, its publish time the job's nominal release. Messages are in chunks
+//! without compression, each with an index, so a reader finds a time without reading everything.
 //!
 //! Types are JSON schemas (draft 2020-12), and values are JSON. Viewers accept a part of a schema
-//! only if it has one type: a list of types, `anyOf`, tuples or arrays of arrays make them refuse
-//! the channel. So
+//! only if it has a single type: lists of types, `anyOf`, tuples or arrays of arrays make them
+//! refuse the channel. So
 //!
 //! - a tuple is an object with the fields `0`, `1` and so on;
-//! - a part that may have no value is not `required`, and is left out of its object without one: an
-//!   option, a number (JSON has no NaN), and an array of numbers, as a whole;
-//! - an array or an option that is an element, and an option of an option, is the field `value` of
-//!   an object of its own;
-//! - an infinite number is `1e999`, which is beyond the range of every JSON reader's numbers.
+//! - a part without a guaranteed value is not `required`, and its object omits it if there is no
+//!   value: an option, a number (JSON has no NaN), and an array of numbers, as a whole;
+//! - an array or an option as an element, and an option of an option, become the field `value` of
+//!   an object of their own;
+//! - an infinite number is `1e999`, a number beyond the range of every JSON reader.
 //!
-//! A schema describes exactly what is written here; the tests check one against the other.
+//! A schema describes exactly the output of this module; the tests check both against each other.
 
 use std::collections::BTreeMap;
 use std::fmt::{Display, Write as _};
@@ -93,7 +93,7 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
         }
         (what, channel) => {
             let subtask = match what {
-                // Of a lost value the place is its channel, of other entries the subtask.
+                // The place of a lost value is its channel, of any other entry its subtask.
                 EntryKind::Lost => channel.map_or(entry.place, |channel| channel.subtask),
                 _ => entry.place,
             };
@@ -106,14 +106,14 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
                 entry.job,
                 event.into_text()
             );
-            // The channels of events follow those of values, one for each DAG.
+            // The channels of events follow the channels of values, one for each DAG.
             number(header.channels.len()).saturating_add(entry.dag)
         }
     }
 }
 
-/// Returns the records of schemas and channels: those of the recording, then one channel for each
-/// DAG for other entries.
+/// Returns the records of schemas and channels: those of the recording, then a channel of other
+/// entries for each DAG.
 fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
     let event = "Event { what: text, subtask: u16 }";
     let event = recording::Schema::parse(event).expect("it is a schema");
@@ -145,7 +145,7 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
     schemas
 }
 
-/// The messages of one chunk.
+/// The messages of a chunk.
 #[derive(Default)]
 struct MessageChunk {
     records: Vec<u8>,
@@ -161,7 +161,7 @@ fn including(times: Times, time_ns: u64) -> Times {
     Some((first.min(time_ns), last.max(time_ns)))
 }
 
-/// The part of the file that is written.
+/// The file as written so far.
 struct WrittenFile<'o> {
     out: &'o mut dyn Write,
     length: u64,
@@ -220,7 +220,7 @@ impl WrittenFile<'_> {
         let size = records.len() as u64;
         let mut crc = Crc::new();
         crc.update(&records);
-        // An empty name of the compression: none, so both sizes are equal.
+        // An empty name means no compression, so both sizes are equal.
         let none = String::new();
         let mut content = to_bytes(&(first, last, size, crc.value(), none.clone(), size));
         content.extend(records);
@@ -247,7 +247,7 @@ impl WrittenFile<'_> {
         let start = self.length;
         let messages: u64 = self.counts.values().sum();
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
-        // `channels` has a schema and a channel for each.
+        // `channels` contains a schema and a channel for each.
         let of_each = u16::try_from(channels.len() / 2).unwrap_or(u16::MAX);
         let no_attachments_and_metadata = [0_u32; 2];
         let counts: Vec<u8> = self
@@ -268,7 +268,7 @@ impl WrittenFile<'_> {
         let indexes = std::mem::take(&mut self.chunk_indexes);
         let indexes = indexes.into_iter().map(|content| (CHUNK_INDEX, content));
         let statistics = [(STATISTICS, statistics)];
-        // Schemas and channels are repeated, so that a reader needs the summary alone.
+        // Schemas and channels are repeated, so a reader needs the summary alone.
         let all = channels.iter().cloned().chain(indexes).chain(statistics);
         for (kind, content) in all {
             self.record(kind, &content)?;
@@ -280,7 +280,7 @@ impl WrittenFile<'_> {
     }
 }
 
-/// Returns the schema of the messages of a channel: the job, and a value of this type.
+/// Returns the schema of a channel's messages: the job, and a value of this type.
 pub(super) fn of_message(schema: &Schema) -> String {
     let job = Schema::Scalar(Scalar::U64);
     object([("job", &job), ("value", schema)].into_iter()).into_text()
@@ -327,7 +327,7 @@ fn may_lack(schema: &Schema) -> bool {
     match schema {
         Schema::Scalar(Scalar::F32 | Scalar::F64) | Schema::Option(_) => true,
         Schema::List(element) | Schema::Array(element, _) => {
-            // Of an array of numbers a single NaN leaves out the whole.
+            // A single NaN in an array of numbers leaves out the whole array.
             !is_wrapped(element) && may_lack(element)
         }
         _ => false,
@@ -376,20 +376,20 @@ fn named(fields: &[Field]) -> impl Iterator<Item = (&str, &Schema)> {
     fields.iter().map(|field| (&*field.name, &field.schema))
 }
 
-/// Writes values, one behind the other.
+/// Writes values, each behind the previous value.
 struct ValueWriter<'v, 'b> {
     input: &'v mut Decoder<'b>,
     out: &'v mut String,
 }
 
 impl ValueWriter<'_, '_> {
-    /// Writes a field after others, if it has a value.
+    /// Writes a field after others, if the field has a value.
     fn write_field(&mut self, name: impl Display, schema: &Schema) -> Result<(), Malformed> {
         let before = self.out.len();
         let comma = if self.out.ends_with('{') { "" } else { "," };
         let _ = write!(self.out, "{comma}{}:", quoted(&name.to_string()));
         if !self.write(schema)? {
-            // Without a value the name that was written goes, too.
+            // Without a value, the field's name is removed, too.
             self.out.truncate(before);
         }
         Ok(())
@@ -421,7 +421,7 @@ impl ValueWriter<'_, '_> {
         Ok(has_all)
     }
 
-    /// Writes a value. Returns whether it has one; if not, the caller drops the text.
+    /// Writes a value. Returns `false` for a missing value; the caller then drops the text.
     fn write(&mut self, schema: &Schema) -> Result<bool, Malformed> {
         match schema {
             Schema::Scalar(_) => self.write_scalar(schema),
@@ -451,7 +451,7 @@ impl ValueWriter<'_, '_> {
             text = part.to_string();
         })?;
         *self.out += match real {
-            // Shown as `null`, it would be left out as NaN is.
+            // Shown as `null`, an infinite number would be left out like NaN.
             f64::INFINITY => "1e999",
             f64::NEG_INFINITY => "-1e999",
             _ => &text,

@@ -1,8 +1,8 @@
-//! The subcommand `recording`: shows a recording, and converts it to and from other formats.
+//! Shows a recording, and converts it to and from other formats: the subcommand `recording`.
 //!
-//! A recording is the file of a run's inputs; the crate `recording` has its format. It can be shown
-//! as a table, whole or for one job, written as tables of comma-separated values or as an MCAP file
-//! (`mcap`), and made from a table (`table`).
+//! A recording is the file of a run's inputs, in the format defined by the crate `recording`. The
+//! subcommand shows a recording as a table, whole or for a single job. It writes tables of
+//! comma-separated values (`table`) or an MCAP file (`mcap`), and makes recordings from tables.
 
 pub mod mcap;
 mod table;
@@ -27,7 +27,7 @@ use crate::system;
 use views::protocol::Transcript;
 use views::record::Record;
 
-/// The options that write views of the commits and runs of a record.
+/// The options for writing views of the commits and runs of a record.
 const OF_RUNS: [OptionName; 2] = [name::WITNESS, name::OBSERVE];
 
 /// The table of `recording`.
@@ -98,7 +98,7 @@ fn attempt(options: &Arguments) -> Result<(), Refusal> {
     }
     let bytes = read(file).map_err(Refusal::Usage)?;
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
-    // Before anything is printed, since it may refuse.
+    // Before anything is printed, since this may refuse.
     of_runs(&recording, options).map_err(Refusal::Usage)?;
     let bytes = in_run_time(&recording);
     let rebased = parse(file, &bytes).map_err(Refusal::Usage)?;
@@ -124,8 +124,8 @@ fn attempt(options: &Arguments) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Returns the values with all times in that of the run: a function is told the clock's, also by
-/// samples.
+/// Returns the recording with all times in run time. Functions, also those fed by samples, see the
+/// clock's time, so the epoch of the run is subtracted.
 fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
     let texts = recording.chunks().filter_map(|chunk| match chunk {
         Chunk::Text(text) => Some(text),
@@ -140,7 +140,7 @@ fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
         let mut value = entry.value.to_vec();
         let role = header.channels.get(usize::from(entry.place));
         let times = match (entry.what, role.map(|channel| channel.role)) {
-            // Behind the length of the list, and behind `some` and the job.
+            // The times stand behind the length of the list, or behind `some` and the job.
             (EntryKind::Clock, _) => value.get_mut(4..),
             (EntryKind::Value, Some(Role::Sample)) => value.get_mut(9..17),
             _ => None,
@@ -155,7 +155,7 @@ fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
     record.end()
 }
 
-/// Writes the views of commits and runs that the options name.
+/// Writes the requested views of commits and runs.
 fn of_runs(recording: &Recording<'_>, options: &Arguments) -> Result<(), String> {
     let Some(name) = options.given_of(&OF_RUNS) else {
         return Ok(());
@@ -179,7 +179,7 @@ fn of_runs(recording: &Recording<'_>, options: &Arguments) -> Result<(), String>
     Ok(())
 }
 
-/// Checks the options and all files, before any is opened.
+/// Checks the options and all files before opening any of them.
 fn check(input: NamedFile<'_>, options: &Arguments) -> Result<(), String> {
     let of_tables = [name::OUT, name::DAG, name::TOPIC];
     if options.is_given(name::FROM_CSV) {
@@ -201,7 +201,7 @@ fn check(input: NamedFile<'_>, options: &Arguments) -> Result<(), String> {
     (options.named(&[name::CSV]).iter()).try_for_each(files::check_folder)
 }
 
-/// Reads a file that must be a recording.
+/// Reads a file that must be a recording, and completes a recording cut off at its end.
 pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
     let place = files::shown_path(file);
     let bytes = files::read(file).map_err(|why| format!("{place}: {why}; name another file"))?;
@@ -209,8 +209,8 @@ pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
     Ok(bytes.into_owned())
 }
 
-/// Reads the bytes that a guest has sent to the debug port. A firmware prints there, too, before
-/// the guest.
+/// Reads the bytes sent by a guest to the debug port, without the output of a firmware, which
+/// prints there before the guest.
 ///
 /// # Errors
 ///
@@ -245,11 +245,11 @@ fn write(
     write().map_err(|error| format!("cannot write {}: {error}", files::shown_path(path)))
 }
 
-/// Returns a Python that has PyPI's `mcap`, a reader of such files independent of this one.
+/// Returns a Python with PyPI's `mcap`, a reader of MCAP files independent of this module.
 ///
 /// # Errors
 ///
-/// In words: it has no such package.
+/// In words: the Python has no such package.
 pub fn independent_reader() -> Result<OsString, String> {
     let python = env::var_os("MCAP_PYTHON").unwrap_or("python3".into());
     match system::run(process::Command::new(&python).args(["-c", "import mcap"])) {
@@ -342,7 +342,7 @@ fn shown(recording: &Recording<'_>) -> String {
     text + &tables
 }
 
-/// Returns the times of all jobs of a run, also those whose events are lost.
+/// Returns the times of all jobs of a run, including jobs with lost events.
 fn table(run: usize, commit: &Commit, times: &Times) -> String {
     let mut text = String::new();
     let mut row = |name: &str, counted: &Counted| {
@@ -351,7 +351,7 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
         let figures = figures.map(|ns| format!("{:>12}", views::units::shown(ns)));
         let figures = figures.concat();
         // Writing into a `String` cannot fail.
-        // A row without samples would show zeros that nobody has measured.
+        // A row without samples would show zeros measured by nobody.
         let _ = match times.count() {
             0 => Ok(()),
             count => writeln!(text, "  {name:<34}{count:>8}{figures}"),
@@ -377,7 +377,7 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
     }
 }
 
-/// Returns the lines about a job, given as `DAG/JOB`.
+/// Returns the lines about the job given as `DAG/JOB`.
 fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> {
     let header = recording.header();
     // The last `/`, since a DAG's name may contain one.

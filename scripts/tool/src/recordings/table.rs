@@ -1,13 +1,13 @@
-//! Recordings from and to tables of comma-separated values (RFC 4180).
+//! Converts recordings from and to tables of comma-separated values (RFC 4180).
 //!
-//! In a table that becomes a recording each row is the value that a source returns in one job. The
-//! columns `job`, `release_ns` and `at_ns` are optional and mean what they are called. The others,
-//! in their order, are the numbers and texts of the type.
+//! In a table to be converted, each row is the value returned by a source in one job. The optional
+//! columns `job`, `release_ns` and `at_ns` have the meanings of their names. The other columns, in
+//! their order, are the numbers and texts of the type.
 //!
-//! A recording becomes one table for each channel, and one for other entries. Each number has a
-//! column: structs, tuples and arrays are spread, and the name of a column is the path to it. A
-//! part without a fixed number of columns, a list or an option, is JSON in one cell, and so is a
-//! large array; an option without a value is an empty cell.
+//! A recording becomes a table for each channel, and a table for other entries. Each number has a
+//! column: structs, tuples and arrays are spread, and the name of a column is the path to its
+//! number. A part without a fixed number of columns, such as a list or an option, is JSON in a
+//! single cell, and so is a large array; an option without a value is an empty cell.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -145,7 +145,7 @@ pub(super) fn convert(file: &Path, options: &Arguments) -> Result<Vec<u8>, Strin
         });
         row += 1;
     }
-    // An order that is wrong says more.
+    // A wrong order of rows tells more, so it is reported first.
     off_grid.map_or(Ok(writer.end()), Err)
 }
 
@@ -190,13 +190,13 @@ impl ColumnRoles {
     }
 }
 
-/// Returns the names of the columns that are left out of the values.
+/// Returns the names of the columns left out of the values.
 fn ignored(options: &Arguments) -> Vec<&str> {
     let all = options.text(name::IGNORE);
     all.map_or(Vec::new(), |all| all.split(',').collect())
 }
 
-/// Returns a name that two columns share, unless it is ignored.
+/// Returns a name shared by two columns, unless the name is ignored.
 fn twice<'t>(titles: &'t [String], options: &Arguments) -> Option<&'t str> {
     let (ignored, mut seen) = (ignored(options), BTreeSet::new());
     let mut used = (titles.iter().map(String::as_str)).filter(|title| !ignored.contains(title));
@@ -219,7 +219,7 @@ fn schema(columns: &ColumnRoles, options: &Arguments) -> Result<Schema, String> 
         .map_err(|(column, expected)| format!("`--type`, column {column}: expected {expected}"))
 }
 
-/// Appends the bytes of a part of a value, which is a cell.
+/// Parses a cell as a part of a value, and appends the bytes of the part.
 fn encode(part: &Schema, cell: &str, out: &mut Vec<u8>) -> Result<(), String> {
     match part {
         Schema::Scalar(scalar) => {
@@ -233,12 +233,12 @@ fn encode(part: &Schema, cell: &str, out: &mut Vec<u8>) -> Result<(), String> {
             match (&**inner, cell.is_empty()) {
                 (_, true) => Ok(()),
                 (Schema::Scalar(_), false) => encode(inner, cell, out),
-                // Other options are JSON in their cell, which is only written.
+                // Other options are JSON in their cell; JSON is written but never read.
                 _ => Err(format!("a value of type {part} is not read from a table")),
             }
         }
         Schema::List(_) => Err(format!("a list, {part}, is not read from a table")),
-        // Whatever else is no array has been spread.
+        // Structs, tuples and small arrays were spread before, so this is a large array.
         _ => Err(format!(
             "an array of more than {MOST_COLUMNS} columns, {part}, is not read from a table"
         )),
@@ -286,7 +286,7 @@ impl Iterator for TableRows<'_> {
             }
         }
         self.text = "";
-        // The rest of the table would be one cell.
+        // The rest of the table would be a single cell.
         if quotes {
             let why = "a cell that begins with a quotation mark has no end";
             return Some(Err((first, why.into())));
@@ -394,7 +394,7 @@ fn row(cells: &[String]) -> String {
     line
 }
 
-/// Adds the columns of a type: the name of each, and the part of a value that is in it.
+/// Adds the columns of a type: for each, its name and its part of a value.
 fn spread<'s>(schema: &'s Schema, name: &str, columns: &mut Vec<(String, &'s Schema)>) {
     let within = |part: &dyn std::fmt::Display| match name {
         "value" => part.to_string(),
@@ -423,7 +423,7 @@ fn spread<'s>(schema: &'s Schema, name: &str, columns: &mut Vec<(String, &'s Sch
     }
 }
 
-/// Returns the cell of a part of a value that is read from `input`, a decoder of `all`.
+/// Returns the cell for a part of a value, read from `input`, a decoder of `all`.
 fn cell(part: &Schema, input: &mut Decoder<'_>, all: &[u8]) -> Result<String, Malformed> {
     let (start, mut cell) = (input.offset(), String::new());
     part.walk(input, &mut |part| cell = shown(part))?;
@@ -437,7 +437,7 @@ fn cell(part: &Schema, input: &mut Decoder<'_>, all: &[u8]) -> Result<String, Ma
     Ok(cell)
 }
 
-/// Returns a scalar as Rust writes it, and text as it is.
+/// Returns a scalar as Rust writes it, and text unchanged.
 fn shown(part: Part<'_>) -> String {
     match part {
         Part::Char(letter) => letter.to_string(),

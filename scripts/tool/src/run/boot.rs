@@ -1,9 +1,9 @@
 //! The subcommand `boot`: a runner for cargo.
 //!
-//! Cargo hands each program that it would start to a *runner*, images and tests alike. An image is
+//! Cargo hands each program to be started to a *runner*, images and tests alike. An image is
 //! booted, as by `run --image`; any other program replaces this process, and so keeps its words,
-//! streams and exit code. With `--on linux`, or `--on debian`, the app's Linux program is built by
-//! cargo and run instead.
+//! streams and exit code. With `--on linux` or `--on debian`, cargo builds the app's Linux program,
+//! and the runner runs it instead.
 
 use std::env;
 use std::ffi::OsString;
@@ -50,7 +50,7 @@ pub fn boot(words: &[OsString]) -> ExitCode {
     };
     // An image is recognized by its content; all else is a program of the host.
     if let Ok(app) = image::check_file(Path::new(file)) {
-        // A line that does not parse is refused by `run` below, with its own words.
+        // `run` below refuses a line that does not parse, with its own words.
         if let Ok(options) = RUN.parse(rest)
             && on_linux::is_asked_for(&options)
         {

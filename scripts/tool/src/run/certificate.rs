@@ -1,7 +1,8 @@
-//! Certificates for the sets of a DAG file, which this computer explores before the run.
+//! Makes certificates for the sets of a DAG file, by exploring their states on this computer before
+//! the run.
 //!
-//! A set gets one where no other test proves it, and it stands behind the set's records: so it travels
-//! wherever the file does. The commit checks it again.
+//! A set gets a certificate where no other test proves the set. The certificate follows the set's
+//! records in the file and so travels with the file. The commit checks the certificate again.
 
 use fass_dag_file::{Length, Set, verified};
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer, certify};
@@ -10,8 +11,9 @@ use sched_dag::{CommitOptions, Policy, Preemption, SchedulerOptions};
 use super::name;
 use crate::options::Arguments;
 
-/// Gives a set its certificate for a run with these words, if it needs and can have one, in place of
-/// one that is of other words or another set. Returns the number of states.
+/// Gives a set a certificate for a run with these words, if the set needs a certificate and can
+/// have one. Replaces a certificate made for other words or for another set. Returns the number of
+/// states.
 pub(super) fn give(
     set: &mut Set,
     words: &[String],
@@ -23,7 +25,8 @@ pub(super) fn give(
         let mut values = words.iter().rev().filter_map(|word| word.split_once('='));
         values.find(|(of, _)| *of == name).map(|(_, value)| value)
     };
-    // Persons may pause DAGs; measured times are not known yet; the last ones let cores idle.
+    // At a console, persons may pause DAGs; measured times are not known yet; the last two words
+    // let cores idle.
     let apart = [
         "console",
         "clusters",

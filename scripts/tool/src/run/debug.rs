@@ -1,15 +1,15 @@
-//! The subcommand `debug`: an app in QEMU, and gdb at it.
+//! Runs an app in QEMU under gdb: the subcommand `debug`.
 //!
-//! The image is built by the profile `gdb`, which optimizes nothing and keeps all that gdb needs to
-//! show variables. QEMU waits before the first instruction. A script connects gdb to it and sets
-//! the breakpoints; then gdb replaces this process. So the terminal is gdb's alone: QEMU, which
-//! ends with it, does not get a ctrl-C that is meant for gdb.
-//! The guest's lines for people appear between gdb's. Budgets are off, since code without
-//! optimization takes many times its WCET.
+//! The image is built by the profile `gdb`, which optimizes nothing and keeps all data needed by
+//! gdb to show variables. QEMU waits before the first instruction. A script connects gdb to QEMU
+//! and sets the breakpoints; then gdb replaces this process. So the terminal belongs to gdb alone:
+//! QEMU, which ends together with gdb, never gets a ctrl-C meant for gdb. The guest's lines for
+//! people appear between gdb's lines. Budgets are off, since code without optimization takes many
+//! times its WCET.
 //!
-//! A *place* is a breakpoint: a function, by the last parts of its path, or `FILE:LINE`. gdb itself
-//! takes whole paths only, such as `drone::camera::detect`; so it is asked for the functions of the
-//! image. A place that is not in the image is refused before anything starts.
+//! A *place* is a breakpoint: a function, named by the last parts of its path, or `FILE:LINE`.
+//! Because gdb takes only whole paths, such as `drone::camera::detect`, the tool asks gdb for the
+//! functions of the image. A place missing from the image is refused before anything starts.
 
 use std::ffi::OsString;
 use std::fmt::Write;
@@ -34,10 +34,10 @@ use crate::qemu::{Mode, Qemu};
 use crate::run_options::name;
 use crate::system;
 
-/// The longest time from QEMU's start until gdb can reach it.
+/// The longest time from QEMU's start until gdb can reach QEMU.
 const START: Duration = Duration::from_secs(30);
 
-/// The table of `debug`. Options that `run` has, too, mean the same.
+/// The table of `debug`. Options shared with `run` have the same meaning there.
 static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
     invocation: "./scripts/debug",
     about: "Boots an app in QEMU with gdb at it, in an image that gdb shows whole.",
@@ -68,7 +68,7 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 ",
 });
 
-/// The options that `run` has not.
+/// The options missing from `run`.
 mod own {
     use crate::options::{OptionValue, options};
 
@@ -81,7 +81,7 @@ mod own {
     }
 }
 
-/// Returns an option of `run`, with another default if one is given.
+/// Returns an option of `run`, optionally with another default.
 fn of_run(name: OptionName, default: Option<&'static str>) -> Opt {
     let option = RUN.options.iter().find(|option| option.name == name);
     let option = option.expect("`run` has each of them");
@@ -97,14 +97,14 @@ pub fn debug(words: &[OsString]) -> ExitCode {
     DEBUG.carry_out(words, attempt)
 }
 
-/// Starts gdb in place of this process; returns only if something fails.
+/// Starts gdb in place of this process; returns only if a step fails.
 fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
     let commands = own.path(own::name::COMMANDS);
     if let Some(path) = commands {
         let place = files::shown_path(path);
-        // Read to see that it can be; gdb itself would only complain after the boot.
+        // Read now to see whether that works; gdb itself would complain only after the boot.
         files::read(path)
             .map_err(|why| Refusal::Usage(format!("`--commands {place}` {why}; name another")))?;
     }
@@ -135,14 +135,14 @@ fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
     let script = log.with_extension("gdb");
     let text = script_text(&socket, &places);
     files::write(&script, text)?;
-    // The guest waits for gdb, so nothing is lost between these two.
+    // The guest waits for gdb, so nothing is lost between these two calls.
     start(qemu, &image, &log, &socket)?;
     let error = gdb(&image, &script, commands).exec();
     Err(Refusal::Failure(format!("cannot start gdb: {error}")))
 }
 
-/// Returns a command line of `run` with the options that both commands have: those given, and those
-/// whose defaults differ.
+/// Returns a command line for `run` with the options shared by both commands: the given options,
+/// and options with other defaults here.
 fn as_run(own: &Arguments) -> Result<Arguments, Refusal> {
     let shared = DEBUG.options.iter().map(|option| option.name);
     let shared = shared.filter(|name| RUN.options.iter().any(|option| option.name == *name));
@@ -156,14 +156,14 @@ fn as_run(own: &Arguments) -> Result<Arguments, Refusal> {
     RUN.parse(&words.collect::<Vec<_>>())
 }
 
-/// Starts QEMU, which waits for gdb at the socket, and a filter that shows the guest's lines for
+/// Starts QEMU, waiting for gdb at the socket, and a filter that shows only the guest's lines for
 /// people.
 fn start(mut qemu: Qemu, image: &Path, log: &Path, socket: &Path) -> Result<(), String> {
     let mut device = OsString::from("unix:");
     device.push(socket);
     device.push(",server=on,wait=off");
     qemu.debugger = Some(device);
-    // A process of its own: this one becomes gdb and can filter no more.
+    // A separate process: this process becomes gdb and can no longer filter.
     let shown = process::Command::new("grep")
         .args(["--line-buffered", "-v", "^{"])
         .stdin(Stdio::piped())
@@ -187,10 +187,10 @@ fn start(mut qemu: Qemu, image: &Path, log: &Path, socket: &Path) -> Result<(), 
     let running = command.spawn();
     let mut running = running.map_err(|error| format!("cannot start QEMU: {error}"))?;
     let begun = Instant::now();
-    // gdb fails at once if the socket is missing, so we wait for it.
+    // Without the socket gdb would fail at once, so we wait for it.
     while !socket.exists() {
         if !matches!(running.try_wait(), Ok(None)) || begun.elapsed() > START {
-            // It may have ended by itself; then there is nothing to kill.
+            // QEMU may have ended by itself; then there is nothing to kill.
             let _ = running.kill();
             let said = fs::read_to_string(&complaints).unwrap_or_default();
             return Err(format!("QEMU did not start: {}", said.trim()));
@@ -200,7 +200,7 @@ fn start(mut qemu: Qemu, image: &Path, log: &Path, socket: &Path) -> Result<(), 
     Ok(())
 }
 
-/// The most functions that one place may match.
+/// The most functions that a single place may match.
 const MOST: usize = 8;
 
 /// Marks the start of gdb's answer to each place.
@@ -236,7 +236,8 @@ pub(super) fn resolve(image: &Path, app: &str, places: &str) -> Result<Vec<Strin
     let mut found = Vec::new();
     for (place, answer) in places.into_iter().zip(answers) {
         match is_line(place) {
-            // gdb names an address only for a line with code; it also answers for lines without.
+            // gdb also answers for lines without code, but names an address only for a line with
+            // code.
             true if answer.contains(" address ") => found.push(place.into()),
             true => {
                 return Err(format!(
@@ -263,7 +264,7 @@ fn last(path: &str) -> &str {
     path.rsplit("::").next().unwrap_or(path)
 }
 
-/// Reads the paths of functions from gdb's list. Generic ones are left out, as gdb does not find
+/// Reads the paths of functions from gdb's list. Skips generic functions, because gdb does not find
 /// them by name.
 fn functions(listed: &str) -> Vec<&str> {
     let lines = listed.lines().filter_map(|line| line.split_once("fn "));
@@ -277,7 +278,7 @@ fn functions(listed: &str) -> Vec<&str> {
     paths
 }
 
-/// Chooses the functions that a place matches; those of the app prevail.
+/// Chooses the functions matching a place; functions of the app take precedence.
 fn choose(
     place: &str,
     own: &str,
@@ -302,7 +303,7 @@ fn choose(
             "`--break`: the image has no function {shown}; a closure is found by `FILE:LINE`{hint}"
         ));
     }
-    // The processor has few hardware breakpoints, and so many stops are hardly meant.
+    // The processor has few hardware breakpoints, and hardly anybody wants so many stops.
     if meant.len() > MOST {
         return Err(format!(
             "`--break`: {} functions are called {shown}; give more of the path, such as `{}`",
@@ -313,9 +314,9 @@ fn choose(
     Ok(meant.into_iter().map(String::from).collect())
 }
 
-/// Returns the script that connects gdb to the guest, sets the breakpoints and continues.
+/// Returns the script for gdb: it connects to the guest, sets the breakpoints and continues.
 ///
-/// The breakpoints are hardware ones: they work before the code has been loaded.
+/// The script sets hardware breakpoints, because they work before the code has been loaded.
 pub(super) fn script_text(socket: &Path, places: &[String]) -> String {
     let mut text = String::from("set pagination off\nset confirm off\nset width 0\n");
     if let Some(printers) = printers() {
@@ -328,7 +329,7 @@ pub(super) fn script_text(socket: &Path, places: &[String]) -> String {
     text + "continue\n"
 }
 
-/// Returns the path of the Rust toolchain's script that makes gdb show vectors and strings.
+/// Returns the path of the Rust toolchain's script for showing vectors and strings in gdb.
 fn printers() -> Option<String> {
     let mut rustc = process::Command::new("rustc");
     rustc.current_dir(system::workspace());
@@ -338,7 +339,7 @@ fn printers() -> Option<String> {
     file.is_file().then(|| file.display().to_string())
 }
 
-/// Returns the command that starts gdb with its script and, in place of a person, with a file of
+/// Returns the command for starting gdb with its script and, in place of a person, with a file of
 /// commands.
 pub(super) fn gdb(image: &Path, script: &Path, commands: Option<&Path>) -> process::Command {
     let mut gdb = process::Command::new("gdb");

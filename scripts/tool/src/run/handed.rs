@@ -1,14 +1,14 @@
-//! The boot module handed to the guest. It is the DAGs of a file behind `--wcets`, or else
-//! `--wcets`, `--replay`, `--module` and `--input`, in this order.
+//! Builds the boot module handed to the guest. The module consists of the DAGs of a file behind
+//! `--wcets`, or else of `--wcets`, `--replay`, `--module` and `--input`, in this order.
 //!
-//! The guest alone knows the types and ranges of the parameters that `--params FILE` and `--set
-//! NAME=VALUE,...` give it; here they are only checked to fit into one word. `--set` comes after
-//! the file, and so prevails.
+//! The parameters given by `--params FILE` and `--set NAME=VALUE,...` become a word for the guest.
+//! Only the guest knows their types and ranges; here they are only checked to fit into the word.
+//! `--set` comes after the file, and so prevails.
 //!
-//! `--input` and `--output` belong to the guest's second serial port, which is an app's wire. A
-//! file of bytes with their times goes to the guest with the boot module, so that runs repeat; it may
-//! have several wires.
-//! Standard input goes to the port as it comes. The guest's output there goes to a file.
+//! `--input` and `--output` belong to the guest's second serial port, an app's wire. A file of
+//! bytes with their times, possibly for several wires, goes to the guest with the boot module, to
+//! make runs repeatable. Standard input goes to the port as it comes. The guest's output from the
+//! port goes to a file.
 
 use std::path::{Path, PathBuf};
 
@@ -27,15 +27,15 @@ use crate::wire_script;
 
 /// Files on their way to the guest.
 pub(super) struct HandedFiles {
-    /// The guest's words with the parameters and the length of each part of the module, each after
-    /// a blank.
+    /// The guest's words: the parameters, and the length of each part of the module; each word
+    /// follows a blank.
     pub(super) words: String,
-    /// The file of the module, if it has any content; removed when this value is dropped.
+    /// The file of the module, if the module has any content; removed when this value is dropped.
     module: TemporaryFile,
 }
 
 impl HandedFiles {
-    /// Reads the files that the options name, and writes the module.
+    /// Reads the files named by the options, and writes the module.
     pub(super) fn read(
         options: &Arguments,
         dags: Option<&PreparedFile>,
@@ -72,7 +72,7 @@ impl HandedFiles {
             ("replay", &replayed),
             ("input", &input),
         ] {
-            // `--module` needs no length: it is the part without one.
+            // `--module` is the only part without a length, as it takes the rest.
             if !part.is_empty() {
                 words += &format!(" {name}={}", part.len());
             }
@@ -80,13 +80,13 @@ impl HandedFiles {
         Ok(HandedFiles { words, module })
     }
 
-    /// Returns the module that was written.
+    /// Returns the path of the written module.
     pub(super) fn module(&self) -> Option<PathBuf> {
         self.module.0.clone()
     }
 }
 
-/// Returns the bytes of the recording for the module; none if no replay is asked for, or on Linux,
+/// Returns the bytes of the recording for the module. Returns none without a replay, or on Linux,
 /// where the program reads the file itself.
 fn read_replayed(options: &Arguments) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path(name::REPLAY) else {
@@ -95,14 +95,14 @@ fn read_replayed(options: &Arguments) -> Result<Vec<u8>, Refusal> {
     let refused = |why| Refusal::Usage(format!("`--replay` {why}"));
     let bytes = recordings::read(path).map_err(refused)?;
     recordings::parse(path, &bytes).map_err(refused)?;
-    // Parsed above all the same, so that a damaged file is refused before the build.
+    // Parsed above all the same, to refuse a damaged file before the build.
     match options.is_given(name::ON) {
         true => Ok(Vec::new()),
         false => Ok(bytes),
     }
 }
 
-/// Returns the word for the guest's parameters after a blank, if some are given.
+/// Returns the word for the guest's parameters after a blank; empty without parameters.
 fn parameters(options: &Arguments) -> Result<String, Refusal> {
     let mut parts = Vec::new();
     if let Some(path) = options.path(name::PARAMS) {
@@ -139,7 +139,7 @@ fn of_file(text: &str) -> Result<Vec<String>, String> {
     .collect()
 }
 
-/// Returns `NAME=VALUE` with the blanks around name and value removed; `None` if it is malformed.
+/// Returns `NAME=VALUE` without blanks around name and value; `None` if the text is malformed.
 fn pair(text: &str) -> Option<String> {
     let (name, value) = text.split_once('=')?;
     let parts = [name.trim(), value.trim()];
@@ -149,7 +149,7 @@ fn pair(text: &str) -> Option<String> {
     is_pair.then(|| parts.join("="))
 }
 
-/// The name that stands for standard input.
+/// The name for standard input.
 const STREAM: &str = "-";
 
 /// Reports whether standard input goes to the port.
@@ -157,7 +157,7 @@ pub(super) fn is_live(options: &Arguments) -> bool {
     options.path(name::INPUT) == Some(Path::new(STREAM))
 }
 
-/// Returns the file that `--input` names, if it names one.
+/// Returns the file named by `--input`, unless the name means standard input.
 pub(super) fn input(options: &Arguments) -> Vec<NamedFile<'_>> {
     match is_live(options) {
         true => Vec::new(),
@@ -165,7 +165,7 @@ pub(super) fn input(options: &Arguments) -> Vec<NamedFile<'_>> {
     }
 }
 
-/// Makes sure that `--input` and `--output` go with the other options.
+/// Makes sure that `--input` and `--output` are compatible with the other options.
 pub(super) fn check(options: &Arguments) -> Result<(), Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     if is_live(options) && options.is_given(name::CONSOLE) {
@@ -184,7 +184,7 @@ pub(super) fn check(options: &Arguments) -> Result<(), Refusal> {
     wire.map_err(Refusal::Usage)
 }
 
-/// Returns the script for the guest from the file that `--input` names; empty if it names none.
+/// Returns the script for the guest from the file named by `--input`; empty without a file.
 fn script(options: &Arguments) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path(name::INPUT).filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
@@ -225,7 +225,7 @@ pub(super) fn second(options: &Arguments) -> Option<SecondPort> {
 /// Returns the network, if `--net` is given.
 pub(super) fn network(options: &Arguments) -> Option<Network> {
     let words = options.text(name::NET)?.into();
-    // Without the program by which a firmware would boot from the network.
+    // Without the option ROM with which a firmware would boot from the network.
     let card = match options.text(name::CARD) {
         Some("e1000e") => "e1000e,romfile=",
         _ => "virtio-net-pci,romfile=",
@@ -238,7 +238,7 @@ pub(super) fn network(options: &Arguments) -> Option<Network> {
     })
 }
 
-/// Returns a warning if `--output` is given but the app has no wire, so that nothing was sent.
+/// Returns a warning if `--output` is given but the app has no wire and so has sent nothing.
 pub(super) fn warning(options: &Arguments, outcome: &Outcome) -> Option<String> {
     let file = options.path(name::OUTPUT).map(files::shown_path)?;
     let has_wire = outcome.transcript.of_kind("wire").next().is_some();

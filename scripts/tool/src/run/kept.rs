@@ -1,13 +1,13 @@
-//! The files that stay of a boot: its record, views of that, and its serial log.
+//! Keeps the files of a boot: its record, views of the record, and its serial log.
 //!
-//! The record arrives while the guest runs and is completed with the guest's machine lines. It is
-//! written to the files that the options name.
+//! The record arrives while the guest runs. At the end, the guest's machine lines complete the
+//! record, and the tool writes it to the files named by the options.
 //!
-//! Even without such an option a guest sends the inputs of its last jobs before a fault; they are
+//! Even without such an option a guest sends the inputs of its last jobs before a fault. They are
 //! written to a file next to the log.
 //!
-//! A log that the person names stays. If the guest refuses its command line, nothing has run, and
-//! the file gets its previous content back.
+//! A log named by the person stays. If the guest refuses its command line, nothing has run, and the
+//! file gets its previous content back.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,28 +28,28 @@ use crate::system;
 use views::protocol::Status;
 use views::record::Record;
 
-/// The kinds of lines that are left out of the record: those about progress, and those that carry
-/// the record itself.
+/// The kinds of lines left out of the record: lines about progress, and lines carrying the record
+/// itself.
 const PASSING: [&str; 3] = ["progress", "record", "status"];
 
-/// The options that name a file for the record.
+/// The options naming a file for the record.
 const FILES: [OptionName; 2] = [name::KEEP, name::TRACE];
 
-/// The buffer in KiB for values that wait for the background to send them.
+/// The guest's buffer in KiB for values still waiting for the background to send them.
 const ROOM_KIB: &str = "1024";
 
-/// The files that a boot keeps.
+/// The files kept of a boot.
 pub(super) struct KeptFiles {
-    /// The file that takes the bytes as they arrive.
+    /// The file for the bytes as they arrive.
     raw: TemporaryFile,
     app: String,
-    /// The guest's word for the wanted kind of record; `None`: none is wanted.
+    /// The guest's word for the wanted kind of record; `None` if no record is wanted.
     word: Option<&'static str>,
     /// The server of the page, if one is wanted.
     server: Option<&'static PageServer>,
 }
 
-/// Returns the guest's word for the kind of record that the options want.
+/// Returns the guest's word for the kind of record wanted by the options.
 pub(super) fn word(options: &Arguments) -> Option<&'static str> {
     // A full record has the events, too, so it prevails over the views.
     match options.given_of(&[name::KEEP, name::PAGE]) {
@@ -75,15 +75,16 @@ impl KeptFiles {
         })
     }
 
-    /// Returns the file for the bytes that the guest sends.
+    /// Returns the file for the bytes sent by the guest.
     pub(super) fn raw(&self) -> Option<PathBuf> {
         self.raw.0.clone()
     }
 
-    /// Says where the record can be read while the run goes on.
+    /// Says where to read the record while the run goes on.
     pub(super) fn introduce(&self, screen: &LineOutputs) {
         if let Some(server) = &self.server {
-            // Not by the screen, for which `--quiet` holds: without the address it is of no use.
+            // Not by the screen, which `--quiet` silences: without the address the page is of no
+            // use.
             eprintln!("page: http://127.0.0.1:{}/", server.port);
         } else if let (Some(_), Some(raw)) = (self.word, &self.raw.0) {
             let (show, raw) = (system::script("recording"), files::shown_path(raw));
@@ -93,12 +94,12 @@ impl KeptFiles {
         }
     }
 
-    /// Returns the guest's word and the file, for a Linux program that writes the file itself.
+    /// Returns the guest's word and the file, for Linux programs, which write the file themselves.
     pub(super) fn word_with_file(&self) -> Option<(&'static str, PathBuf)> {
         self.word.zip(self.raw())
     }
 
-    /// Returns the guest's word after a blank, with the size of its buffer; empty if there is none.
+    /// Returns the guest's word after a blank, with the size of its buffer; empty without a word.
     pub(super) fn guest_word(&self) -> String {
         match self.word {
             Some("events") => " events=on".into(),
@@ -107,7 +108,7 @@ impl KeptFiles {
         }
     }
 
-    /// Reads the bytes that the guest has sent into `outcome`, from the file or else from the log.
+    /// Reads the bytes sent by the guest into `outcome`, from the file or else from the log.
     pub(super) fn receive(&self, outcome: &mut Outcome) -> Result<(), String> {
         // A boot that failed before the guest started leaves no file.
         let sent = self.raw.0.as_deref().map(recordings::received);
@@ -119,7 +120,7 @@ impl KeptFiles {
         Ok(())
     }
 
-    /// Writes the record to the files that the options name. Returns lines that announce them.
+    /// Writes the record to the files named by the options. Returns lines announcing the files.
     pub(super) fn write(
         &self,
         options: &Arguments,
@@ -129,7 +130,7 @@ impl KeptFiles {
         if outcome.ending == QemuEnd::Guest(Status::Usage) {
             return Ok(Vec::new());
         }
-        // Bytes without being asked for are those of a crash.
+        // Bytes nobody asked for come from a crash.
         if self.word.is_none() {
             return self.write_crash(&outcome.sent);
         }
@@ -183,7 +184,7 @@ impl KeptFiles {
         Ok(announced)
     }
 
-    /// Says which part of the run the record has.
+    /// Says which part of the run is in the record.
     fn part(&self, bytes: &[u8]) -> String {
         let what = match self.word {
             _ if Recording::read(bytes).is_ok_and(|of| of.is_cut()) => "a part of the run",
@@ -198,11 +199,11 @@ impl KeptFiles {
         }
     }
 
-    /// Returns the record with a header and with the guest's machine lines.
+    /// Returns the record with a header, completed by the guest's machine lines.
     fn completed(&self, outcome: &Outcome) -> Vec<u8> {
         let sent = match Recording::read(&outcome.sent) {
             Ok(_) => outcome.sent.clone(),
-            // The guest died while it sent: the whole chunks before the break are kept.
+            // The guest died while sending: the whole chunks before the break are kept.
             Err(_) => recording::mended(&outcome.sent).unwrap_or_default(),
         };
         let recording = Recording::read(&sent).ok();
@@ -232,7 +233,7 @@ impl KeptFiles {
         let lines: String = lasting.map(|line| line.text.clone() + "\n").collect();
         record.text(&lines);
         let is_whole = outcome.transcript.verdict().is_ok();
-        // A reader must be able to tell a run that ended from one that was cut off.
+        // A reader must be able to distinguish a finished run from a truncated run.
         match is_whole && !recording.is_some_and(|recording| recording.is_cut()) {
             true => record.end(),
             false => record.cut(),
@@ -259,8 +260,8 @@ impl KeptFiles {
         )])
     }
 
-    /// Returns cargo's argument for the package with the app's own replay program; `None` if there
-    /// is none.
+    /// Returns cargo's argument for the package with the app's own replay program; `None` without
+    /// such a program.
     fn replay_package(&self) -> Option<String> {
         const EXAMPLE: &str = "examples/replay.rs";
         let app = &self.app;
@@ -270,7 +271,7 @@ impl KeptFiles {
     }
 }
 
-/// Names the DAGs of a record that a replay computes anew, if there are such.
+/// Names the DAGs of a record that a replay must compute anew, if there are any.
 fn but_for(bytes: &[u8]) -> String {
     let Ok(recording) = Recording::read(bytes) else {
         return String::new();
@@ -296,8 +297,8 @@ fn but_for(bytes: &[u8]) -> String {
     }
 }
 
-/// Writes the files that the options want of a run, and announces them. Of a run that failed only
-/// the record is written, and views of the commit if a bound was exceeded.
+/// Writes and announces the files wanted of a run. A failed run leaves only the record, without a
+/// warning about an unused wire.
 pub(super) fn write(
     options: &Arguments,
     kept: &KeptFiles,
@@ -332,13 +333,13 @@ pub(super) fn write(
 /// The serial log of a run.
 pub(super) struct SerialLog {
     pub(super) path: PathBuf,
-    /// Whether the person has named it.
+    /// Whether the person has named the log.
     stays: bool,
     /// The content of the file before the run.
     before: Option<Vec<u8>>,
 }
 
-/// Makes sure that the named log can be read back while it is written.
+/// Makes sure that the named log can be read back while the guest writes it.
 pub(super) fn check(options: &Arguments) -> Result<(), String> {
     let is_other = |path: &&Path| fs::metadata(path).is_ok_and(|data| !data.is_file());
     options
@@ -366,10 +367,10 @@ impl SerialLog {
         })
     }
 
-    /// Removes it, unless the person has named it.
+    /// Removes the log, unless the person has named it.
     pub(super) fn discard(&self) {
         if !self.stays {
-            // The log is ours; one that cannot be removed harms nothing.
+            // The log is ours; a leftover log harms nothing.
             let _ = fs::remove_file(&self.path);
         }
     }

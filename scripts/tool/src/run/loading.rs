@@ -1,4 +1,4 @@
-//! The loader that the options choose, with the board, the memory and the QEMU it needs.
+//! Chooses the loader by the options, and the board, the memory and the QEMU needed for it.
 
 use std::path::PathBuf;
 
@@ -10,13 +10,13 @@ use crate::qemu::{Loader, Machine, Mode, PROGRAM};
 use crate::run_options::name;
 use crate::system;
 
-/// Returns the loader that the options choose.
+/// Returns the loader chosen by the options.
 pub(super) fn chosen(options: &Arguments) -> Loader {
     let named = options.text(name::BOOT).and_then(Loader::from_name);
     named.unwrap_or(Loader::Pvh)
 }
 
-/// Returns what needs a PC, if the options ask for such a thing.
+/// Returns the first option that needs a PC, after the feature missing from a microvm.
 fn needs_pc(options: &Arguments) -> Option<(&'static str, &'static str)> {
     let stick = ("no firmware that boots from a stick", "boot");
     let boots = chosen(options).needs_stick().then_some(stick);
@@ -27,7 +27,7 @@ fn needs_pc(options: &Arguments) -> Option<(&'static str, &'static str)> {
         .or(options.is_given(name::NET).then_some(network))
 }
 
-/// Returns the board that the options choose, or what they need.
+/// Returns the board chosen or needed by the options.
 pub(super) fn machine(options: &Arguments) -> Machine {
     if needs_pc(options).is_some() {
         return Machine::Q35;
@@ -36,15 +36,15 @@ pub(super) fn machine(options: &Arguments) -> Machine {
     named.unwrap_or(Machine::Microvm)
 }
 
-/// Makes sure that the loader goes with the other options.
+/// Makes sure that the loader is compatible with the other options.
 ///
 /// # Errors
 ///
-/// In words: it does not.
+/// In words: the options contradict each other.
 pub(super) fn check(options: &Arguments, mode: Option<Mode>) -> Result<(), String> {
     let loader = chosen(options);
     let microvm = Machine::Microvm.name();
-    // Only a board that the person has named: the default gives way.
+    // Only a board named by the person is refused: the default gives way.
     if let Some((lacks, option)) = needs_pc(options)
         && options.is_given(name::MACHINE)
         && options.text(name::MACHINE) == Some(microvm)
@@ -69,8 +69,8 @@ pub(super) fn check(options: &Arguments, mode: Option<Mode>) -> Result<(), Strin
     Ok(())
 }
 
-/// Chooses the memory in MiB: the person's choice or the usual amount, in both cases enough for the
-/// stacks and tables of that many processors.
+/// Chooses the memory in MiB: the person's choice or the usual amount. Both must suffice for the
+/// stacks and tables of all processors.
 pub(super) fn choose_memory(
     options: &Arguments,
     dags: Option<&PreparedFile>,
@@ -79,15 +79,14 @@ pub(super) fn choose_memory(
     let loader = chosen(options);
     let bytes = |name| {
         let data = options.path(name).and_then(|path| path.metadata().ok());
-        // A file that is not there counts as empty; it is refused when it is read.
+        // A missing file counts as empty; its read is refused later.
         data.map_or(0, |data| data.len())
     };
-    // A replay also builds a table of its values in memory; twice the file's size is set aside for
-    // it.
+    // A replay also builds a table of its values in memory, in twice the file's size.
     let module_mib = (bytes(name::MODULE) + 3 * bytes(name::REPLAY)).div_ceil(1 << 20);
     // Each processor has stacks and tables; a quarter of the memory is for them, the rest is heap.
     let mut least = loader.least_memory_mib().max(8 + cores) + module_mib;
-    // The DAG file's estimate is for the usual amount; a person may know that less will do.
+    // The DAG file's estimate is a usual amount; a person may know that less is enough.
     if let Some(dags) = dags.filter(|_| !options.is_given(name::MEMORY)) {
         least = least.max(dags.memory_mib);
     }
@@ -105,11 +104,11 @@ pub(super) fn choose_memory(
              {least} MiB; give more, or fewer cores"
         )));
     }
-    // The default is below the need: it grows silently, since the person chose nothing.
+    // The default is below the need and grows silently, since the person chose nothing.
     Ok(least)
 }
 
-/// Finds the QEMU to use; installs one if none is named and none is there.
+/// Finds the QEMU to use. Installs QEMU if the person named none and none is there.
 pub(super) fn choose_program(options: &Arguments) -> Result<PathBuf, Refusal> {
     if let Some(named) = options.path(name::QEMU) {
         return system::find_program(named).ok_or_else(|| {

@@ -1,8 +1,9 @@
-//! `run --on host` with many sets: those of a file, or of all files of a folder, in one CSV.
+//! Runs many sets with `run --on host`: all sets of a file, or of all files of a folder, into a
+//! single CSV table.
 //!
-//! A program for each processor of this computer runs its share of the next sets, and their rows
-//! are printed before the others are run. The table has a row for each DAG, under the set and its
-//! file; a set that is refused has one row with the reason, and so has a file that cannot be read,
+//! For each processor of this computer, a program runs its share of the next sets. Their rows are
+//! printed before the following sets are run. The table has a row for each DAG, with the names of
+//! its set and file. A refused set has a single row with the reason, and so has an unreadable file,
 //! or a set that ended the program.
 
 use std::ffi::OsString;
@@ -24,23 +25,23 @@ use crate::progress::Progress;
 use crate::system;
 use views::protocol::MachineLine;
 
-/// The columns: the members of a line `dag_run` under the same names, but for those of the file.
+/// The columns. Apart from those about the file, the names are members of a `dag_run` line.
 const COLUMNS: &str = "file,set,verdict,dag,subtasks,period_ns,relative_deadline_ns,bound_ns,test,\
     not_proven,released,completed,deadline_misses,response_time_ns.min,response_time_ns.median,\
     response_time_ns.p99,response_time_ns.max,tightness_permille,violations,reason";
 
-/// A set that is run, or the reasons why a file is not.
+/// A set to run, or the reasons for refusing a file.
 type Part<'f> = (&'f Path, Result<Set, String>);
 
 /// The rows of a part.
 struct PartRows {
     verdict: &'static str,
-    /// Whether each of the DAGs has a bound.
+    /// Whether all of the DAGs have bounds.
     is_proven: bool,
     rows: String,
 }
 
-/// So many parts are run by one program at most.
+/// The most parts run by a single program.
 const SHARE: usize = 16;
 
 /// Runs all sets of the files, and prints the table.
@@ -94,7 +95,7 @@ fn read<'f>(
         progress.show(number);
         match prepare(&options.with(name::DAG, file)) {
             Ok(Some(dags)) => {
-                // They follow from the options alone, so those of any file are those of all.
+                // Length and words follow from the options alone, so they are equal for all files.
                 length = dags.length;
                 told = words(options, Some(&dags), on_linux::own_words(options));
                 parts.extend(dags.file.sets.into_iter().map(|set| (&**file, Ok(set))));
@@ -109,8 +110,8 @@ fn read<'f>(
     Ok((parts, told, length))
 }
 
-/// Runs parts by a program. Where the program dies at a set, another goes on behind the set. A set
-/// may take `seconds`.
+/// Runs parts by a program. Where the program dies at a set, another program goes on behind the
+/// set. A set may take up to `seconds`.
 fn run_share(
     program: &Path,
     (words, options, length): (&[String], &Arguments, Length),
@@ -166,7 +167,7 @@ fn run_share(
     Ok(rows.collect())
 }
 
-/// Returns the rows of a set by its machine lines, or by the program's death at it.
+/// Returns the rows of a set, made from its machine lines, or from the program's death at the set.
 fn of_set(path: &Path, set: &Set, (lines, died): &(Vec<MachineLine>, String)) -> PartRows {
     let of_kind = |kind| lines.iter().filter(move |line| line.kind == kind);
     let end = of_kind("verdict").next();
@@ -201,7 +202,7 @@ fn of_set(path: &Path, set: &Set, (lines, died): &(Vec<MachineLine>, String)) ->
     }
 }
 
-/// Returns a row, by the names of the columns.
+/// Returns a row, filled in by the names of the columns.
 fn row(
     path: &Path,
     set: &str,
@@ -233,7 +234,7 @@ fn number(number: Option<u64>) -> String {
     number.map_or(String::new(), |number| number.to_string())
 }
 
-/// Quotes a cell if a reader of CSV needs that.
+/// Quotes a cell if a CSV reader needs the quotes.
 fn quoted(cell: String) -> String {
     match cell.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),

@@ -1,12 +1,12 @@
-//! The subcommand `run`: from a command line to a judged run of an app.
+//! Runs an app, from the command line to the judgement: the subcommand `run`.
 //!
-//! The order matters: first everything that can be refused is checked, then
-//! QEMU is found or installed, the image is built, the mode is chosen by a probe with it, the guest
-//! is booted, and its output is shown while it runs. A command line that is refused before the
-//! build leaves nothing behind.
+//! The order of the steps matters. First the tool checks everything it can refuse. Then it finds or
+//! installs QEMU, builds the image, probes KVM with the image to choose the mode, boots the guest,
+//! and shows the output while the guest runs. A command line refused before the build leaves
+//! nothing behind.
 //!
-//! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or
-//! the guest's), 130 a run that a person has ended.
+//! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or the guest's), 130 a
+//! run ended by a person.
 
 mod boot;
 mod certificate;
@@ -47,7 +47,7 @@ pub use crate::run_options::RUN;
 pub use boot::boot;
 pub use debug::debug;
 
-/// Options that exclude each other in one run that is not observed.
+/// Pairs of options that exclude each other in a single run without `--prove`.
 const APART: [(OptionName, OptionName, &str); 4] = [
     (
         name::DAG,
@@ -104,12 +104,12 @@ fn attempt(options: &Arguments) -> Result<ExitCode, Refusal> {
     Ok(conclude(&booted, dags.as_ref(), options))
 }
 
-/// Reads the file that `--dag` names, if there is one.
+/// Reads the file named by `--dag`, if there is such a file.
 fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Refusal> {
     dag_file::prepare(options).map_err(|lines| Refusal::Usage(lines.join("\n")))
 }
 
-/// Gives the sets of a file certificates, and tells so.
+/// Gives certificates to the sets of a file, and reports them.
 fn certified(options: &Arguments, mut dags: PreparedFile) -> PreparedFile {
     let words = words(options, Some(&dags), on_linux::own_words(options));
     for set in &mut dags.file.sets {
@@ -123,7 +123,7 @@ fn certified(options: &Arguments, mut dags: PreparedFile) -> PreparedFile {
     dags
 }
 
-/// Makes sure of all files that the options name, before any is opened.
+/// Checks all files named by the options, before opening any of them.
 fn check_files(options: &Arguments) -> Result<(), Refusal> {
     handed::check(options)?;
     let names = [
@@ -143,14 +143,14 @@ fn check_files(options: &Arguments) -> Result<(), Refusal> {
     kept::check(options).map_err(Refusal::Usage)
 }
 
-/// A run that has ended in any way.
+/// A finished run, whatever its ending.
 struct EndedRun {
     outcome: Outcome,
     log: SerialLog,
     screen: LineOutputs,
 }
 
-/// Boots the app that the options name; `shows` says whether its lines are shown.
+/// Boots the app named by the options; `shows` says whether its lines are shown.
 fn boot_app(
     options: &Arguments,
     dags: Option<&PreparedFile>,
@@ -177,7 +177,7 @@ fn boot_app(
         qemu.module = handed.module();
         qemu
     };
-    // The words of the longest mode name are checked, as the mode is chosen only after the build.
+    // The mode is chosen only after the build, so the words of the longest mode name are checked.
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
     if longest.loader.needs_stick() {
@@ -203,7 +203,8 @@ fn boot_app(
     let show = |line: &str| {
         // A firmware draws its menus on the serial port with escape sequences; they are not shown.
         if shows && !(qemu.loader.needs_stick() && line.contains('\x1b')) {
-            // The guest's messages about a DAG file give lines of the form written for the guest.
+            // The guest's messages about a DAG file give line numbers of the form written for the
+            // guest.
             let translated = dags.and_then(|dags| dags.translate(line));
             screen.show(translated.as_deref().unwrap_or(line));
         }
@@ -214,8 +215,8 @@ fn boot_app(
     kept::write(options, &kept, outcome?, log, screen)
 }
 
-/// Returns the app to run: the one that the options name (a given image must be of it), or else the
-/// one that the image names.
+/// Returns the app to run: the app named by the options, which a given image must match, or else
+/// the app named by the image.
 fn choose_app(options: &Arguments, is_dag_file: bool) -> Result<String, Refusal> {
     let app = match is_dag_file {
         true => "dag-file",
@@ -258,7 +259,8 @@ fn describe(
     dags: Option<&PreparedFile>,
 ) -> Qemu {
     let words = words(options, dags, screen::guest_words(options)).join(" ");
-    // Emulated cores take much longer than their instructions say, and no budget is for that.
+    // Emulated cores take much longer than their instructions suggest, and budgets do not allow for
+    // that.
     let budgets = match mode {
         Mode::Threads if options.is_given(name::CONSOLE) && !words.contains("budget_factor=") => {
             " budget_factor=0"
@@ -283,8 +285,8 @@ fn describe(
     }
 }
 
-/// Returns the guest's words: those of the options, then those of the platform, and last the
-/// person's own.
+/// Returns the guest's words: first the options' words, then the platform's, and last the person's
+/// own.
 fn words(options: &Arguments, dags: Option<&PreparedFile>, own: Vec<String>) -> Vec<String> {
     let mut words = Vec::new();
     for name in GUEST_WORDS.iter().copied() {
@@ -298,8 +300,8 @@ fn words(options: &Arguments, dags: Option<&PreparedFile>, own: Vec<String>) -> 
     words
 }
 
-/// Returns the time limit: the person's, or two minutes and a second for each job, which is
-/// generous also where a job takes its real time. A DAG file states its own.
+/// Returns the time limit: the person's, or two minutes and a second for each job. The default is
+/// generous even where a job takes its real time. A DAG file states its own limit.
 fn limit(options: &Arguments, dags: Option<&PreparedFile>) -> Duration {
     let jobs = options.number(name::JOBS).unwrap_or(200);
     let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
@@ -312,7 +314,7 @@ fn limit(options: &Arguments, dags: Option<&PreparedFile>) -> Duration {
     Duration::from_secs(seconds)
 }
 
-/// Reports whether somebody sends while the guest runs.
+/// Reports whether somebody sends input while the guest runs.
 fn is_live(options: &Arguments) -> bool {
     options.is_given(name::CONSOLE) || handed::is_live(options)
 }
@@ -352,11 +354,12 @@ fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments)
         };
         let seconds = outcome.elapsed.as_secs_f64();
         screen.say(&format!("\n{how} after {seconds:.1} s"));
-        // A good run needs no log; `discard` keeps one that the person has named.
+        // A good run needs no log; `discard` spares a log named by the person.
         log.discard();
         return code;
     };
-    // A fault in the WCET file is reported with its name and line instead of the guest's words.
+    // A fault in the WCET file is reported with the file's name and line instead of the guest's
+    // words.
     if several::refused(options, &fault.reason) {
         log.restore();
         return ExitCode::from(2);
@@ -381,7 +384,7 @@ fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments)
         return RUN.report(Refusal::Usage(lines + remedy));
     }
     match outcome.transcript.verdict() {
-        // The screen has shown the guest's own reason already.
+        // The screen has already shown the guest's own reason.
         Ok(_) => eprintln!("the serial log is {}", outcome.log.display()),
         // Without a verdict the last lines are the only hint at the cause.
         Err(_) => eprint!("{}", outcome.tail()),
@@ -399,14 +402,14 @@ fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments)
     };
     let line = format!("failed: {}{remedy}", fault.reason);
     let code = RUN.report(Refusal::Failure(line));
-    // Ctrl-C has the last word: the fault of a run that was cut short is not the app's.
+    // Ctrl-C has the last word: the fault of an interrupted run is not the app's.
     if by_person {
         return ExitCode::from(BY_PERSON);
     }
     code
 }
 
-/// Returns an error that stops a series of runs if a person has ended this one.
+/// Returns an error to stop a series of runs if a person has ended this run.
 fn go_on(booted: &EndedRun) -> Result<(), Refusal> {
     match booted.outcome.asked {
         Some(EndReason::ByPerson) => Err(Refusal::ByPerson),
@@ -414,7 +417,7 @@ fn go_on(booted: &EndedRun) -> Result<(), Refusal> {
     }
 }
 
-/// Names the subtasks that the guest reported as never giving up their cores.
+/// Names the subtasks reported by the guest as never giving up their cores.
 fn stalled(transcript: &Transcript) -> String {
     let named = transcript.of_kind("stalled").filter_map(|line| {
         let (subtask, dag) = (line.text_at("subtask_name")?, line.text_at("dag_name")?);

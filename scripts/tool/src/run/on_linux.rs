@@ -1,6 +1,6 @@
-//! `run --on linux`: the app as a program of this computer, built, started, shown and judged like a
-//! guest. With `--on debian` it runs on Debian's Linux in QEMU, and with `--on host` the app of DAG
-//! files runs in virtual time.
+//! Runs an app as a program of this computer, with the build, output and judgement of a guest:
+//! `run --on linux`. With `--on debian` the program runs on Debian's Linux in QEMU. With
+//! `--on host` the app for DAG files runs in virtual time.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -20,7 +20,7 @@ use crate::program;
 use crate::qemu::{self, Mode, QemuEnd};
 use crate::run_options::name;
 
-/// Options that concern QEMU, its guest, or the bare-metal kernel alone.
+/// Options about QEMU, its guest, or the bare-metal kernel only.
 const FOREIGN: [OptionName; 10] = [
     name::BOOT,
     name::DEVICE,
@@ -45,7 +45,7 @@ const NOT_IN_GUEST: [OptionName; 6] = [
 ];
 const ONLY_IN_GUEST: [OptionName; 2] = [name::MODE, name::BUSY];
 
-/// Options that virtual time has no use for, besides those of the bare machine.
+/// Options without use in virtual time, besides those of the bare machine.
 const NOT_ON_HOST: [OptionName; 11] = [
     name::BUSY,
     name::CONSOLE,
@@ -60,10 +60,10 @@ const NOT_ON_HOST: [OptionName; 11] = [
     name::REPLAY,
 ];
 
-/// The additional time that a guest may take, in which Linux starts.
+/// The additional time for a guest, in which Linux starts.
 const START: Duration = Duration::from_secs(120);
 
-/// Reports whether the options ask for Linux, or for a program of this computer at least.
+/// Reports whether the options ask for Linux, or at least for a program of this computer.
 pub(super) fn is_asked_for(options: &Arguments) -> bool {
     options.text(name::ON) != Some("machine")
 }
@@ -73,12 +73,12 @@ pub(super) fn is_on_host(options: &Arguments) -> bool {
     options.text(name::ON) == Some("host")
 }
 
-/// Reports whether that Linux runs as a guest, in QEMU.
+/// Reports whether Linux runs as a guest in QEMU.
 fn is_in_guest(options: &Arguments) -> bool {
     options.text(name::ON) == Some("debian")
 }
 
-/// Refuses options that Linux does not have, and settles the number of cores.
+/// Refuses options unavailable on Linux, and settles the number of cores.
 pub(super) fn settle(options: &Arguments) -> Result<Arguments, Refusal> {
     if !is_asked_for(options) {
         // The reverse case: options of Linux on the bare machine.
@@ -107,7 +107,7 @@ pub(super) fn settle(options: &Arguments) -> Result<Arguments, Refusal> {
             `--on linux` give `--input -`";
         return Err(Refusal::Usage(line.into()));
     }
-    // An explicit number stands, even above that of this computer.
+    // An explicit number of cores holds, even if this computer has fewer.
     if options.is_given(name::CORES) {
         return Ok(options.clone());
     }
@@ -128,15 +128,15 @@ fn settle_host(options: &Arguments) -> Result<Arguments, String> {
     if !options.is_given(name::DAG) {
         return Err("`--on host` runs DAGs of a file; name one by `--dag FILE`".into());
     }
-    // As on the machine, whatever this computer has.
+    // As on the machine, however many cores this computer has.
     let cores = options.number(name::CORES).unwrap_or(1);
     Ok(options.with(name::CORES, cores.to_string()))
 }
 
-/// The number of processors of a guest if `--cores` is not given.
+/// The number of a guest's processors without `--cores`.
 const GUEST_CORES: &str = "4";
 
-/// Builds the app's program and runs it as the options say.
+/// Builds the app's program and runs it as ordered by the options.
 #[allow(clippy::too_many_lines, reason = "the steps of a run, in order")]
 pub(super) fn run_app(
     options: &Arguments,
@@ -214,15 +214,15 @@ pub(super) fn run_app(
         program: &image,
         words: &words,
         is_live: handed::is_live(options) || options.is_given(name::CONSOLE),
-        // In virtual time nothing listens, and nothing has to end in order.
+        // In virtual time no program listens, and none has to end in order.
         stops: !is_on_host(options),
         log: &log.path,
         limit,
     };
     let outcome = match &guest {
         None => program::run(&order, &mut show),
-        // The program to run is QEMU, without a terminal and with the time that Linux takes to
-        // start.
+        // The program to run is QEMU, without a terminal and with extra time for the start of
+        // Linux.
         Some(guest) => {
             let order = program::ProgramOrder {
                 program: &guest.program,
@@ -237,14 +237,14 @@ pub(super) fn run_app(
     };
     screen.wipe();
     let mut outcome = outcome?;
-    // If Linux itself failed, the app's log is empty; the console of the guest tells why.
+    // If Linux itself failed, the app's log is empty; the guest's console tells why.
     if let (Some(guest), QemuEnd::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
     kept::write(options, &kept, outcome, log, screen)
 }
 
-/// Prints which program is run and how far its times can be trusted.
+/// Prints the program, its words, and how far its times can be trusted.
 fn introduce(
     screen: &LineOutputs,
     app: &str,
@@ -283,7 +283,7 @@ fn meaning(mode: Mode) -> &'static str {
     }
 }
 
-/// Returns the words that only a program of this computer gets.
+/// Returns the words for programs of this computer only.
 pub(super) fn own_words(options: &Arguments) -> Vec<String> {
     let mut words = Vec::new();
     for name in [name::CORES, name::MECHANISM, name::OUTPUT] {

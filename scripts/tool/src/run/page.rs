@@ -1,13 +1,14 @@
-//! The server of `run --page`: the page, and the growing record of a run, for this computer alone.
+//! Serves the page, and the growing record of a run, to this computer alone: `run --page`.
 //!
-//! The server has two routes. `/` is the page; `/record?from=N` is the record from byte N on, with a
-//! header `record:`, which says `going`, or `over` when the run has ended and the record is complete,
-//! and a header `bytes:` with the record's length. A complete record begins with another header than
-//! a growing one, so a page reads it anew from byte 0.
+//! The server has two routes. `/` is the page, and `/record?from=N` is the record from byte N on.
+//! The answer has two headers: `bytes:`, with the record's length, and `record:`, with `going` or,
+//! after the end of the run, when the record is complete, `over`. A complete record begins with
+//! another header than a growing record, so a page reads it anew from byte 0.
 //!
-//! A request must name this server as its host. So no page of another origin reads a run by a name
-//! directed to this computer; nor does a page, as an image, keep a run waiting at its end.
-//! Each request has a thread, which ends when a client says nothing, or takes nothing, for 2 s.
+//! A request must name this server as its host. So a page of another origin cannot read a run by a
+//! name directed to this computer; nor can such a page, by loading the record as an image, keep a
+//! run waiting at its end. Each request has a thread. The thread ends when a client sends or takes
+//! nothing for 2 s.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -27,19 +28,19 @@ const MOST_REQUEST_BYTES: u64 = 16 << 10;
 /// The most bytes of a record in an answer.
 const MOST_BYTES: usize = 8 << 20;
 
-/// The most requests at a time: each takes a thread and a file of those that the run needs.
+/// The most requests at a time: each takes a thread and an open file, and the run needs some, too.
 const MOST_REQUESTS: usize = 64;
 
-/// A page follows a run if its latest request is younger.
+/// The greatest age of a page's latest request while the page counts as following the run.
 const ASKS: Duration = Duration::from_secs(5);
 
-/// The longest wait for such a page to take a whole record.
+/// The longest wait for a following page to take the whole record.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
-/// The reason why a lock is not poisoned.
+/// Why a lock is not poisoned.
 const UNBROKEN: &str = "no thread panics with it";
 
-/// A server, which lives until the program ends.
+/// A server, alive until the program ends.
 pub(super) struct PageServer {
     pub(super) port: u16,
     page: String,
@@ -47,8 +48,8 @@ pub(super) struct PageServer {
     raw: PathBuf,
     /// The record of the run, after its end.
     whole: OnceLock<Vec<u8>>,
-    /// The time of the latest request for the record, and how many bytes of the whole one were
-    /// taken, from the first byte on.
+    /// The time of the latest request for the record, and the number of bytes taken from the whole
+    /// record, counted from the first byte on.
     taken: Mutex<(Option<Instant>, usize)>,
 }
 
@@ -75,7 +76,7 @@ impl PageServer {
             for stream in listener.incoming().flatten() {
                 let request = Arc::clone(&requests);
                 if Arc::strong_count(&request) <= MOST_REQUESTS {
-                    // The failure of a client that goes away harms nobody.
+                    // A client that goes away harms nobody, so its failure is ignored.
                     thread::spawn(move || (server.answer(stream).ok(), request));
                 }
             }
@@ -83,8 +84,8 @@ impl PageServer {
         Ok(server)
     }
 
-    /// Serves the whole record from now on. If a page still asks, waits until that page has taken all.
-    /// Reports whether a page has ever asked.
+    /// Serves the whole record from now on. If a page is still asking, waits until that page has
+    /// taken everything. Reports whether a page has ever asked.
     pub(super) fn finish(&self, whole: Vec<u8>) -> bool {
         let until = Instant::now() + LONGEST_WAIT;
         let bytes = self.whole.get_or_init(|| whole).len();
@@ -131,11 +132,11 @@ impl PageServer {
         }
     }
 
-    /// Answers with the record from a byte on.
+    /// Answers with the record, beginning at a byte.
     fn answer_record(&self, stream: TcpStream, from: usize) -> io::Result<()> {
         self.taken.lock().expect(UNBROKEN).0 = Some(Instant::now());
         let (whole, grown) = (self.whole.get(), recordings::received(&self.raw));
-        // Until the guest sends something there is no file.
+        // Until the guest sends something, there is no file.
         let (record, state) = match whole {
             Some(whole) => (whole, "over"),
             None => (&grown.unwrap_or_default(), "going"),
@@ -145,6 +146,7 @@ impl PageServer {
         let headers = format!("record: {state}\r\nbytes: {length}\r\n");
         write(stream, "200 OK", &headers, rest)?;
         let taken = &mut self.taken.lock().expect(UNBROKEN).1;
+        // Only bytes without a gap count as taken: `finish` waits until a page has all of them.
         if whole.is_some() && from <= *taken {
             *taken = (*taken).max(from + rest.len());
         }
@@ -152,7 +154,7 @@ impl PageServer {
     }
 }
 
-/// Writes an answer, after which the connection ends.
+/// Writes an answer and so ends the connection.
 fn write(mut stream: TcpStream, status: &str, headers: &str, body: &[u8]) -> io::Result<()> {
     let length = body.len();
     write!(
@@ -171,7 +173,7 @@ mod tests {
     use recording::MAGIC;
     use std::fs;
 
-    /// Asks a server; returns the head of the answer, and its content.
+    /// Sends a request to a server; returns the head of the answer, and its content.
     fn ask(server: &PageServer, request: &str) -> (String, Vec<u8>) {
         let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, server.port)).unwrap();
         let request = request.replace("PORT", &server.port.to_string()) + "\n\n";

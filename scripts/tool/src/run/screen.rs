@@ -1,13 +1,13 @@
-//! The output of a run while it goes on, and a person's input to it.
+//! Shows the output of a run while it goes on, and passes a person's input to the guest.
 //!
-//! Lines for people and machine lines go to standard output in the order of
-//! the serial log, so that `grep '^{'` works there as on the log itself.
-//! Progress lines become one line on standard error, as for every command. On a terminal status
-//! lines take its place. After a fault at an address a line of our own names the function.
+//! Lines for people and machine lines go to standard output in the order of the serial log, so
+//! `grep '^{'` works on this output as on the log itself. Progress lines become a single line on
+//! standard error, as in every command. On a terminal, status lines take its place. After a fault
+//! at an address, a line of our own names the function.
 //!
 //! The console's input comes from standard input, byte by byte; the terminal itself shows and edits
-//! the line. The status is asked for only on a terminal: printing changes a guest's times, and a
-//! run whose output goes to a file or a pipe must not depend on the caller.
+//! the line. Only on a terminal does the tool ask for the status: printing changes a guest's times,
+//! and a run with output to a file or a pipe must not depend on the caller.
 
 use std::fs;
 use std::io::{ErrorKind, IsTerminal, Read, Write, stdin, stdout};
@@ -24,7 +24,8 @@ use crate::run_options::name;
 use crate::system;
 use views::protocol::{MachineLine, read_line};
 
-/// The value of `quiet` that suppresses machine lines, too: for a run that only prepares another.
+/// The value of `quiet` for suppressing machine lines, too, in a run that only prepares another
+/// run.
 pub(super) const NOTHING: &str = "nothing";
 
 /// The destinations of each kind of line.
@@ -34,9 +35,9 @@ pub(super) struct LineOutputs {
     quiet: bool,
     on_terminal: bool,
     bar_is_shown: bool,
-    /// The arrival of the first status line, and the run's time in it.
+    /// The arrival of the first status line, and the run's time in that line.
     first_status: Option<(Instant, u64)>,
-    /// The progress of this run, and how many jobs were done.
+    /// The progress of this run, and the number of finished jobs.
     progress: Option<(Progress, u64)>,
     image: PathBuf,
 }
@@ -64,19 +65,19 @@ impl LineOutputs {
         if self.people {
             println!("{line}");
         } else {
-            // Standard output is for machine lines alone then.
+            // Standard output is for machine lines only in this case.
             eprintln!("{line}");
         }
     }
 
-    /// Shows one line of the serial log.
+    /// Shows a line of the serial log.
     pub(super) fn show(&mut self, line: &str) {
-        // The number is for messages only, and the judge makes those.
+        // The number serves only messages, and those come from the judge.
         let read = read_line(0, line);
         if let Some(Ok(machine)) = &read {
             match machine.kind.as_str() {
                 "progress" => return self.advance(machine),
-                // Records are written to files; on the screen they say nothing.
+                // Records are written to files; on the screen they tell nothing.
                 "record" => return,
                 "status" if self.on_terminal => return self.show_status(machine),
                 _ => {}
@@ -88,7 +89,7 @@ impl LineOutputs {
             self.people
         };
         if wanted {
-            // A progress line may stand there; the new line would begin behind it.
+            // A progress line may be there; the new line would begin behind it.
             self.wipe();
             println!("{line}");
         }
@@ -112,7 +113,7 @@ impl LineOutputs {
         }
     }
 
-    /// Describes in one line how the run does; `None` if the machine line lacks a member.
+    /// Describes the run's state in one line; `None` if the machine line lacks a member.
     fn status_text(&mut self, line: &MachineLine) -> Option<String> {
         let now = Instant::now();
         let time_ns = line.number_at("time_ns")?;
@@ -145,7 +146,7 @@ impl LineOutputs {
 /// The longest line in bytes, so that a narrow terminal does not break it.
 const WIDTH: usize = 100;
 
-/// Describes the run after `wall_ns` of real time, in which `run_ns` of its own time have passed.
+/// Describes the run after `wall_ns` of real time and `run_ns` of the run's own time.
 fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
     let (done, total) = (line.number_at("done")?, line.number_at("total")?);
     let misses = line.number_at("misses")?;
@@ -171,14 +172,14 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
         text += &format!(", {} s left", left_ns.div_ceil(1_000_000_000));
     }
     if text.len() > WIDTH {
-        // Not in the middle of a character.
+        // The cut must not fall into the middle of a character.
         text.truncate(text.floor_char_boundary(WIDTH - 2));
         text += "..";
     }
     Some(text)
 }
 
-/// Returns the guest's words that the screen needs.
+/// Returns the guest's words needed for the screen.
 pub(super) fn guest_words(options: &Arguments) -> Vec<String> {
     let mut words = Vec::new();
     if options.is_given(name::CONSOLE) {
@@ -190,8 +191,8 @@ pub(super) fn guest_words(options: &Arguments) -> Vec<String> {
     words
 }
 
-/// Reports whether the guest can be asked to end by ctrl-C: not if standard input feeds its second
-/// port, since QEMU has one standard input.
+/// Reports whether the tool can ask the guest to end by ctrl-C. It cannot if standard input feeds
+/// the guest's second port, since QEMU has only one standard input.
 pub(super) fn can_stop(options: &Arguments) -> bool {
     let says_otherwise = options
         .text(name::APPEND)
@@ -199,7 +200,7 @@ pub(super) fn can_stop(options: &Arguments) -> bool {
     !handed::is_live(options) && !says_otherwise
 }
 
-/// Reports whether a person watches and does not type meanwhile.
+/// Reports whether a person watches without typing.
 fn is_watched(options: &Arguments) -> bool {
     let is_silent = options
         .given_of(&[name::QUIET, name::JSON, name::GDB])
@@ -207,11 +208,12 @@ fn is_watched(options: &Arguments) -> bool {
     stdout().is_terminal() && system::stderr_moves() && !is_silent
 }
 
-/// Copies standard input to the guest's serial port until either ends. At the end of input a
-/// console's last line is completed; an endless run is also shut down, since no one could do so
-/// later.
+/// Copies standard input to the guest's serial port until either ends. At the end of input,
+/// completes a console's last line; also shuts down an endless run, since no later input could do
+/// so.
 ///
-/// Starts when the guest has written to `log`: before its serial port is set up, input is lost.
+/// Starts when the guest has written to `log`: before the guest sets up its serial port, input is
+/// lost.
 pub(super) fn relay(options: &Arguments, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
     let is_read = options.is_given(name::CONSOLE) || handed::is_live(options);

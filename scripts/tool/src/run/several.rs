@@ -1,12 +1,13 @@
-//! More than one run: the files of a folder (`--dag FOLDER`), and runs that compare bounds with
+//! Makes several runs: all files of a folder (`--dag FOLDER`), or runs for comparing bounds with
 //! response times (`--prove`).
 //!
 //! An observed guest records its DAGs and times. `--prove` boots twice: the first run is observed,
-//! the second one commits with the WCETs and overheads of the first, unless the person states them.
+//! and the second run commits with the WCETs and overheads of the first, unless the person states
+//! them.
 //!
-//! Every file of a folder whose name ends as that of a DAG file is run, in the order of the
-//! names: one boot each, with `--prove` two, in one table. A file that is refused or fails does not
-//! keep the others from being run.
+//! In a folder, every file with the name ending of a DAG file is run, in the order of the names:
+//! one boot for each, or two with `--prove`, in a single table. A file refused or failed does not
+//! keep the other files from running.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,10 +31,10 @@ use views::json::quoted;
 use views::protocol::Status;
 use views::record::Record;
 
-/// The platform's overheads; an error in words if no trace was kept.
+/// The platform's overheads, or an error in words if no trace was kept.
 type Measurement = Result<MeasuredCosts, String>;
 
-/// Runs the proof.
+/// Proves a single file's or app's DAGs: observes, commits, compares, and prints the table.
 pub(super) fn run(options: &Arguments) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
     let others = [name::CONSOLE, name::GDB, name::PAGE, name::PRINT_DAG];
@@ -51,8 +52,8 @@ pub(super) fn run(options: &Arguments) -> Result<ExitCode, Refusal> {
     }
 }
 
-/// Proves the DAGs of each file, one after the other, and prints all in one table. A file that is
-/// refused or fails does not keep the others from being proven.
+/// Proves the DAGs of each file, one file after the other, and prints all results in one table.
+/// Goes on with the next file after a refusal or a failure.
 pub(super) fn of_files(options: &Arguments, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files");
     let (mut rows, mut over) = (Vec::new(), 0);
@@ -60,7 +61,7 @@ pub(super) fn of_files(options: &Arguments, files: &[PathBuf]) -> Result<ExitCod
         progress.show(over);
         over += 1;
         let one = options.with(name::DAG, file).with(name::QUIET, NOTHING);
-        // The lines of the single runs would drown the one table.
+        // The lines of the single runs would drown the table.
         let one = one.with(name::JSON, "yes");
         let Some((proven, code)) = prove(&one)? else {
             return Ok(Status::Failure);
@@ -87,8 +88,8 @@ pub(super) fn of_files(options: &Arguments, files: &[PathBuf]) -> Result<ExitCod
 /// The rows of a proof, and the exit code of its second run.
 type Proven = (Vec<ProofRow>, ExitCode);
 
-/// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
-/// which has been reported.
+/// Observes a run, commits with its measurements, and compares. Returns `None` if the first run
+/// failed; the failure has been reported.
 fn prove(options: &Arguments) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
     // The WCETs of the first run.
@@ -110,8 +111,8 @@ fn prove(options: &Arguments) -> Result<Option<Proven>, Refusal> {
     Ok(Some((rows, code)))
 }
 
-/// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
-/// which the next run commits with the measurements; `None` if the run failed.
+/// Observes a run, unless the person states both WCETs and overheads. Returns the command line for
+/// the next run, which commits with the measurements. Returns `None` if the run failed.
 fn observe_first(options: &Arguments, own: &Path) -> Result<Option<Arguments>, Refusal> {
     let append = options.text(name::APPEND).unwrap_or_default();
     let measures = !states_overheads(append);
@@ -120,7 +121,7 @@ fn observe_first(options: &Arguments, own: &Path) -> Result<Option<Arguments>, R
     }
     // The person asked for the second run; the first only prepares it.
     let first = options.with(name::QUIET, NOTHING);
-    // WCETs that the person states are not overwritten by observed ones.
+    // Observed WCETs do not replace WCETs stated by the person.
     let file = Some(own).filter(|_| !options.is_given(name::WCETS));
     let Some(seen) = observe(&first, file)? else {
         return Ok(None);
@@ -151,7 +152,7 @@ fn compare(booted: &EndedRun) -> Result<Vec<ProofRow>, String> {
 }
 
 /// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
-/// the overheads; `None` if a run failed, which has been reported.
+/// the overheads. Returns `None` if a run failed; the failure has been reported.
 fn observe(options: &Arguments, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
     let observing = options.with(name::PROVE, OBSERVING);
     // Saturating, since a person's seed may be the largest `u64`.
@@ -184,11 +185,11 @@ fn observe(options: &Arguments, file: Option<&Path>) -> Result<Option<Measuremen
     if let Some(path) = file {
         files::write(path, observed::text(&all, margin))?;
     }
-    // The overheads in the last seed's run stand for those of all.
+    // The overheads in the last seed's run represent all runs.
     Ok(Some(observed::measure(&latest.runs)))
 }
 
-/// The value of `--prove` in its first run, which only observes.
+/// The value of `--prove` in the first run, which only observes.
 const OBSERVING: &str = "observing";
 
 /// Prints the rows of a proof.
@@ -197,7 +198,7 @@ fn say_all(options: &Arguments, rows: &[ProofRow]) {
     say(options, &proof::table(rows), lines);
 }
 
-/// Prints a table for people and lines for programs, as the options want.
+/// Prints a table for people and lines for programs, as far as the options want them.
 fn say(options: &Arguments, table: &str, lines: impl Iterator<Item = String>) {
     if !options.is_given(name::JSON) {
         print!("{table}");
@@ -207,15 +208,15 @@ fn say(options: &Arguments, table: &str, lines: impl Iterator<Item = String>) {
     }
 }
 
-/// Returns the word that keeps a run which only observes from judging bounds: its WCETs and
-/// overheads are still to be found.
+/// Returns the guest's word against judging bounds, for a run that only observes: its WCETs and
+/// overheads are not known yet.
 pub(super) fn bounds_word(options: &Arguments) -> Option<String> {
     let observes = options.text(name::PROVE) == Some(OBSERVING);
     observes.then(|| "bounds=observe".into())
 }
 
-/// Reports a guest's refusal of a WCET file with the file's name and line; returns whether it was
-/// one.
+/// Reports a guest's refusal of a WCET file with the file's name and line; returns whether the
+/// refusal was about that file.
 pub(super) fn refused(options: &Arguments, reason: &str) -> bool {
     let path = options.path(name::WCETS);
     match path.and_then(|path| observed::translate(reason, path)) {
@@ -227,7 +228,7 @@ pub(super) fn refused(options: &Arguments, reason: &str) -> bool {
     }
 }
 
-/// Options that make sense for one file only.
+/// Options that make sense for a single file only.
 pub(super) const FOR_ONE_FILE: [OptionName; 8] = [
     name::PRINT_DAG,
     name::GRAPH,
@@ -239,8 +240,8 @@ pub(super) const FOR_ONE_FILE: [OptionName; 8] = [
     name::PAGE,
 ];
 
-/// Runs all files. A refused or failed one does not keep the others from running;
-/// the exit code is that of the worst.
+/// Runs all files, going on after refused and failed files. Returns the exit code of the worst
+/// file.
 pub(super) fn run_folder(options: &Arguments, folder: &Path) -> Result<ExitCode, Refusal> {
     let why = "is for one file; name one with `--dag`";
     let for_several = options.check_without(&FOR_ONE_FILE, why);
@@ -283,8 +284,8 @@ pub(super) fn run_folder(options: &Arguments, folder: &Path) -> Result<ExitCode,
     Ok(worst(refused, failed))
 }
 
-/// Runs each file; one that is refused or fails does not keep the others from running. Returns
-/// how many were refused, and how many failed.
+/// Runs each file, going on after a refusal or a failure. Returns the numbers of refused and of
+/// failed files.
 pub(super) fn each(
     files: &[PathBuf],
     mut run: impl FnMut(&Path) -> Result<Status, Refusal>,
@@ -320,7 +321,7 @@ pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
     }
 }
 
-/// Returns the folder that `--dag` names, if it is one.
+/// Returns the path named by `--dag`, if it is a folder.
 pub(super) fn folder(options: &Arguments) -> Option<PathBuf> {
     let path = options.path(name::DAG)?;
     path.is_dir().then(|| path.to_path_buf())
@@ -330,7 +331,7 @@ pub(super) fn folder(options: &Arguments) -> Option<PathBuf> {
 ///
 /// # Errors
 ///
-/// In words: it cannot be read, or has none.
+/// In words: the folder cannot be read, or has no DAG file.
 pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let place = folder.display();
     let entries = fs::read_dir(folder).map_err(|error| format!("{place}: {error}"))?;
@@ -351,7 +352,7 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
 const COLUMNS: &str = "file:<18|dag:<18|subtasks:8|cores:6|jobs:6|misses:8|violations:11|\
                        bound ms:14|max ms:14|max/bound:10";
 
-/// Adds the rows of a file: one for each of its DAGs.
+/// Adds the rows of a file, one for each DAG.
 fn add_rows(table: &mut Table, file: &Path, cores: u64, outcome: &Outcome) {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let violations: u64 = outcome
@@ -383,13 +384,14 @@ fn decimal(ns: u64) -> String {
     format!("{}.{:03}", us / 1000, us % 1000)
 }
 
-/// Returns the machine lines of a file's DAGs, each with a member that names the file.
+/// Returns the machine lines of a file's DAGs, each with an additional member naming the file.
 fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> + use<'o> {
     const BEGINNING: &str = "{\"kind\":\"dag_run\",";
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let name = quoted(&name);
     outcome.serial.lines().filter_map(move |line| {
-        // The member goes in first: the rest of the line stays byte for byte the guest's.
+        // The member goes in first, to keep the rest of the line byte for byte as the guest wrote
+        // it.
         let rest = line.strip_prefix(BEGINNING)?;
         Some(format!("{BEGINNING}\"file\":{name},{rest}"))
     })

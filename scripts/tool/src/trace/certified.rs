@@ -1,4 +1,4 @@
-//! The answer whether a run is certified, and by which theorems its bounds hold.
+//! Tells whether a run is certified, and by which theorems its bounds hold.
 
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
@@ -10,7 +10,7 @@ use views::record::Run;
 
 use crate::{files, system};
 
-/// Returns the answer in words, and the word of the condition that failed, empty if none did.
+/// Returns the answer in words, and the word for the failed condition, empty if none failed.
 pub(super) fn told(run: &Run, findings: &Findings, asks_theorems: bool) -> (String, &'static str) {
     let theorems = certify(run, findings).and_then(|()| match asks_theorems {
         true => theorems(run).map_err(|why| ("witness", why)),
@@ -27,7 +27,7 @@ pub(super) fn told(run: &Run, findings: &Findings, asks_theorems: bool) -> (Stri
     }
 }
 
-/// Asks the proven checker by which theorems the bounds of a run hold.
+/// Asks the proven checker for the theorems behind the bounds of a run.
 fn theorems(run: &Run) -> Result<String, String> {
     let path = system::new_log("witness")?;
     let witness = analysis::witness(&run.commit.task_set, &run.commit.settings());
@@ -41,9 +41,9 @@ fn theorems(run: &Run) -> Result<String, String> {
     named(&said, run.bounds_ns.iter().flatten().count())
 }
 
-/// Returns how many bounds hold by which theorem, by what check-witness says of so many.
+/// Counts the bounds of each theorem in the output of check-witness, and expects `bounds` of them.
 fn named(said: &str, bounds: usize) -> Result<String, String> {
-    // One of several clusters, too.
+    // A refusal for only one of several clusters counts, too.
     if let Some(refused) = said.lines().find(|line| line.contains(": refused: ")) {
         return Err(refused.into());
     }

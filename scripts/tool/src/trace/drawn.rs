@@ -1,4 +1,4 @@
-//! Runs drawn: the command `trace`.
+//! Draws runs: the command `trace`.
 
 use std::ffi::OsString;
 use std::fs;
@@ -72,7 +72,7 @@ pub fn trace(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Converts the runs that the options name.
+/// Converts the runs named by the options.
 fn draw(options: &Arguments) -> Result<String, String> {
     options.file("which file? name a record of a run")?;
     let inputs = options.files().map(|path| NamedFile { option: "", path });
@@ -99,7 +99,7 @@ fn draw(options: &Arguments) -> Result<String, String> {
         eprintln!("{file}: the record ends before the run");
     }
     if options.is_given(name::SVG) {
-        // Without `--run` the first one: a picture has one axis of time.
+        // A picture has only one axis of time, so without `--run` it shows the first run.
         let run = runs.first().ok_or("the file has no run")?;
         let view = View::new(run);
         let asked = WindowRequest {
@@ -110,7 +110,7 @@ fn draw(options: &Arguments) -> Result<String, String> {
         };
         return picture::draw(&view, TimeWindow::of(&view, &asked)?);
     }
-    // All runs of a file come from one boot, so one bound holds for all.
+    // All runs of a file come from the same boot, so the same bound holds for all.
     let of_first = |run| tolerance_ns(run, options.number(name::BOUND_US));
     let bound_ns = runs.first().map_or(0, of_first);
     Ok(perfetto::convert(&runs, bound_ns))

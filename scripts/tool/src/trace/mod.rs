@@ -1,9 +1,8 @@
-//! The trace checker: the events of a run, judged by the model's rules.
+//! Checks traces: judges the events of a run by the model's rules.
 //!
-//! This module has the subcommand `check-trace`, which prints the [`views::findings`] of runs and the
-//! times of their [chains]; and that of `trace`, which draws a run instead of judging it. All
-//! files are read before the first run is judged, so that a damaged one does not hide behind the
-//! breaches of another.
+//! This module has two subcommands. `check-trace` prints the [`views::findings`] of runs and the
+//! times of their [chains]; `trace` draws a run instead of judging it. Both read all files before
+//! handling the first run, so a damaged file does not hide behind the breaches of another.
 
 mod certified;
 mod drawn;
@@ -120,7 +119,7 @@ fn judge_all(options: &Arguments) -> Result<usize, String> {
         Ok(joint) => runs.extend(joint.map(|run| (files, run))),
         Err(why) => eprintln!("{files}: each is read alone, as {why}"),
     }
-    // All chains are measured first, so that a wrong name is reported before any output.
+    // All chains are measured first, to report a wrong name before any output.
     let measured = runs.iter().map(|(_, run)| match run.machines[..] {
         [] if is_joint => Ok(Vec::new()),
         _ => measure(run, options),
@@ -137,7 +136,7 @@ fn read_files(options: &Arguments) -> Result<Vec<(String, Record)>, String> {
     options.files().map(read).collect()
 }
 
-/// Reads a file's runs, of which at least one must have events.
+/// Reads a file's runs; at least one of them must have events.
 pub(crate) fn read_file(path: &Path) -> Result<Record, String> {
     let file = files::shown_path(path);
     let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
@@ -162,7 +161,7 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Arguments) -
             let (words, failed) = certified::told(run, &findings, options.is_given(name::PROVEN));
             let table = table(file, run, &findings, bound_ns) + &words;
             let line = machine_line(file, run, &findings, failed);
-            // A bound that fails although all conditions hold is a breach, too.
+            // A bound exceeded although all conditions hold is a breach, too.
             let breaches = findings.breaches.len() + usize::from(failed == "bound");
             (table, vec![line], breaches)
         }
@@ -188,7 +187,7 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Arguments) -
     breaches + exceeded
 }
 
-/// The most breaches of a run that are shown; all are counted.
+/// The most breaches shown for a run; all are counted.
 const MOST: usize = 20;
 
 /// Returns the text for people: the first breaches, then the figures.
@@ -265,14 +264,14 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings, failed_condition
         .into_text()
 }
 
-/// The largest number of chains shown for a run, unless one is named.
+/// The most chains shown for a run, unless the options name a chain.
 const SHOWN: usize = 8;
 
-/// Measures the chains that the options name, or else all.
+/// Measures the chains named by the options, or else all chains.
 ///
 /// # Errors
 ///
-/// In words: there is no such subtask, or no chain between the two.
+/// In words: there is no such subtask, or no chain between the two subtasks.
 fn measure(run: &Run, options: &Arguments) -> Result<Vec<MeasuredChain>, String> {
     let ends = match (options.text(name::FROM), options.text(name::TO)) {
         (None, None) => None,
@@ -294,7 +293,7 @@ fn measure(run: &Run, options: &Arguments) -> Result<Vec<MeasuredChain>, String>
     Ok(chains::measured(&View::new(run), &found))
 }
 
-/// Finds the subtask that an option names.
+/// Finds the subtask named by an option.
 fn named_subtask(run: &Run, option: &str, name: &str) -> Result<SubtaskRef, String> {
     Chain::find(&run.task_set, name).ok_or_else(|| {
         let dags = (0..).map(DagId).zip(run.task_set.dags());

@@ -1,11 +1,12 @@
-//! Runs for Perfetto's viewer, in the Trace Event Format of Chrome's tracing.
+//! Converts runs for Perfetto's viewer, into the Trace Event Format of Chrome's tracing.
 //!
-//! In its words a *process* is a group of *tracks* (it calls them threads), a *slice* a stretch of
-//! time on a track, an *instant* a moment. A run is a group of cores, with their executions; one
-//! for each DAG, with its moments, and its jobs on as many *lanes* as overlap; and one of breaches.
+//! In Perfetto's words a *process* is a group of *tracks* (the format calls them threads), a
+//! *slice* is a stretch of time on a track, and an *instant* is a moment. A run becomes a group of
+//! cores, with their executions; a group for each DAG, with its moments, and its jobs on as many
+//! *lanes* as overlap; and a group of breaches.
 //!
-//! Slices of a track never overlap, and stand in the order of time. Each is a begin and an end, as
-//! viewers round durations, and two slices that touch at one nanosecond must still touch there.
+//! Slices of a track never overlap, and appear in the order of time. Each is written as a begin and
+//! an end: viewers round durations, and slices that touch at a nanosecond must still touch.
 
 use sched_dag::DagId;
 use views::findings::check;
@@ -23,7 +24,7 @@ pub(super) fn convert(runs: &[Run], bound_ns: u64) -> String {
         for dag in (0..).map(DagId).take(run.task_set.dags().len()) {
             output.add_dag(&view, dag);
         }
-        // Of several machines each is judged alone.
+        // The machines of a joint run are judged separately, so there are no breaches here.
         let group = output.track(None, &format!("run {}: breaches", run.number));
         let track = output.track(Some(group), "rules");
         let of_one = Some(run).filter(|run| run.machines.is_empty());
@@ -36,10 +37,11 @@ pub(super) fn convert(runs: &[Run], bound_ns: u64) -> String {
     format!("{{\"displayTimeUnit\":\"ns\",\"traceEvents\":[\n{events}\n]}}\n")
 }
 
-/// The numbers of a group and of a track in it: no two are equal, as viewers mix them up.
+/// The numbers of a group and of a track in the group. No two are equal, as viewers mix up equal
+/// numbers.
 type Track = (usize, usize);
 
-/// The events that are written.
+/// The events written so far.
 struct PerfettoOutput(Vec<String>);
 
 impl PerfettoOutput {
@@ -84,6 +86,8 @@ impl PerfettoOutput {
             for (what, time_ns) in released.into_iter().chain(missed) {
                 self.instant(moments, time_ns, format!("{what} #{job}"));
             }
+            // A job takes the first lane free at its release, so lanes never show overlapping
+            // slices.
             let from_ns = view.release_ns(dag, job);
             let free = |(_, until_ns): &(Track, u64)| *until_ns <= from_ns;
             let lane = lanes.iter().position(free).unwrap_or(lanes.len());
@@ -95,7 +99,7 @@ impl PerfettoOutput {
             let (track, to_ns) = lanes[lane];
             self.slice(track, (from_ns, to_ns), &format!("job #{job}"));
         }
-        // Those of the run, such as its modes, stand with its first DAG.
+        // Marks of the whole run, such as its modes, appear with its first DAG.
         for mark in marks::of(view).filter(|mark| mark.dag.unwrap_or(DagId(0)) == dag) {
             self.instant(moments, mark.time_ns, mark.text);
         }
