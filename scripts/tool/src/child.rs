@@ -1,6 +1,6 @@
 //! Child processes with a time limit. The tool waits for a child, watches its output, and kills it
-//! by process id at the limit or when the [`Child`] is dropped. A child able to end in order is
-//! asked to do so before the kill.
+//! by process id at the limit or when the [`Child`] is dropped. A child that can end in order is
+//! asked to do so first.
 //!
 //! The request comes at the child's limit, or when a *signal* such as ctrl-C asks the tool to end.
 //! After its limit a child may run on as long as it prints, and then for 10 s of silence; the next
@@ -93,8 +93,9 @@ impl Child {
 
     /// Works like [`wait`](Self::wait), and passes each complete line of the child's output, read
     /// from `log`, to `show` as soon as the line is there. `sent` gets the number of bytes in the
-    /// log. It returns the number of bytes sent elsewhere, counted as progress, too, or `None` to
-    /// give the child up. `stop`, if given, asks the child to end in order before the kill.
+    /// log. It returns how many bytes the child has sent elsewhere, which counts as progress, or
+    /// `None` to give the child up. `stop`, if given, asks the child to end in order before the
+    /// kill.
     ///
     /// # Errors
     ///
@@ -213,7 +214,7 @@ const GRACE: Duration = Duration::from_secs(10);
 /// Why a child was asked to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndReason {
-    /// A person pressed ctrl-C, or asked this program to end.
+    /// A person pressed ctrl-C, or this program was asked to end.
     ByPerson,
     /// The child took longer than this limit.
     ByLimit(Duration),

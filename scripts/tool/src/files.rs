@@ -1,4 +1,4 @@
-//! Reads files named by a person with care, and never overwrites such a file by mistake.
+//! Handles the files named by a person: reads them with care, and never overwrites them by mistake.
 //!
 //! A command reads its *inputs* and writes its *outputs*. Before a command begins its work it calls
 //! [`check`]. The check promises that no output is also an input or another output, under whatever
@@ -19,7 +19,7 @@ use text::visible;
 
 use crate::system;
 
-/// The most bytes of an input, far beyond the needs of a guest or a reader.
+/// The most bytes of an input: far more than a guest or a reader can use.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// The most bytes of a text read as a whole.
@@ -120,7 +120,7 @@ pub(crate) fn write_named(
 pub(crate) fn why_full(path: &Path) -> Option<String> {
     const MORE: usize = 4096;
     let length = fs::metadata(path).ok()?.len();
-    // Read, not tried: the system ends a program exceeding this limit.
+    // Read from `/proc`, not tried: the system ends a program that goes beyond this limit.
     let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
     let mut limits = limits.lines();
     let limit = limits.find_map(|line| line.strip_prefix("Max file size"));
@@ -167,8 +167,8 @@ pub(crate) fn in_folder<R>(
 ///
 /// # Errors
 ///
-/// In words beginning with the file's name, and with the line number at bytes that are no text: an
-/// error of [`read`], text that is not UTF-8, or text that is too long.
+/// In words that begin with the file's name and, for bytes that are not UTF-8, with their line: as
+/// [`read`], the text is not UTF-8, or the text is too long.
 pub fn read_text(path: &Path) -> Result<String, String> {
     let refused = |line: &dyn Display, why: &dyn Display| {
         let place = shown_path(path);
@@ -215,7 +215,7 @@ pub fn check(inputs: &[NamedFile<'_>], outputs: &[NamedFile<'_>]) -> Result<(), 
     outputs.iter().try_for_each(try_output)
 }
 
-/// Makes sure that no input is given twice and so counted twice.
+/// Makes sure that no input is given, and so counted, twice.
 ///
 /// # Errors
 ///
@@ -284,8 +284,8 @@ fn try_output(output: &NamedFile<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// Makes sure that files can be written into a folder, which need not exist yet. Leaves nothing
-/// behind.
+/// Makes sure that files can be written into a folder, even if the folder does not exist yet.
+/// Leaves nothing behind.
 ///
 /// # Errors
 ///

@@ -1,9 +1,9 @@
 //! Builds images with cargo, finds their files, and measures their sizes.
 //!
 //! An *image* is a freestanding ELF file. It is linked from a package under `apps/` (or from the
-//! guest side of the boot tests) and bears the package's name. Images for running are built in
-//! release, images for a debugger by a profile of their own. The tool asks cargo itself for the
-//! file's path, so no setting of cargo's can make the tool boot a stale image.
+//! guest side of the boot tests) and bears the package's name. Images to run are built in release,
+//! images for a debugger by a profile of their own. The tool asks cargo itself for the file's path,
+//! so no setting of cargo's can make the tool boot a stale image.
 
 use std::env;
 use std::fs::{self, File, TryLockError};
@@ -151,7 +151,7 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<PathBuf, String> 
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
-/// Builds the program for running DAG files in virtual time.
+/// Builds the program that runs DAG files in virtual time.
 ///
 /// # Errors
 ///
@@ -224,7 +224,7 @@ fn is_locked(file: &Path) -> bool {
     matches!(locked, Ok(Err(TryLockError::WouldBlock)))
 }
 
-/// Returns the executable announced by a message of cargo, if its target has our name.
+/// Returns the executable announced by one of cargo's messages, if it is the wanted target.
 fn executable(message: &Value, package: &str) -> Option<PathBuf> {
     let name = message.at(&["target", "name"]).and_then(Value::as_text)?;
     let path = message.get("executable").and_then(Value::as_text)?;

@@ -18,7 +18,8 @@ pub struct HostNeed {
     /// The name, and a description for messages.
     name: &'static str,
     what: &'static str,
-    /// The parts that prove its presence: programs on the `PATH`, and files or folders.
+    /// The parts by which the tool recognizes a present program: programs on the `PATH`, and files
+    /// or folders.
     parts: &'static [&'static str],
     /// The names of Debian's packages with these parts, with blanks between; empty if a person
     /// installs it.
@@ -122,7 +123,7 @@ pub(crate) const WASM_TARGET: &str = "wasm32-wasip1";
 /// Packages of PyPI for tests: a router of Zenoh, and a reader of ROS 2's messages.
 const OF_PYPI: [&str; 2] = ["eclipse-zenoh==1.10.2", "rosbags==0.11.9"];
 
-/// Makes sure that QEMU is there, and installs it if necessary.
+/// Installs QEMU, unless QEMU is already there.
 ///
 /// # Errors
 ///
@@ -131,7 +132,7 @@ pub fn ensure_qemu() -> Result<(), String> {
     ensure(&QEMU)
 }
 
-/// Makes sure that a loader has everything besides QEMU, and installs missing programs.
+/// Installs everything a loader needs besides QEMU, unless it is already there.
 ///
 /// # Errors
 ///
@@ -144,8 +145,8 @@ pub fn ensure_loader(loader: Loader) -> Result<(), String> {
     }
 }
 
-/// Makes sure that a program is there, and installs it if it is missing. The package manager's
-/// output goes to standard error.
+/// Installs a program or file, unless it is already there. The package manager's output goes to
+/// standard error.
 ///
 /// # Errors
 ///
@@ -173,7 +174,7 @@ pub fn ensure(need: &HostNeed) -> Result<(), String> {
     }
 }
 
-/// Makes sure that Python can read YAML, and installs a reader if necessary.
+/// Installs a reader of YAML for Python, unless Python already has such a reader.
 ///
 /// # Errors
 ///
@@ -190,7 +191,7 @@ pub fn ensure_yaml() -> Result<(), String> {
         .map_err(|_| format!("the `python3` on the PATH has no PyYAML; {remedy}"))
 }
 
-/// Makes sure that Rust can compile for WebAssembly, and adds the target if it is missing.
+/// Adds Rust's target for WebAssembly, unless the toolchain already has it.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Makes boot media for a PC, also by the subcommand `image`.
+//! Makes boot media for a PC: for a single boot, or by the subcommand `image`.
 //!
 //! A medium is an ISO, for a stick or a disc. It contains the loaded part of the app's image,
 //! optionally a file to leave in memory, GRUB for BIOS and for UEFI, and commands for GRUB to boot
@@ -178,7 +178,7 @@ fn write_iso(iso: &Path, image: &[u8], words: &str, module: Option<&[u8]>) -> Re
     })
 }
 
-/// Returns GRUB's commands. GRUB leaves every file as it is, compressed or not. It reports a
+/// Returns GRUB's commands. The module stays as it is, compressed or not. GRUB itself reports a
 /// processor without 64 bits, since the image cannot run a single instruction there.
 ///
 /// Under UEFI, GRUB puts the first module at address 0. The firmware takes this address for a

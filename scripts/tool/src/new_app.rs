@@ -344,7 +344,7 @@ pub fn create_repository(out: &Path, name: &str, source: CrateSource<'_>) -> Res
 /// moved together.
 fn way(from: &Path, to: &Path) -> Option<String> {
     let from = std::path::absolute(from).ok()?;
-    // Only existing folders above: the rest of the path has no links yet.
+    // Only the existing folders are resolved: the rest of the path has no links yet.
     let there = from.ancestors().find(|above| above.exists())?;
     let new = from.strip_prefix(there).ok()?;
     let (from, to) = (

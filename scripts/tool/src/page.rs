@@ -129,7 +129,7 @@ fn assembled(engine: &str, content: &PageFiles, is_live: bool) -> Result<String,
     Ok(html.replacen("/*SCRIPT*/", &script, 1))
 }
 
-/// Returns a DAG file with its words for the play.
+/// Returns a DAG file with the words for playing it.
 fn example(path: &Path, text: &str, words: &str) -> String {
     let words = words.split(' ').filter_map(|word| word.split_once('='));
     let words = words.fold(Object::new(), |words, (name, value)| {

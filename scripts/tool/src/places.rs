@@ -1,4 +1,5 @@
-//! Finds places in code: the function of an image around an address, and the calls leading there.
+//! Finds places in code: the function that contains an address of an image, and the calls that lead
+//! there.
 //!
 //! A guest reporting a fault knows the address of the instruction, but its image contains no
 //! readable names. So when the tool shows a line of kind `panic` or `fault` with an address as its
@@ -34,7 +35,7 @@ const KINDS: [&str; 3] = ["panic", "fault", BACKTRACE];
 /// The kind of lines listing the calls on a stack.
 const BACKTRACE: &str = "backtrace";
 
-/// Folders of the workspace with code outside the app.
+/// Folders of the workspace whose code is not the app's.
 const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
 
 /// Returns the text to add to a line of an image's serial log, if any, such as
@@ -66,7 +67,7 @@ pub fn explain(image: &Path, line: &str) -> Option<String> {
     Some(sentence(first, frames.get(&first)?))
 }
 
-/// A function around an address, called or inlined there.
+/// A function that contains an address, called or inlined there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// The function's name; `??` if unknown.
@@ -75,8 +76,8 @@ pub struct Frame {
     pub line: String,
 }
 
-/// Finds the functions around each of the addresses in an image, the innermost first, by running
-/// `addr2line` (`program`). Returns `None` if the program fails.
+/// Finds the functions that contain each of the addresses in an image, the innermost first, by
+/// running `addr2line` (`program`). Returns `None` if the program fails.
 pub fn frames(
     program: &Path,
     image: &Path,
@@ -116,7 +117,7 @@ impl NamedImage {
         })
     }
 
-    /// Returns the functions around each of the addresses, and around earlier addresses.
+    /// Returns the functions that contain each of the addresses, and those of earlier addresses.
     fn frames(&mut self, addresses: &[u64]) -> Option<&BTreeMap<u64, Vec<Frame>>> {
         for address in addresses {
             if !self.known.contains_key(address) {
@@ -355,7 +356,7 @@ fn chain<'f>(
             return chain;
         };
         chain.push(call.instruction());
-        // Words further inside were skipped as left over, and stay so.
+        // Words further inside were skipped as left over, and stay skipped.
         calls = &calls[next + 1..];
     }
 }

@@ -19,8 +19,7 @@ use crate::system;
 const LIMIT: Duration = Duration::from_secs(3);
 
 /// Chooses the mode for booting `image` on `machine`: the mode named by the person, if any; else
-/// KVM if it works, and `otherwise` if not. Returns the reason for a choice between these two as
-/// well.
+/// KVM if it works, and `otherwise` if not. Without a named mode, also returns the reason.
 ///
 /// # Errors
 ///

@@ -29,9 +29,9 @@ pub struct ProgramOrder<'a> {
     pub is_live: bool,
     /// Whether the program ends in order at SIGINT; then the tool asks before it kills.
     pub stops: bool,
-    /// The file for the program's output.
+    /// The output file.
     pub log: &'a Path,
-    /// The longest time for the run.
+    /// The time limit.
     pub limit: Duration,
 }
 
@@ -49,7 +49,7 @@ pub fn run(order: &ProgramOrder<'_>, show: &mut impl FnMut(&str)) -> Result<Outc
 ///
 /// # Errors
 ///
-/// The errors of [`run`].
+/// As [`run`].
 pub fn run_for(
     order: &ProgramOrder<'_>,
     show: &mut impl FnMut(&str),
@@ -72,8 +72,8 @@ pub fn run_for(
         .map_err(|error| format!("cannot write `{place}`: {error}; name a file elsewhere"))?;
     let mut command = bound_to_us(program);
     command.args(words).stdin(stdin).stdout(file);
-    // A live program must stay in the terminal's process group: elsewhere it could not read the
-    // terminal. Only other programs leave the group, so that ctrl-C does not reach them twice.
+    // A live program must stay in the terminal's process group, or it could not read the terminal;
+    // there ctrl-C reaches it directly. Other programs leave the group, and we pass the request on.
     let is_apart = stops && !is_live;
     if is_apart {
         command.process_group(0);

@@ -12,7 +12,7 @@ use crate::system;
 pub const SILENCE: Duration = Duration::from_secs(5);
 
 /// Progress on standard error: on a terminal, a single line renewed in place; otherwise a new line
-/// after each silence of [`SILENCE`].
+/// whenever nothing was said for [`SILENCE`].
 pub struct Progress {
     /// The name of the counted units, such as `files`.
     unit: &'static str,

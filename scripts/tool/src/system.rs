@@ -1,5 +1,4 @@
-//! Access to the system under the tool: its programs, the workspace's root, and the folder for
-//! logs.
+//! The system that the tool runs on: its programs, the workspace's root, and the folder for logs.
 
 use std::env;
 use std::ffi::OsStr;
@@ -14,8 +13,8 @@ use std::time::Duration;
 
 use views::json::{self, Value};
 
-/// Returns the root of the workspace: the folder stated by `scripts/tool/start`, or else the place
-/// of the tool's build, which is wrong after a move of the workspace.
+/// Returns the root of the workspace: the folder that `scripts/tool/start` states, or else the
+/// folder in which this tool was built, which is wrong once the workspace has moved.
 pub fn workspace() -> &'static Path {
     static ROOT: OnceLock<PathBuf> = OnceLock::new();
     ROOT.get_or_init(|| match env::var_os("TOOL_WORKSPACE") {
@@ -170,11 +169,11 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
 }
 
-/// The storage time for files in the folder for logs, longer than any run.
+/// How long files stay in the folder for logs: longer than any run lasts.
 const KEPT: Duration = Duration::from_secs(7 * 86_400);
 
-/// Removes old files: logs of failed guests, read by a person long ago, and files of killed
-/// processes.
+/// Removes old files: logs of guests that failed, which a person has read by now, and files of
+/// killed processes.
 fn clear(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let changed = entry.metadata().and_then(|data| data.modified());

@@ -1,8 +1,8 @@
 //! Reads DAG files in foreign formats, by running `scripts/convert`.
 //!
 //! The converter writes our format and ends each record with a comment naming the line in the
-//! person's file. So a fault found later by one of our own checks names the right line, too; faults
-//! found by the converter name theirs already. The converter reports left-out parts of a file on
+//! person's file. So a fault found later by our own checks names the right line, too; faults that
+//! the converter finds have their lines already. The converter reports left-out parts of a file on
 //! standard error.
 
 use std::path::Path;

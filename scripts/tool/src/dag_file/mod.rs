@@ -4,8 +4,8 @@
 //! other formats to ours:
 //!
 //! - [`load()`] reads a file of any format and checks it as the commit will;
-//! - [`prepare()`] turns the file of `./scripts/run --dag FILE` into a boot module, words for the
-//!   guest, and sufficient memory and time.
+//! - [`prepare()`] prepares the input of `./scripts/run --dag FILE`: the boot module, words for the
+//!   guest, and enough memory and time.
 //!
 //! Every message about a file begins with `FILE:LINE:` and a line of the file named by the person,
 //! even if the guest reads the file in another form. The guest gets the file rewritten in our
@@ -137,8 +137,7 @@ const COMPANIONS: [OptionName; 6] = [
     name::STRICT_DEADLINES,
 ];
 
-/// The length of a run without a stated length, in the longest periods; the guest's default is
-/// equal.
+/// The default length of a run, counted in its longest period; the guest has the same default.
 const PERIODS: u64 = 50;
 
 /// Returns the guest's word for the kernel's worst-case overheads. The commit adds them to the

@@ -1,5 +1,5 @@
 //! Runs programs under Debian's Linux in QEMU. Some of our programs need another kernel than this
-//! computer's: a kernel with `sched_ext`, or one granting SCHED_FIFO.
+//! computer's: a kernel with `sched_ext`, or a kernel that grants SCHED_FIFO.
 //!
 //! Kernel and tools come from Debian's packages. The guest's files are in an archive, unpacked by
 //! the kernel into memory: the program, its libraries, and a script to run the program. The
@@ -167,8 +167,8 @@ impl GuestOrder<'_> {
     }
 }
 
-/// Packs a folder into a cpio archive, including the folders mounted by the script. Linux unpacks
-/// the archive into memory when it starts. Every file is executable and belongs to root.
+/// Packs a folder into a cpio archive, and adds the folders on which the script mounts. Linux
+/// unpacks the archive into memory when it starts. Every file is executable and belongs to root.
 fn pack(folder: &Path, packages: &UnpackedPackages, archive: &Path) -> Result<(), String> {
     const LINES: &str = "set -e; mkdir proc sys dev tmp; chmod -R 755 .
         find . | \"$0\" cpio -o -H newc -R 0:0 >\"$1\"";
@@ -194,9 +194,9 @@ const PACKAGES: [&str; 4] = ["busybox-static", "bpftool", "clang-19", "libbpf-de
 /// The keys for checking the signatures of the package lists.
 const KEYS: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
-/// The preferred kernel version, used to try the policy.
+/// The preferred kernel version: the policy was tried with it.
 const TRIED: [u32; 2] = [6, 18];
-/// The first kernel version whose `sched_ext` has every function used by the policy.
+/// The first kernel version whose `sched_ext` has everything that the policy uses.
 const LEAST: [u32; 2] = [6, 13];
 
 /// The unpacked packages.
@@ -257,7 +257,7 @@ impl UnpackedPackages {
         command
     }
 
-    /// Returns the libraries linked to the programs, each once.
+    /// Returns the libraries that programs are linked with, each once.
     fn libraries(&self, programs: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
         let mut found = Vec::new();
         for program in programs {

@@ -50,13 +50,13 @@ pub struct Command {
 /// Why a command did not do its work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// The help text, as the person asked.
+    /// The help text that the person asked for.
     Help(String),
     /// The command line, or a file named there, is at fault: exit code 2.
     Usage(String),
     /// Another failure: exit code 1.
     Failure(String),
-    /// A person has ended a run before the other runs of a series: exit code 130.
+    /// A person has ended a run before the rest of its series: exit code 130.
     ByPerson,
 }
 
@@ -224,7 +224,7 @@ impl Command {
         // column.
         let groups = self.options.iter().map(|option| option.group.len());
         let indent = groups.max().filter(|longest| *longest > 0);
-        // Two blanks stand between the longest group name and the headings.
+        // Two blanks separate the longest group name from the headings.
         let indent = indent.map_or(0, |longest| longest + 2);
         let mut add = |group: &str, heading: &str, sentence: &str| {
             add_entry(
@@ -489,7 +489,7 @@ impl Opt {
     fn sentence(&self) -> String {
         let mut parts = Vec::new();
         match self.takes {
-            // `u64::MAX` stands for "no upper bound"; printing it would only be noise.
+            // `u64::MAX` means "no upper bound"; printing it would only be noise.
             OptionValue::Number(least, most) | OptionValue::Numbers(least, most) => {
                 parts.push(match most {
                     u64::MAX => format!("from {least}"),

@@ -233,8 +233,8 @@ pub fn slack(commit: &CommittedDags, dag: DagId) -> Slack {
     // With a core for each subtask, nothing delays the longest path.
     settings.cores = u32::try_from(own.subtasks.len()).unwrap_or(u32::MAX).max(1);
     let length = bound(&[own], &settings, 0);
-    // A time table gives time to its DAGs and leaves the rest to others; such time has no parts of
-    // these kinds.
+    // A time table fixes when its DAGs run and which time is left to others, so these parts do not
+    // apply.
     let has_table = task_set.tables().iter().any(|of| of.cluster == cluster);
     let part = |whole: Option<u64>, rest: Option<u64>| match has_table {
         true => None,

@@ -43,7 +43,7 @@ pub struct OfDag {
 ///
 /// # Errors
 ///
-/// In words: there are no times, or some DAG's times are wrong.
+/// In words: there are no times, or a DAG's times do not fit its subtasks.
 pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
     let mut is_told = false;
     for (place, times) in &record.times {

@@ -10,8 +10,8 @@
 //! refuse the channel. So
 //!
 //! - a tuple is an object with the fields `0`, `1` and so on;
-//! - a part without a guaranteed value is not `required`, and its object omits it if there is no
-//!   value: an option, a number (JSON has no NaN), and an array of numbers, as a whole;
+//! - a part that may lack a value is not `required`, and without a value its object omits it: an
+//!   option, a number (JSON has no NaN), and an array of numbers, as a whole;
 //! - an array or an option as an element, and an option of an option, become the field `value` of
 //!   an object of their own;
 //! - an infinite number is `1e999`, a number beyond the range of every JSON reader.

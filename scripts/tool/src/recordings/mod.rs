@@ -124,8 +124,8 @@ fn attempt(options: &Arguments) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Returns the recording with all times in run time. Functions, also those fed by samples, see the
-/// clock's time, so the epoch of the run is subtracted.
+/// Returns the recording with all times in run time. Functions that ask for the time or get a
+/// sample see the clock's time; this subtracts the epoch.
 fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
     let texts = recording.chunks().filter_map(|chunk| match chunk {
         Chunk::Text(text) => Some(text),
@@ -201,7 +201,7 @@ fn check(input: NamedFile<'_>, options: &Arguments) -> Result<(), String> {
     (options.named(&[name::CSV]).iter()).try_for_each(files::check_folder)
 }
 
-/// Reads a file that must be a recording, and completes a recording cut off at its end.
+/// Reads a file that must be a recording, and completes a truncated recording.
 pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
     let place = files::shown_path(file);
     let bytes = files::read(file).map_err(|why| format!("{place}: {why}; name another file"))?;
@@ -350,8 +350,8 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
         let figures = [times.min(), times.median(), times.p99(), times.max()];
         let figures = figures.map(|ns| format!("{:>12}", views::units::shown(ns)));
         let figures = figures.concat();
-        // Writing into a `String` cannot fail.
-        // A row without samples would show zeros measured by nobody.
+        // Writing into a `String` cannot fail. A row without samples would show zeros that nobody
+        // has measured.
         let _ = match times.count() {
             0 => Ok(()),
             count => writeln!(text, "  {name:<34}{count:>8}{figures}"),

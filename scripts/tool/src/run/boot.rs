@@ -1,6 +1,6 @@
 //! The subcommand `boot`: a runner for cargo.
 //!
-//! Cargo hands each program to be started to a *runner*, images and tests alike. An image is
+//! Cargo hands each program that it would start to a *runner*, images and tests alike. An image is
 //! booted, as by `run --image`; any other program replaces this process, and so keeps its words,
 //! streams and exit code. With `--on linux` or `--on debian`, cargo builds the app's Linux program,
 //! and the runner runs it instead.

@@ -2,7 +2,7 @@
 //! the run.
 //!
 //! A set gets a certificate where no other test proves the set. The certificate follows the set's
-//! records in the file and so travels with the file. The commit checks the certificate again.
+//! records and travels with the file. The commit checks the certificate again.
 
 use fass_dag_file::{Length, Set, verified};
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer, certify};
@@ -11,9 +11,8 @@ use sched_dag::{CommitOptions, Policy, Preemption, SchedulerOptions};
 use super::name;
 use crate::options::Arguments;
 
-/// Gives a set a certificate for a run with these words, if the set needs a certificate and can
-/// have one. Replaces a certificate made for other words or for another set. Returns the number of
-/// states.
+/// Gives a set a certificate for a run with these words, if the set needs one and can have one.
+/// Replaces a certificate of other words or another set. Returns the number of states.
 pub(super) fn give(
     set: &mut Set,
     words: &[String],

@@ -1,7 +1,7 @@
 //! Runs an app in QEMU under gdb: the subcommand `debug`.
 //!
-//! The image is built by the profile `gdb`, which optimizes nothing and keeps all data needed by
-//! gdb to show variables. QEMU waits before the first instruction. A script connects gdb to QEMU
+//! The image is built by the profile `gdb`, which optimizes nothing and keeps everything that gdb
+//! needs to show variables. QEMU waits before the first instruction. A script connects gdb to QEMU
 //! and sets the breakpoints; then gdb replaces this process. So the terminal belongs to gdb alone:
 //! QEMU, which ends together with gdb, never gets a ctrl-C meant for gdb. The guest's lines for
 //! people appear between gdb's lines. Budgets are off, since code without optimization takes many
@@ -68,7 +68,7 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 ",
 });
 
-/// The options missing from `run`.
+/// The options that `run` does not have.
 mod own {
     use crate::options::{OptionValue, options};
 
@@ -104,7 +104,7 @@ fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
     let commands = own.path(own::name::COMMANDS);
     if let Some(path) = commands {
         let place = files::shown_path(path);
-        // Read now to see whether that works; gdb itself would complain only after the boot.
+        // Read now to see whether it can be read; gdb itself would complain only after the boot.
         files::read(path)
             .map_err(|why| Refusal::Usage(format!("`--commands {place}` {why}; name another")))?;
     }

@@ -130,7 +130,7 @@ impl KeptFiles {
         if outcome.ending == QemuEnd::Guest(Status::Usage) {
             return Ok(Vec::new());
         }
-        // Bytes nobody asked for come from a crash.
+        // Bytes that nobody asked for come from a crash.
         if self.word.is_none() {
             return self.write_crash(&outcome.sent);
         }
@@ -297,8 +297,8 @@ fn but_for(bytes: &[u8]) -> String {
     }
 }
 
-/// Writes and announces the files wanted of a run. A failed run leaves only the record, without a
-/// warning about an unused wire.
+/// Writes and announces the files wanted of a run, and serves the record to its page. Only after a
+/// good run, warns of a wire that was never used.
 pub(super) fn write(
     options: &Arguments,
     kept: &KeptFiles,

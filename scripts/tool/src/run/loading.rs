@@ -16,7 +16,7 @@ pub(super) fn chosen(options: &Arguments) -> Loader {
     named.unwrap_or(Loader::Pvh)
 }
 
-/// Returns the first option that needs a PC, after the feature missing from a microvm.
+/// Returns the feature that a microvm lacks and an option needs, with the option's name.
 fn needs_pc(options: &Arguments) -> Option<(&'static str, &'static str)> {
     let stick = ("no firmware that boots from a stick", "boot");
     let boots = chosen(options).needs_stick().then_some(stick);
@@ -69,7 +69,7 @@ pub(super) fn check(options: &Arguments, mode: Option<Mode>) -> Result<(), Strin
     Ok(())
 }
 
-/// Chooses the memory in MiB: the person's choice or the usual amount. Both must suffice for the
+/// Chooses the memory in MiB: the person's choice or the usual amount. Either must suffice for the
 /// stacks and tables of all processors.
 pub(super) fn choose_memory(
     options: &Arguments,

@@ -20,7 +20,7 @@ use crate::program;
 use crate::qemu::{self, Mode, QemuEnd};
 use crate::run_options::name;
 
-/// Options about QEMU, its guest, or the bare-metal kernel only.
+/// Options that concern only QEMU, its guest, or the bare-metal kernel.
 const FOREIGN: [OptionName; 10] = [
     name::BOOT,
     name::DEVICE,
@@ -45,7 +45,7 @@ const NOT_IN_GUEST: [OptionName; 6] = [
 ];
 const ONLY_IN_GUEST: [OptionName; 2] = [name::MODE, name::BUSY];
 
-/// Options without use in virtual time, besides those of the bare machine.
+/// Options that are of no use in virtual time, besides those of the bare machine.
 const NOT_ON_HOST: [OptionName; 11] = [
     name::BUSY,
     name::CONSOLE,
@@ -60,7 +60,7 @@ const NOT_ON_HOST: [OptionName; 11] = [
     name::REPLAY,
 ];
 
-/// The additional time for a guest, in which Linux starts.
+/// The additional time for a guest, as Linux must start first.
 const START: Duration = Duration::from_secs(120);
 
 /// Reports whether the options ask for Linux, or at least for a program of this computer.
@@ -107,7 +107,7 @@ pub(super) fn settle(options: &Arguments) -> Result<Arguments, Refusal> {
             `--on linux` give `--input -`";
         return Err(Refusal::Usage(line.into()));
     }
-    // An explicit number of cores holds, even if this computer has fewer.
+    // An explicit number of cores is kept, even if this computer has fewer.
     if options.is_given(name::CORES) {
         return Ok(options.clone());
     }
@@ -136,7 +136,7 @@ fn settle_host(options: &Arguments) -> Result<Arguments, String> {
 /// The number of a guest's processors without `--cores`.
 const GUEST_CORES: &str = "4";
 
-/// Builds the app's program and runs it as ordered by the options.
+/// Builds the app's program and runs it as the options say.
 #[allow(clippy::too_many_lines, reason = "the steps of a run, in order")]
 pub(super) fn run_app(
     options: &Arguments,

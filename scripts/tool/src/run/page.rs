@@ -1,9 +1,9 @@
 //! Serves the page, and the growing record of a run, to this computer alone: `run --page`.
 //!
 //! The server has two routes. `/` is the page, and `/record?from=N` is the record from byte N on.
-//! The answer has two headers: `bytes:`, with the record's length, and `record:`, with `going` or,
-//! after the end of the run, when the record is complete, `over`. A complete record begins with
-//! another header than a growing record, so a page reads it anew from byte 0.
+//! The answer has two headers: `bytes:` has the record's length, and `record:` says `going`, or
+//! `over` when the run has ended and the record is complete. A complete record begins with another
+//! header than a growing record, so a page reads it anew from byte 0.
 //!
 //! A request must name this server as its host. So a page of another origin cannot read a run by a
 //! name directed to this computer; nor can such a page, by loading the record as an image, keep a

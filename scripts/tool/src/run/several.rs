@@ -5,9 +5,9 @@
 //! and the second run commits with the WCETs and overheads of the first, unless the person states
 //! them.
 //!
-//! In a folder, every file with the name ending of a DAG file is run, in the order of the names:
-//! one boot for each, or two with `--prove`, in a single table. A file refused or failed does not
-//! keep the other files from running.
+//! Every file of a folder whose name ends like a DAG file's is run, in the order of the names: one
+//! boot for each, or two with `--prove`, in a single table. A file that is refused or fails does
+//! not keep the other files from running.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ use views::record::Record;
 /// The platform's overheads, or an error in words if no trace was kept.
 type Measurement = Result<MeasuredCosts, String>;
 
-/// Proves a single file's or app's DAGs: observes, commits, compares, and prints the table.
+/// Proves the DAGs of an app or a file: observes, commits, compares, and prints the table.
 pub(super) fn run(options: &Arguments) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
     let others = [name::CONSOLE, name::GDB, name::PAGE, name::PRINT_DAG];
@@ -208,7 +208,7 @@ fn say(options: &Arguments, table: &str, lines: impl Iterator<Item = String>) {
     }
 }
 
-/// Returns the guest's word against judging bounds, for a run that only observes: its WCETs and
+/// Returns the word that keeps a guest from judging bounds while it only observes: its WCETs and
 /// overheads are not known yet.
 pub(super) fn bounds_word(options: &Arguments) -> Option<String> {
     let observes = options.text(name::PROVE) == Some(OBSERVING);

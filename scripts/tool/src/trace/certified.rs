@@ -41,7 +41,8 @@ fn theorems(run: &Run) -> Result<String, String> {
     named(&said, run.bounds_ns.iter().flatten().count())
 }
 
-/// Counts the bounds of each theorem in the output of check-witness, and expects `bounds` of them.
+/// Counts the bounds that hold by each theorem, in the output of check-witness about `bounds`
+/// bounds.
 fn named(said: &str, bounds: usize) -> Result<String, String> {
     // A refusal for only one of several clusters counts, too.
     if let Some(refused) = said.lines().find(|line| line.contains(": refused: ")) {

@@ -1,12 +1,13 @@
 //! Converts runs for Perfetto's viewer, into the Trace Event Format of Chrome's tracing.
 //!
 //! In Perfetto's words a *process* is a group of *tracks* (the format calls them threads), a
-//! *slice* is a stretch of time on a track, and an *instant* is a moment. A run becomes a group of
-//! cores, with their executions; a group for each DAG, with its moments, and its jobs on as many
-//! *lanes* as overlap; and a group of breaches.
+//! *slice* a stretch of time on a track, and an *instant* a moment. A run becomes a group of cores,
+//! with their executions; a group for each DAG, with its moments, and its jobs on as many *lanes*
+//! as overlap; and a group of breaches.
 //!
 //! Slices of a track never overlap, and appear in the order of time. Each is written as a begin and
-//! an end: viewers round durations, and slices that touch at a nanosecond must still touch.
+//! an end, because viewers round durations, and slices that touch at a nanosecond must still touch
+//! there.
 
 use sched_dag::DagId;
 use views::findings::check;

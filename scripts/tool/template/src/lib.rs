@@ -1,4 +1,4 @@
-//! The app's functions, and the DAGs of them.
+//! The app's functions, and the DAGs built from them.
 //!
 //! Nothing here knows the machine, so the same code is booted (`src/main.rs`)
 //! and tested on the host (`tests/virtual_time.rs`). Put your own functions in
@@ -11,7 +11,7 @@ use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 
-/// The time between two releases, and the time that each job has.
+/// The time between two releases, and the deadline of each job.
 pub const PERIOD: Duration = Duration::from_millis(10);
 
 /// Builds the app's DAGs, here one: `sense`, then `brake` and `steer` side by side, then `act`.
@@ -43,7 +43,7 @@ fn brake((distance,): (u32,)) -> (u32,) {
     (100 - distance,)
 }
 
-/// Steers away from an obstacle that is near.
+/// Steers away from a near obstacle.
 fn steer((distance,): (u32,)) -> (bool,) {
     work(3_500);
     (distance < 20,)
@@ -60,7 +60,7 @@ fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
     SubtaskAttributes::named(name).wcet(Duration::from_millis(wcet_ms))
 }
 
-/// Stands for a computation that takes `us` microseconds.
+/// Simulates a computation of `us` microseconds.
 fn work(us: u64) {
     execute_for(Duration::from_micros(us), Occupation::Hold);
 }

@@ -41,7 +41,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     }
 }
 
-/// Reports on the jobs of one DAG.
+/// Reports on the jobs of a DAG.
 fn report(run: &Run, name: &str) {
     let statistics = run.statistics(name);
     println!(
