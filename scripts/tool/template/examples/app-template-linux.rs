@@ -1,4 +1,4 @@
-//! The app on Linux: the same `main` as the image's, on this computer.
+//! The app as a program for Linux: the same `main` as the image's.
 
 extern crate kernel_on_linux as kernel;
 

@@ -1,5 +1,5 @@
-//! Replays a recording of the app on this computer: `--until app-template/17` shows the inputs
-//! and outputs of each subtask in a job.
+//! Replays a recording of the app on the host: `--until app-template/17`
+//! shows the inputs and outputs of each subtask in a job.
 
 use std::process::ExitCode;
 

@@ -1,8 +1,8 @@
 //! The app's functions, and the DAGs built from them.
 //!
-//! Nothing here knows the machine, so the same code is booted (`src/main.rs`)
-//! and tested on the host (`tests/virtual_time.rs`). Put your own functions in
-//! place of these; `docs/guide.md` explains each step.
+//! Nothing here knows the machine, so the same code is booted (`src/main.rs`) and tested on the
+//! host (`tests/virtual_time.rs`). Replace these functions with your own; `docs/guide.md` explains
+//! each step.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -14,8 +14,8 @@ use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 /// The time between two releases, and the deadline of each job.
 pub const PERIOD: Duration = Duration::from_millis(10);
 
-/// Builds the app's DAGs, here one: `sense`, then `brake` and `steer` side by side, then `act`.
-/// It ends after `jobs` jobs.
+/// Builds the app's DAGs, here only one: `sense`, then `brake` and `steer` side by side, then
+/// `act`. The DAG ends after `jobs` jobs.
 #[must_use]
 pub fn build(jobs: u64) -> [Dag; 1] {
     let dag = create_dag();
