@@ -1,4 +1,4 @@
-//! A camera that asks an accelerator what is in each frame, next to a control loop at 1 kHz.
+//! A camera asking an accelerator about each frame, next to a control loop at 1 kHz.
 //!
 //! | DAG | period | subtasks |
 //! |---|---|---|
@@ -6,12 +6,12 @@
 //! | `camera` | 20 ms | `capture`, `detect`, `track` |
 //! | `accelerator` | 500 us | `serve` |
 //!
-//! `detect` asks the accelerator and waits for at most 8 ms: its instance has no core meanwhile, so
-//! `control` runs on, also on one core. An answer that comes later is refused, and `track` goes on
-//! with what it knows. The accelerator is simulated by a DAG of its own, which looks for a question
-//! each 500 us and answers after a random time of 1 to 12 ms: so the app runs alike on every
-//! platform, and a bound covers whatever the accelerator does. Its answers are recorded, and a
-//! replay takes those. The code here knows no kernel.
+//! `detect` asks the accelerator, and waits for at most 8 ms. Its instance has no core meanwhile,
+//! so `control` runs on, even on a single core. A late answer is refused, and `track` goes on with
+//! the objects already known. The accelerator is simulated by its own DAG. Every 500 us this DAG
+//! looks for a question, and it answers after a random time of 1 to 12 ms. So the app runs alike on
+//! every platform, and a bound covers every behaviour of the accelerator. A recording contains the
+//! answers, and a replay takes them from there. The crate does not depend on the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -26,20 +26,20 @@ use fass::shared::{Asker, Device, DeviceDriver, Ticket, create_device};
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 use random::Random;
 
-/// The time that `detect` waits at most.
+/// The longest wait of `detect`.
 pub const LIMIT: Duration = ms(8);
 
-/// How often the accelerator looks for a question.
+/// The time between two looks of the accelerator for a question.
 const POLL: Duration = us(500);
 
-/// How the accelerator behaves.
+/// The behaviour of the accelerator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Conduct {
-    /// It answers after a random time, some too late.
+    /// The accelerator answers after a random time, sometimes too late.
     Random,
-    /// It answers twice.
+    /// The accelerator answers twice.
     Twice,
-    /// It never answers.
+    /// The accelerator never answers.
     Silent,
 }
 
@@ -48,20 +48,20 @@ pub enum Conduct {
 pub enum Detection {
     /// The accelerator's answer.
     Asks,
-    /// Nothing: a wait of no time instead.
+    /// No event: a wait of zero time instead.
     Skips,
-    /// A future that nothing ends, which is a fault.
+    /// A future that never completes, which is a fault.
     Hangs,
 }
 
-/// How often each thing has happened.
+/// The number of waits and answers with each outcome.
 #[derive(Debug, Default)]
 pub struct WaitCounts {
-    /// Frames of which the answer came in time.
+    /// Frames answered in time.
     pub answered: AtomicU64,
-    /// Frames whose wait ended by its limit.
+    /// Frames whose wait ended at its limit.
     pub late: AtomicU64,
-    /// Answers that the device's cell has given back.
+    /// Answers refused by the device: late or repeated.
     pub refused: AtomicU64,
 }
 
@@ -73,7 +73,7 @@ const fn us(us: u64) -> Duration {
     Duration::from_micros(us)
 }
 
-/// Builds the DAGs, of which `camera` ends after `frames` jobs and the others with it.
+/// Builds the DAGs. `camera` ends after `frames` jobs, and the others end with it.
 pub fn build(
     frames: u64,
     seed: u64,
@@ -177,13 +177,13 @@ struct Accelerator {
     driver: DeviceDriver<u64, u64>,
     conduct: Conduct,
     random: Random,
-    /// The question that it is at, and how many jobs of its own it still takes.
+    /// The question in hand, with the number of the accelerator's jobs until the answer.
     asked: Option<(Ticket, u64, u64)>,
     counts: Arc<WaitCounts>,
 }
 
 impl Accelerator {
-    /// Takes a question, or goes on with the one that it has taken.
+    /// Accepts a question, or continues with the question in hand.
     fn serve(&mut self) {
         let Some((ticket, frame, left)) = self.asked.take() else {
             if let Some((ticket, frame)) = self.driver.question() {

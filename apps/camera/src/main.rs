@@ -1,4 +1,4 @@
-//! Boots into a camera that asks an accelerator, and says how it went.
+//! Boots into a camera with an accelerator, and reports on the run.
 
 #![no_std]
 #![no_main]

@@ -1,4 +1,4 @@
-//! The app on Linux: the function is the image's, the machine is this computer.
+//! Runs the app on Linux: the image's own code, with the host as machine.
 
 extern crate kernel_on_linux as kernel;
 

@@ -1,4 +1,4 @@
-//! A car that keeps its distance: a radar says how far the car ahead is, and a motor takes speeds.
+//! A car keeping its distance: a radar measures the gap to the car ahead, and a motor takes speeds.
 //!
 //! Both are at the ends of one wire. The radar sends lines such as `gap 2350`, in cm; the motor
 //! gets lines such as `speed 1235`, in cm/s. The DAG `cruise` has three subtasks:
@@ -9,9 +9,10 @@
 //! | `control` | the gap | a speed |
 //! | `drive`, the sink | the speed | a line on the wire |
 //!
-//! It runs every 10 ms, or, released by packets, at most so often. Without a fresh gap the car
-//! stops. The DAG `watch` looks every 10 ms whether the wire has a link, and enters the mode `lost`
-//! without: then the DAG `brake` runs in place of `cruise`. The code here knows no kernel.
+//! `cruise` runs every 10 ms or, if released by packets, at most so often. Without a fresh gap the
+//! car stops. The DAG `watch` checks every 10 ms whether the wire has a link. Without a link,
+//! `watch` enters the mode `lost`, and the DAG `brake` runs in place of `cruise`. The crate does
+//! not depend on the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -27,7 +28,7 @@ use fass::{Dag, SubtaskAttributes, create_dag};
 /// The time between two jobs, or the least time.
 pub const PERIOD: Duration = Duration::from_millis(10);
 
-/// For how long a gap is fresh.
+/// The time for which a gap is fresh.
 const FRESH_NS: u64 = 50_000_000;
 
 /// The gap to keep, in cm, and the highest speed, in cm/s.
@@ -53,7 +54,7 @@ fn decode(line: &[u8]) -> Option<i32> {
 pub fn build(wire: &Wire, releases: ReleaseSource, jobs: u64) -> [Dag; 3] {
     let (cruise, brake) = (build_cruise(wire, releases, jobs), build_brake(jobs));
     let watch = build_watch(wire, &cruise, &brake, jobs);
-    // Next to each other in a cluster are the two of the modes, where there are two clusters.
+    // Where there are two clusters, the DAGs of the two modes share a cluster.
     [cruise, watch, brake]
 }
 
@@ -116,7 +117,7 @@ fn build_brake(jobs: u64) -> Dag {
     brake
 }
 
-/// Watches the link, and enters the mode for it.
+/// Builds the DAG that watches the link and enters the matching mode.
 fn build_watch(wire: &Wire, cruise: &Dag, brake: &Dag, jobs: u64) -> Dag {
     let modes = Modes::new();
     let following = modes.mode("following", &[cruise]);
@@ -130,7 +131,7 @@ fn build_watch(wire: &Wire, cruise: &Dag, brake: &Dag, jobs: u64) -> Dag {
         .writes(&["link"])
         .register(taking("look", 50));
     let mut was_up = true;
-    // Not in the source, which a replay leaves out.
+    // The source cannot decide: a replay leaves sources out.
     let decide = move |modes: (ModeSwitch<'_>, ModeSwitch<'_>), (is_up,): (bool,)| {
         let (mut following, mut lost) = modes;
         match (was_up, is_up) {

@@ -1,4 +1,4 @@
-//! Boots into a car that keeps its distance, and says how it went.
+//! Boots into a car keeping its distance, and reports on the run.
 
 #![no_std]
 #![no_main]

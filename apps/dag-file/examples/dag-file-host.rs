@@ -1,4 +1,4 @@
-//! The app in virtual time: the function is the image's, and no machine is below it.
+//! Runs the app in virtual time: the image's own code, without a machine below.
 
 extern crate alloc;
 extern crate kernel_on_host as kernel;

@@ -61,7 +61,7 @@ pub struct SensorReadings {
     pub up: Vector,
     /// The direction to the north, in the body's axes.
     pub north: Vector,
-    /// Above the ground.
+    /// The height above the ground.
     pub height: f64,
 }
 
@@ -83,7 +83,7 @@ impl Airframe {
         }
     }
 
-    /// Moves on by `seconds`.
+    /// Moves the airframe on by `seconds`.
     pub fn step(&mut self, force: RotorForce, seconds: f64) {
         let Pose {
             position,
@@ -102,7 +102,7 @@ impl Airframe {
         *angles = turned(*angles, *rates, seconds);
     }
 
-    /// Measures.
+    /// Measures the airframe's motion, with noise.
     pub fn measure(&self, noise: &mut Random) -> SensorReadings {
         let mut noisy = |value: f64, size: f64| value + size * draw(noise);
         let rotation = rotation(self.pose.angles);
@@ -131,7 +131,7 @@ pub fn rotation([roll, pitch, yaw]: Vector) -> [Vector; 3] {
     ]
 }
 
-/// Returns angles after a time of turning about the body's axes.
+/// Returns the angles after turning about the body's axes for some seconds.
 pub fn turned([roll, pitch, yaw]: Vector, rates: Vector, seconds: f64) -> Vector {
     let ((sr, cr), (_, cp)) = (sin_cos(roll), sin_cos(pitch));
     let across = rates[1] * sr + rates[2] * cr;

@@ -1,8 +1,8 @@
-//! The attitude loop: from what the sensors measure to what the rotors do.
+//! The attitude loop: from the sensors' measurements to the rotors' force.
 //!
-//! The angles are those of the gyroscopes, drawn slowly towards those of the directions upwards
-//! and to the north (a complementary filter). A controller of the position asks for an
-//! acceleration, thus for angles; one of the angles asks for torques.
+//! The gyroscopes give the angles, drawn slowly towards the angles of the directions upwards and to
+//! the north (a complementary filter). The position controller asks for an acceleration, thus for
+//! angles; the angle controller asks for torques.
 
 use maths::{atan2, sin_cos, sqrt};
 
@@ -17,14 +17,14 @@ pub struct AttitudeEstimate {
     pub angles: Vector,
     /// About the body's axes, in rad/s.
     pub rates: Vector,
-    /// Above the ground.
+    /// The height above the ground.
     pub height: f64,
     /// Upwards, in m/s.
     pub climb: f64,
 }
 
 impl AttitudeEstimate {
-    /// Begins with measurements, of an airframe that does not climb.
+    /// Starts from measurements, for an airframe without climb.
     pub fn new(measured: &SensorReadings) -> Self {
         Self {
             angles: angles_of(measured),
@@ -34,7 +34,7 @@ impl AttitudeEstimate {
         }
     }
 
-    /// Takes measurements in.
+    /// Updates the estimate with new measurements.
     pub fn update(self, measured: &SensorReadings) -> Self {
         const TRUST: f64 = 0.02;
         let mut angles = turned(self.angles, measured.rates, SECONDS);
@@ -52,7 +52,7 @@ impl AttitudeEstimate {
     }
 }
 
-/// The angles of the directions upwards and to the north.
+/// Returns the angles of the directions upwards and to the north.
 fn angles_of(measured: &SensorReadings) -> Vector {
     let [x, y, z] = measured.up;
     let roll = atan2(y, z);
@@ -64,13 +64,13 @@ fn angles_of(measured: &SensorReadings) -> Vector {
     [roll, pitch, atan2(-left, ahead)]
 }
 
-/// The turn from one angle to another, at most half of one.
+/// Returns the turn from one angle to another, at most half a turn.
 fn difference(to: f64, from: f64) -> f64 {
     let (sin, cos) = sin_cos(to - from);
     atan2(sin, cos)
 }
 
-/// Decides what the rotors do to reach a goal. Without a fix the airframe stays level.
+/// Decides the rotors' force for reaching a goal. Without a fix the airframe stays level.
 pub fn control(
     estimate: &AttitudeEstimate,
     fix: Option<(PositionFix, f64)>,

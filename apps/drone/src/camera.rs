@@ -1,8 +1,8 @@
-//! The camera, which looks down, and what it sees of the beacon at the world's origin.
+//! The camera, looking down, and its view of the beacon at the world's origin.
 //!
-//! An image is drawn from the true pose, as optics would. From there on only the image counts:
-//! the brightest region's centre is a ray, and the ray, turned by the believed angles and as long
-//! as the believed height says, is the place.
+//! An image is drawn from the true pose, as optics would draw it. From there on only the image
+//! counts: the centre of the brightest region gives a ray. The ray, turned by the believed angles
+//! and as long as the believed height says, gives the place.
 
 use crate::airframe::{Pose, Vector, rotation};
 use crate::attitude::AttitudeEstimate;
@@ -21,10 +21,10 @@ const FOCAL: f32 = 16.0;
 /// The image's centre.
 const CENTRE: (f32, f32) = (15.5, 11.5);
 
-/// Less is not the beacon.
+/// The least brightness of the beacon.
 const THRESHOLD: u8 = 40;
 
-/// Where the camera believes the airframe to be, over the ground.
+/// The airframe's place over the ground, as the camera believes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PositionFix {
     /// North and west of the beacon.
@@ -61,7 +61,7 @@ pub fn capture(pose: &Pose) -> Image {
     image
 }
 
-/// Finds the beacon's column and row from the image's centre, if it is there.
+/// Finds the beacon's column and row from the image's centre, if the beacon is in sight.
 pub fn detect(image: &Image) -> Option<(f32, f32)> {
     let (mut sum, mut columns, mut rows) = (0.0_f32, 0.0_f32, 0.0_f32);
     for (index, pixel) in (0_u16..).zip(image) {
@@ -76,12 +76,12 @@ pub fn detect(image: &Image) -> Option<(f32, f32)> {
     (sum > 0.0).then(|| (columns / sum, rows / sum))
 }
 
-/// The column and row of a pixel.
+/// Returns the column and row of a pixel.
 fn column_and_row(index: u16) -> (f32, f32) {
     (f32::from(index % SIZE.0), f32::from(index / SIZE.0))
 }
 
-/// Returns where the airframe is if the beacon is seen there.
+/// Returns the airframe's place, given the beacon's place in the image.
 pub fn locate((column, row): (f32, f32), estimate: &AttitudeEstimate) -> [f64; 2] {
     let ray: Vector = [f64::from(column / FOCAL), f64::from(row / FOCAL), -1.0];
     let [x, y, z] = rotation(estimate.angles)
@@ -91,7 +91,7 @@ pub fn locate((column, row): (f32, f32), estimate: &AttitudeEstimate) -> [f64; 2
 }
 
 impl PositionFix {
-    /// Takes a place in that was seen `seconds` after the one before (an alpha-beta filter).
+    /// Updates the fix with a place seen `seconds` after the previous place (an alpha-beta filter).
     pub fn update(self, seen: [f64; 2], seconds: f64) -> Self {
         let mut fix = self;
         for (axis, seen) in seen.into_iter().enumerate() {

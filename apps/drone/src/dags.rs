@@ -1,4 +1,4 @@
-//! The DAGs, and what flows between them.
+//! The DAGs, and the values flowing between them.
 
 use core::time::Duration;
 
@@ -14,9 +14,9 @@ use crate::attitude::{AttitudeEstimate, control};
 use crate::camera::{Image, PositionFix, capture, detect, locate};
 use crate::{FRAME, Flight, PERIOD, SECONDS, Workload};
 
-/// The WCETs in microseconds: three times and more what was observed on four cores in mode
-/// `deterministic`, where all of them share one clock (`./scripts/run --app drone --cores 4`).
-/// The images' have room for a build without optimization.
+/// The WCETs in microseconds: at least three times the times observed on four cores in mode
+/// `deterministic`, where all cores share one clock (`./scripts/run --app drone --cores 4`). The
+/// WCETs for images have room for a build without optimization.
 pub const WCETS: [(&str, u64); 12] = [
     ("measure", 60),
     ("estimate", 60),
@@ -32,7 +32,7 @@ pub const WCETS: [(&str, u64); 12] = [
     ("alarm", 60),
 ];
 
-/// Where to fly, above the beacon's surroundings.
+/// The places to fly to, above the beacon's surroundings.
 const WAYPOINTS: [Vector; 4] = [
     [1.0, 0.0, 3.0],
     [1.0, 1.0, 3.0],
@@ -40,25 +40,25 @@ const WAYPOINTS: [Vector; 4] = [
     [0.0, 0.0, 3.0],
 ];
 
-/// Where to wait for the first decision.
+/// The place to wait for the first decision.
 const START: Vector = [0.0, 0.0, 3.0];
 
-/// How high the airframe is when it stands.
+/// The height of the standing airframe, in m.
 const GROUND: f64 = 0.5;
 
-/// How far the drone comes down between two jobs of `descent`.
+/// The loss of height between two jobs of `descent`, in m.
 const STEP: f64 = 0.075;
 
-/// The battery's charge at first, in thrust and time; to hover takes 11.8 a second.
+/// The battery's initial charge, as thrust times time in N s; hovering takes 11.8 a second.
 const CHARGE: f64 = 130.0;
 
-/// The drone's DAGs, and what is known of the flight when they have ended.
+/// The drone's DAGs, and the figures of the flight when the DAGs have ended.
 pub struct DroneSystem {
-    /// In the order of the table above.
+    /// The DAGs, in the order of the table above.
     pub dags: [Dag; 7],
-    /// With fewer percent of the charge left, the drone comes down.
+    /// The percentage of charge below which the drone comes down.
     pub reserve: Parameter<u32>,
-    /// The figures.
+    /// The figures of the flight.
     pub flight: Flight,
 }
 
@@ -144,7 +144,7 @@ impl Workload {
         type Ahead<'a> = (Seen<'a, PositionFix>, Seen<'a, Vector>, Seen<'a, f64>);
         let control = move |(fix, goal, height): Ahead<'_>, (estimate,): (AttitudeEstimate,)| {
             self.spend("control");
-            // The landing: without the camera, which rests.
+            // A landing has no fix: the camera rests.
             if let Some(height) = height {
                 return (control(&estimate, None, [0.0, 0.0, *height.value]),);
             }
@@ -193,7 +193,7 @@ impl Workload {
 
         // Beyond its WCET, frames are skipped; beyond its budget the camera is at fault.
         let slow = taking("detect").budget(Duration::from_millis(100));
-        // Made anew, it counts its frames anew, and fails again when it has seen so many.
+        // A restart counts frames from 0, so `detect` fails again after as many.
         let make = move || {
             let mut frame = 0;
             move |(image,): (Image,)| {
@@ -340,7 +340,7 @@ impl Workload {
             .register(taking("watch"));
     }
 
-    /// Takes a subtask's WCET, if that is what subtasks do.
+    /// Executes for a subtask's WCET, if the workload says so.
     fn spend(self, subtask: &str) {
         if self.takes_wcet {
             execute_for(wcet(subtask), Occupation::Hold);
@@ -359,10 +359,10 @@ struct Views {
     height: Latest<f64>,
 }
 
-/// The pose that an image was taken from, and the estimate at that time.
+/// The true pose and the estimate at the time of an image.
 type Taken = (Pose, Option<AttitudeEstimate>);
 
-/// The latest value, if there has been one.
+/// The latest value, if any exists yet.
 type Seen<'a, T> = Option<Sample<'a, T>>;
 
 fn wcet(subtask: &str) -> Duration {

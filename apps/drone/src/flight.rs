@@ -8,7 +8,7 @@ use maths::sqrt;
 
 use crate::airframe::Pose;
 
-/// The figures of a flight. The DAGs only write them, so that they order nothing.
+/// The figures of a flight. The DAGs only write figures, so no figure orders subtasks.
 #[derive(Clone, Debug, Default)]
 pub struct Flight(Arc<FlightFigures>);
 
@@ -18,14 +18,14 @@ struct FlightFigures {
     has_landed: AtomicU64,
     frames: AtomicU64,
     fixes: AtomicU64,
-    /// The bits of numbers that are not negative, which have the numbers' order.
+    /// The bits of non-negative numbers, whose order is the numbers' order.
     most_tilt: AtomicU64,
     most_error: AtomicU64,
     height: AtomicU64,
 }
 
 impl Flight {
-    /// Returns how many waypoints were reached.
+    /// Returns the number of waypoints reached.
     pub fn waypoints(&self) -> u64 {
         self.0.waypoints.load(Relaxed)
     }
@@ -35,7 +35,7 @@ impl Flight {
         self.0.has_landed.load(Relaxed) > 0
     }
 
-    /// Returns the number of frames, and of those in which the beacon was seen.
+    /// Returns the number of frames, and the number of frames showing the beacon.
     pub fn frames(&self) -> (u64, u64) {
         (self.0.frames.load(Relaxed), self.0.fixes.load(Relaxed))
     }
@@ -45,13 +45,13 @@ impl Flight {
         f64::from_bits(self.0.most_tilt.load(Relaxed)).to_degrees()
     }
 
-    /// Returns the largest distance between a place that the camera has found and the true one,
-    /// in metres.
+    /// Returns the largest distance between a place found by the camera and the true place, in
+    /// metres.
     pub fn most_error_metres(&self) -> f64 {
         f64::from_bits(self.0.most_error.load(Relaxed))
     }
 
-    /// Returns the height of the end, in metres.
+    /// Returns the height at the end, in metres.
     pub fn height_metres(&self) -> f64 {
         f64::from_bits(self.0.height.load(Relaxed))
     }
@@ -99,7 +99,7 @@ impl fmt::Display for Flight {
     }
 }
 
-/// Rounds up. To print a number with a point takes an image 10 KB of code.
+/// Rounds up. Code to print a fraction would take 10 KB of an image.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

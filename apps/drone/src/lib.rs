@@ -1,4 +1,4 @@
-//! A drone that flies between waypoints: DAGs that compute, and close a loop.
+//! A drone flying between waypoints, with DAGs that compute and close a loop.
 //!
 //! | DAG | released | subtasks |
 //! |---|---|---|
@@ -10,19 +10,19 @@
 //! | `descent` | every 50 ms | `descend` |
 //! | `safety` | by a fault of `camera`, `battery`, `mission` or `command` | `alarm` |
 //!
-//! The airframe and what its sensors see are simulated, within `measure`, `move` and `capture`;
-//! all else is what would fly. The airframe is a *state* of `attitude`. Between the DAGs travel
-//! *latest values*: `camera` reads what `attitude` believes, `attitude` where `camera` has seen
-//! the beacon and what `command` has decided. `mission` signals a waypoint that is reached,
-//! `battery` that little is left. A frame that is not done when the next is due makes that one be
-//! skipped.
+//! The airframe and its sensors are simulated, within `measure`, `move` and `capture`; all other
+//! code would fly. The airframe is a *state* of `attitude`. *Latest values* travel between the
+//! DAGs: `camera` reads the estimate of `attitude`; `attitude` reads the place of the airframe
+//! found by `camera` and the goal decided by `command`. `mission` signals a reached waypoint,
+//! `battery` a low charge. A frame still unfinished when the next frame is due makes the DAG skip
+//! the next frame.
 //!
-//! There are two *modes*: in `flight`, `camera` and `mission` run, in `landing` `descent` does; the
-//! others run in both. `command` enters the landing for want of charge when the camera is done with
-//! its frame, `safety` at once when a fault has ended a DAG (`Dag::on_fault`). How many percent of
-//! the charge are too few is the *parameter* `reserve`.
+//! There are two *modes*: in `flight`, `camera` and `mission` run; in `landing`, `descent` runs.
+//! The others run in both. `command` enters the landing for want of charge, when the camera has
+//! finished its frame; `safety` enters the landing at once, when a fault has ended a DAG
+//! (`Dag::on_fault`). The *parameter* `reserve` says how many percent of the charge are too few.
 //!
-//! The code here knows no kernel: the tests fly it in virtual time.
+//! The crate does not depend on the kernel: the tests fly the drone in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -40,7 +40,7 @@ use core::time::Duration;
 pub use dags::{DroneSystem, WCETS};
 pub use flight::Flight;
 
-/// In m/s^2.
+/// The acceleration of gravity, in m/s^2.
 pub const GRAVITY: f64 = 9.81;
 
 /// The period of the attitude loop.
@@ -55,17 +55,17 @@ pub const FRAME: Duration = Duration::from_micros(33_333);
 /// The workload of a flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Workload {
-    /// How long the flight takes, in seconds.
+    /// The length of the flight, in seconds.
     pub seconds: u64,
     /// The seed of the sensors' noise.
     pub seed: u64,
-    /// Whether each subtask takes its WCET besides what it computes: for virtual time, where
-    /// computing takes none.
+    /// Whether each subtask takes its WCET besides computing: for virtual time, where computing
+    /// takes no time.
     pub takes_wcet: bool,
-    /// The time that `detect` takes beyond that, as it must not; zero in a sound flight.
+    /// The time that `detect` takes beyond its work, as an error; zero in a sound flight.
     pub delay: Duration,
-    /// After how many frames `detect` panics; `None` in a sound flight.
+    /// The number of frames after which `detect` panics; `None` in a sound flight.
     pub fault_at: Option<u64>,
-    /// How many such faults cost a frame each, before one brings the drone down.
+    /// The number of such faults that cost only a frame each; the next fault brings the drone down.
     pub survived: u32,
 }

@@ -1,4 +1,4 @@
-//! Boots into a flight and says how it went.
+//! Boots into a flight, and reports on the flight.
 
 #![no_std]
 #![no_main]

@@ -1,13 +1,14 @@
-//! An echo: what comes on a wire goes back to whom it came from.
+//! An echo: returns every packet on a wire to its sender.
 //!
 //! | subtask | takes | gives |
 //! |---|---|---|
-//! | `hear`, the source | the packets that have come, into the state `batch` | their number |
-//! | `sum` | their number | how many bytes they have |
-//! | `tell`, the sink | that | the packets, on the wire |
+//! | `hear`, the source | the packets received, into the state `batch` | their number |
+//! | `sum` | the number of packets | their bytes in total |
+//! | `tell`, the sink | the number of bytes | the packets, on the wire |
 //!
-//! The packets themselves stay in the DAG's state, so no edge copies them. The code here knows no
-//! kernel.
+//! The packets themselves stay in the DAG's state, so no edge copies them. The crate does not
+//! depend on
+//! the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -22,8 +23,7 @@ use core::time::Duration;
 use fass::shared::{Framing, Received, Sender, Wire, WireOptions};
 use fass::{Dag, SubtaskAttributes, create_dag};
 
-/// The most packets of a job, and the most bytes of one: as many as a frame of Ethernet has room
-/// for.
+/// The most packets of a job, and the most bytes of a packet: the room in a frame of Ethernet.
 const MOST: usize = 16;
 const LONGEST: usize = 1472;
 
@@ -67,8 +67,9 @@ pub fn wire() -> Wire {
     Wire::with("echo", options)
 }
 
-/// Builds the DAGs. Two jobs are `distance` apart at least, and take at most three quarters of it.
-/// The run ends after so many milliseconds; without, it does not end by itself.
+/// Builds the DAGs. Two jobs are at least `distance` apart, and a job takes at most three quarters
+/// of `distance`. The run ends after the given number of milliseconds; with 0, the run does not end
+/// by itself.
 pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
     let taking = |name, share| SubtaskAttributes::named(name).wcet(distance / share);
     let echo = create_dag();
@@ -78,7 +79,7 @@ pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
         batch.count = 0;
         for packet in &mut batch.packets {
             let taken = packets.look(|bytes, _, from| {
-                // The wire takes no longer ones.
+                // The wire accepts no longer packet.
                 packet.length = bytes.len().min(LONGEST);
                 packet.bytes[..packet.length].copy_from_slice(&bytes[..packet.length]);
                 packet.from = from;

@@ -1,4 +1,4 @@
-//! Boots into an echo, and says how it went.
+//! Boots into an echo, and reports on the run.
 
 #![no_std]
 #![no_main]
@@ -13,7 +13,7 @@ kernel::entry!(main);
 
 fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
-    // Not by a number of jobs: packets that come together are one job's.
+    // Time ends the run, not a number of jobs: packets arriving together share a job.
     let milliseconds = options.number("ms", 0..=86_400_000, 0)?;
     let distance = Duration::from_micros(options.number("us", 50..=1_000_000, 1_000)?);
     let wire = wire();

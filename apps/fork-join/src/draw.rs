@@ -8,8 +8,8 @@ use crate::WCET;
 
 /// The execution times of one parallel subtask, job by job.
 ///
-/// Each parallel subtask has its own generator, so what one draws does not depend on when
-/// another runs.
+/// Each parallel subtask has its own generator, so its draws do not depend on when another subtask
+/// runs.
 #[derive(Clone, Debug)]
 pub struct ExecutionTimes {
     random: Random,
@@ -22,7 +22,7 @@ impl ExecutionTimes {
         Self::up_to(WCET, seed, branch)
     }
 
-    /// Starts one whose longest time, at least 1 ms, is not that of the paper.
+    /// Starts a sequence whose longest time, at least 1 ms, differs from the paper's.
     pub fn up_to(longest: Duration, seed: u64, branch: usize) -> Self {
         let seed = nth(seed, branch as u64);
         Self {
@@ -31,7 +31,7 @@ impl ExecutionTimes {
         }
     }
 
-    /// Draws the next time: uniform from 1 ms to the longest, which is 50 ms in the paper.
+    /// Draws the next time: uniform from 1 ms to the longest, 50 ms in the paper.
     pub fn next_time(&mut self) -> Duration {
         let drawn = self.random.within(1_000_000..=self.longest_ns);
         Duration::from_nanos(drawn)

@@ -1,8 +1,8 @@
-//! How execution times are spent: simulated, or by computing.
+//! Two ways to spend an execution time: simulating and computing.
 //!
-//! A computation is to take as long as was drawn *with a core for itself*: the pace of one
-//! core is measured before anything else runs. Next to others it may take longer, as where
-//! instructions are counted, or memory is shared.
+//! A computation takes the drawn time *on a core of its own*: the pace of one core is measured
+//! before anything else runs. Next to other subtasks a computation may take longer, for instance
+//! where instructions are counted or memory is shared.
 
 use core::hint::black_box;
 use core::time::Duration;
@@ -11,12 +11,12 @@ use fass::Occupation;
 
 use crate::compute;
 
-/// How a parallel subtask spends its execution time.
+/// The way in which a parallel subtask spends its execution time.
 #[derive(Clone, Copy, Debug)]
 pub enum ExecutionWork {
-    /// It occupies its core, and its execution is simulated.
+    /// The subtask occupies its core, and its execution is simulated.
     Simulate(Occupation),
-    /// It computes.
+    /// The subtask computes.
     Compute(CorePace),
 }
 
@@ -30,7 +30,7 @@ impl ExecutionWork {
     }
 }
 
-/// How much a core that is alone computes in a time, and what comes out of it.
+/// The pace of a core without other work: the time of a round of computing, and the round's result.
 #[derive(Clone, Copy, Debug)]
 pub struct CorePace {
     round_ns: u64,
@@ -38,13 +38,13 @@ pub struct CorePace {
 }
 
 impl CorePace {
-    /// Of every round.
+    /// The seed of every round.
     const SEED: u64 = 1;
 
     /// Measures this core's pace.
     pub fn measure() -> Self {
         const ROUNDS: u64 = 100;
-        // For the first time code and data come from further away.
+        // The first round is slower: its code and data are not in the caches yet.
         let result = compute(1, Self::SEED);
         let start_ns = fass::now_ns();
         for _ in 0..ROUNDS {
@@ -57,16 +57,16 @@ impl CorePace {
         }
     }
 
-    /// Returns how long a round takes.
+    /// Returns the time of a round, in nanoseconds.
     pub const fn round_ns(self) -> u64 {
         self.round_ns
     }
 
-    /// Computes what takes this time on a core that is alone, in whole rounds.
+    /// Computes for `time`, as measured on a core without other work, in whole rounds.
     ///
     /// # Panics
     ///
-    /// If a result is wrong: something was lost while others had the core.
+    /// If a result is wrong: registers or memory were damaged while other code had the core.
     pub fn compute_for(self, time: Duration) {
         let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         for _ in 0..ns.div_ceil(self.round_ns) {

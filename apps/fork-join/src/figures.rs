@@ -9,7 +9,7 @@ use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::Instance;
 
-/// The names of latencies, in the table and in the machine line.
+/// The names of the latencies, in the table and in the machine line.
 const LATENCIES: [(&str, &str); 4] = [
     ("join latency", "join_latency_ns"),
     ("join to start", "join_to_start_ns"),
@@ -26,7 +26,7 @@ pub(crate) struct RunFigures {
     deadline_misses: u64,
     allocations: u64,
     first_release_ns: u64,
-    /// The first job of which the times are left.
+    /// The first job whose times are still recorded.
     first_recorded_job: u64,
     /// In the order of [`LATENCIES`].
     latencies: [Distribution; 4],
@@ -125,7 +125,7 @@ impl RunFigures {
         }
     }
 
-    /// Says what is wrong with the run, if anything is.
+    /// Returns a complaint about the run, if anything is wrong.
     pub(crate) fn complaint(&self) -> Option<String> {
         let (jobs, joins) = (self.jobs, self.joins);
         let wrong = match (self.violations, self.allocations) {

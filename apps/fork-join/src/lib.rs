@@ -1,13 +1,12 @@
 //! The paper's workload: one source -> N parallel subtasks -> one sink.
 //!
-//! Every 25 ms the source starts a job. Each of the N parallel subtasks executes
-//! for a time drawn uniformly from 1 to 50 ms; the sink joins them. As a parallel
-//! subtask's mean load is 25.5 / 25, backlogs grow slowly however many cores there
-//! are, and deadlines come to be missed: that is the workload's nature, not an
-//! error. An error is a *mixed join*: a sink that receives values of different
-//! jobs, which [`JoinCount`] counts and which must not happen.
+//! The source starts a job every 25 ms. Each of the N parallel subtasks executes for a time drawn
+//! uniformly from 1 to 50 ms; the sink joins them. The mean load of a parallel subtask is 25.5 /
+//! 25, so backlogs grow slowly, however many cores there are, and in time jobs miss their
+//! deadlines. Such misses are the workload's nature, not an error. An error is a *mixed join*: a
+//! sink receiving values of different jobs. [`JoinCount`] counts mixed joins; there must be none.
 //!
-//! The code here knows no kernel: the tests run it in virtual time.
+//! The crate does not depend on the kernel: the tests run the workload in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -32,25 +31,24 @@ pub use work::compute;
 /// The time between two jobs.
 pub const PERIOD: Duration = Duration::from_millis(25);
 
-/// The time that a job is meant to take: four periods, so that deadlines are met
-/// until the backlog has grown.
+/// The relative deadline of a job: four periods, so jobs meet their deadlines until the backlog has
+/// grown.
 pub const RELATIVE_DEADLINE: Duration = Duration::from_millis(100);
 
-/// The longest time that a parallel subtask executes for.
+/// The longest execution time of a parallel subtask.
 pub const WCET: Duration = Duration::from_millis(50);
 
-/// The longest time that the source or the sink executes for, with much room:
-/// they only count.
+/// The longest execution time of the source or the sink, with much room: both only count.
 pub const WCET_OF_ENDS: Duration = Duration::from_millis(1);
 
-/// After this time any subtask is at fault. Generous, because on a busy host a
-/// virtual processor can lose its core to others for long.
+/// The budget of every subtask, after which the subtask is at fault. The budget is generous,
+/// because a virtual processor on a busy host can lose its core to others for long.
 pub const BUDGET: Duration = Duration::from_secs(5);
 
 /// The most jobs in flight.
 pub const MOST_IN_FLIGHT: u32 = 256;
 
-/// The most parallel subtasks: the sink's arguments are a tuple.
+/// The most parallel subtasks, limited because the sink's arguments are a tuple.
 pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 
 /// The workload of a fork-join run.
@@ -58,22 +56,21 @@ pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 pub struct Workload {
     /// The number N of parallel subtasks, 1 to [`MOST_PARALLEL`].
     pub parallel: usize,
-    /// The longest time that a parallel subtask executes for; [`WCET`] in the paper.
+    /// The longest execution time of a parallel subtask; [`WCET`] in the paper.
     pub longest: Duration,
-    /// The number of jobs; 0: without end.
+    /// The number of jobs; 0 for a run without end.
     pub jobs: u64,
     /// The seed of the execution times.
     pub seed: u64,
-    /// How execution times are spent.
+    /// How the parallel subtasks spend their execution times.
     pub work: ExecutionWork,
 }
 
 impl Workload {
-    /// Builds the DAG and the counts that its sink keeps.
+    /// Builds the DAG, and the counts kept by its sink.
     ///
-    /// As many jobs may be in flight as there are, up to 256: the backlog of the
-    /// slowest parallel subtask, some 130 jobs after 2000, must not hold back the
-    /// releases.
+    /// As many jobs may be in flight as there are, up to 256: the slowest parallel subtask, behind
+    /// by some 130 jobs after 2000, must not hold back the releases.
     ///
     /// # Panics
     ///

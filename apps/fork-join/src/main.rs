@@ -1,4 +1,4 @@
-//! Boots into the fork-join workload and reports what it saw.
+//! Boots into the fork-join workload, and reports its figures.
 
 #![no_std]
 #![no_main]
@@ -64,12 +64,12 @@ fn main(machine: &Machine) -> Result<(), AppError> {
         .map_or(Ok(()), |text| Err(AppError::Failure(text)))
 }
 
-/// Reads the app's words of the command line.
+/// Reads the app's options from the command line.
 fn workloads(machine: &Machine) -> Result<Vec<Workload>, AppError> {
     let options = machine.options();
     let most_parallel = MOST_PARALLEL as u64;
     let subtasks = options.numbers("subtasks", 1..=most_parallel, &[2, 4, 6])?;
-    // Without end only where a person can end it.
+    // Only a person at the console can end a run without end.
     let least_jobs = u64::from(!machine.has_console());
     let jobs = options.number("jobs", least_jobs..=1_000_000, 200)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;

@@ -12,8 +12,9 @@ use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS};
 
 /// Calls a macro with the rows `1: a;`, `2: a b;` and so on to 16: a number and as many names.
 ///
-/// The inputs of a subtask are a tuple, and the number of its elements is part of its type. To
-/// choose the number at run time, each arity must be written out; this table does it for all.
+/// The inputs of a subtask are a tuple, and the number of elements is part of the tuple's type. To
+/// choose the number at run time, each arity must be written out; the table here does so for all
+/// users.
 #[macro_export]
 macro_rules! each_arity {
     ($rows:ident) => {
@@ -38,7 +39,7 @@ macro_rules! each_arity {
     };
 }
 
-/// How many joins the sink has seen.
+/// The number of joins, and of mixed joins.
 #[derive(Clone, Debug, Default)]
 pub struct JoinCount(Arc<SinkCounts>);
 
@@ -54,8 +55,8 @@ impl JoinCount {
         self.0.total.load(Ordering::Relaxed)
     }
 
-    /// Returns the number of joins whose values were not all of the job that
-    /// was to be joined; the model allows none.
+    /// Returns the number of joins with a value from a job other than the job to be joined; the
+    /// model allows none.
     pub fn mixed(&self) -> u64 {
         self.0.mixed.load(Ordering::Relaxed)
     }

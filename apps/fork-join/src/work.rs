@@ -1,21 +1,21 @@
-//! Work that a processor really does: a product of matrices, a sort, bytes in memory.
+//! Real work for a processor: a product of matrices, a sort, bytes in memory.
 //!
-//! A simulated execution ([`fass::execute_for`]) halts its core or watches the clock. Code that
-//! computes does neither: it never waits, and has its processor until somebody takes it
-//! away. [`compute`] is such work, in *rounds* that are all alike. Its result depends on
-//! everything it has done, so that a register or a byte that goes wrong shows.
+//! A simulated execution ([`fass::execute_for`]) halts its core or watches the clock. Computing
+//! code does neither: it never waits, and keeps its processor until somebody takes the processor
+//! away. [`compute`] is such work, in *rounds* all alike. The result depends on all of the work, so
+//! a corrupted register or byte shows.
 
 use core::hint::black_box;
-/// The matrices' rows and columns.
+/// The number of rows, and of columns, of a matrix.
 const SIDE: usize = 8;
 
-/// How many numbers are sorted.
+/// The number of sorted numbers.
 const NUMBERS: usize = 64;
 
-/// How many bytes are moved.
+/// The number of moved bytes.
 const BYTES: usize = 1024;
 
-/// Does so many rounds of work. The same arguments give the same result.
+/// Does the given number of rounds of work. Equal arguments give equal results.
 pub fn compute(rounds: u64, seed: u64) -> u64 {
     (0..rounds).fold(seed, |state, _| round(black_box(state)))
 }
@@ -49,7 +49,7 @@ fn multiply(random: &mut u64) -> u64 {
     diagonal.sum::<f64>().to_bits()
 }
 
-/// Sorts numbers, and mixes them in their order.
+/// Sorts numbers, and mixes them in sorted order.
 fn sort(random: &mut u64) -> u64 {
     let mut numbers: [u32; NUMBERS] = core::array::from_fn(|_| next(random));
     // By insertion: the library's sort would take 3 KB of the image.
@@ -66,7 +66,7 @@ fn sort(random: &mut u64) -> u64 {
     })
 }
 
-/// Writes bytes, moves them within their buffer, and hashes what is there then (FNV-1a).
+/// Writes bytes, moves some of them within their buffer, and hashes the buffer (FNV-1a).
 fn move_bytes(seed: u64) -> u64 {
     let mut bytes = [0_u8; BYTES];
     for (word, place) in (0..).zip(bytes.chunks_exact_mut(8)) {

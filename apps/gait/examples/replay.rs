@@ -1,4 +1,4 @@
-//! Replays a recorded walk on the host; `--until gait/JOB` shows what each subtask got and gave.
+//! Replays a recorded walk on the host; `--until gait/JOB` shows each subtask's inputs and outputs.
 
 use std::error::Error;
 use std::process::ExitCode;

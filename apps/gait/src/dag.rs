@@ -12,18 +12,18 @@ use recording::{Mismatch, Recording};
 use crate::filter::{Quaternion, START, after, conjugate, product};
 use crate::{DAG, PERIOD, Sample, Sensor, TOPIC};
 
-/// Each WCET: several times what was observed on two cores in mode `deterministic`.
+/// Each WCET: several times the times observed on two cores in mode `deterministic`.
 const WCET: Duration = Duration::from_micros(50);
 
-/// Takes what one sensor measured.
+/// Selects the measurements of one sensor.
 type Take = fn(&Sample) -> &Sensor;
 
-/// Builds the DAG, which runs the jobs of a recording up to its last sample, and the place of its
-/// results.
+/// Builds the DAG, which runs the jobs of a recording up to its last sample, and the place of the
+/// DAG's results.
 ///
 /// # Errors
 ///
-/// The recording has no samples of ours.
+/// The recording has no samples of type `Sample`.
 pub fn build(recording: &Recording<'static>) -> Result<(Dag, WalkOrientations), Mismatch> {
     let mut samples = recording.values::<Sample>(DAG, TOPIC)?;
     let jobs = samples.clone().last().map_or(0, |(job, _)| job + 1);
@@ -68,20 +68,20 @@ pub fn build(recording: &Recording<'static>) -> Result<(Dag, WalkOrientations), 
     Ok((dag, walk))
 }
 
-/// The numbers of a row: upper leg, lower leg, knee.
+/// The count of numbers in a row: upper leg, lower leg, knee.
 const OF_A_ROW: usize = 12;
 
-/// The orientations after each sample. The DAG only writes them, so that they order nothing.
+/// The orientations after each sample. The DAG only writes orientations, so they order no subtasks.
 #[derive(Clone, Debug)]
 pub struct WalkOrientations(Arc<[AtomicU64]>);
 
 impl WalkOrientations {
-    /// Makes room for the rows of so many samples.
+    /// Makes room for the rows of the given number of samples.
     pub fn new(samples: usize) -> Self {
         Self((0..samples * OF_A_ROW).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Takes a row; one for which there is no room is left out.
+    /// Stores a row; a row without room is left out.
     pub(crate) fn store(&self, row: usize, parts: [Quaternion; 3]) {
         let places = self.0.chunks_exact(OF_A_ROW).nth(row).unwrap_or_default();
         for (place, number) in places.iter().zip(parts.as_flattened()) {
@@ -89,7 +89,7 @@ impl WalkOrientations {
         }
     }
 
-    /// Returns the rows: upper leg, lower leg, knee, w, x, y and z of each.
+    /// Returns the rows: w, x, y and z of the upper leg, the lower leg and the knee.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = [f64; OF_A_ROW]> {
         (self.0.chunks_exact(OF_A_ROW))
             .map(|row| core::array::from_fn(|number| f64::from_bits(row[number].load(Relaxed))))
@@ -100,8 +100,8 @@ impl WalkOrientations {
         (self.rows()).map(|row| (2.0 * acos(row[8].abs().min(1.0))).to_degrees())
     }
 
-    /// Returns a hash of all bits (FNV-1a with 64 bits, over whole words): two walks with the
-    /// same one are the same.
+    /// Returns a hash of all bits (FNV-1a with 64 bits, over whole words): walks with equal hashes
+    /// are equal.
     pub fn digest(&self) -> u64 {
         let words = self.0.iter().map(|word| word.load(Relaxed));
         words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {

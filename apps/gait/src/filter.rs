@@ -1,8 +1,9 @@
-//! An orientation from angular rates, drawn towards where gravity and the magnetic field point.
+//! An orientation from angular rates, drawn towards the directions of gravity and the magnetic
+//! field.
 //!
-//! The filter is that of S. Madgwick, "An efficient orientation filter for inertial and
-//! inertial/magnetic sensor arrays", 2010, equations 12 to 46, with the magnetometer. The rates
-//! are integrated; a step of gradient descent corrects the drift.
+//! The filter comes from S. Madgwick, "An efficient orientation filter for inertial and
+//! inertial/magnetic sensor arrays", 2010, equations 12 to 46, with the magnetometer. The rates are
+//! integrated; a step of gradient descent corrects the drift.
 
 use maths::sqrt;
 
@@ -35,12 +36,12 @@ pub fn conjugate([w, x, y, z]: Quaternion) -> Quaternion {
     [w, -x, -y, -z]
 }
 
-/// Returns the orientation after a sample. Without a rate it stays; without an acceleration
-/// only the rates count.
+/// Returns the orientation after a sample. Without a rate the orientation stays; without an
+/// acceleration only the rates count.
 ///
 /// # Panics
 ///
-/// If a part of the sample is no number, for then no orientation after it would be one.
+/// If a part of the sample is not finite, because all later orientations would be no numbers.
 pub fn after(orientation: Quaternion, sensor: &Sensor) -> Quaternion {
     let parts = [sensor.acc, sensor.gyr, sensor.mag];
     let are_numbers = parts.as_flattened().iter().all(|part| part.is_finite());
@@ -62,8 +63,8 @@ pub fn after(orientation: Quaternion, sensor: &Sensor) -> Quaternion {
     unit(turned)
 }
 
-/// Returns the direction in which the orientation departs fastest from what the directions of
-/// gravity and of the magnetic field say; `None` where it departs not at all.
+/// Returns the direction in which the orientation departs fastest from the measured directions of
+/// gravity and of the magnetic field; `None` without an acceleration or without a departure.
 fn slope(orientation: Quaternion, sensor: &Sensor) -> Option<Quaternion> {
     if norm(&sensor.acc) == 0.0 {
         return None;

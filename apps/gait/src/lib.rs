@@ -2,15 +2,15 @@
 //!
 //! | subtask | takes | gives |
 //! |---|---|---|
-//! | `read`, the source, every 1/120 s | what was recorded | a sample of both sensors |
-//! | `upper`, `lower` | the sample | the orientation of that sensor |
-//! | `knee`, the sink | both orientations | the turn from one to the other |
+//! | `read`, the source, every 1/120 s | the recording | a sample of both sensors |
+//! | `upper`, `lower` | the sample | the orientation of their sensor |
+//! | `knee`, the sink | both orientations | the turn between the two |
 //!
-//! The orientations are those of a filter, [`filter`], whose state is recorded, too, so that a
-//! replay can begin with each job that has it. The input is a recording, as
-//! `./scripts/recording --from-csv` makes it of `data/walking.csv`, whose licence is next to it.
-//! The code here knows no kernel: the tests run it in virtual time, and compare every value with
-//! those of an independent implementation.
+//! A filter ([`filter`]) computes the orientations. Its state is recorded, too, so a replay can
+//! begin with each job whose state is in the recording. The input is a recording, made by
+//! `./scripts/recording --from-csv` of `data/walking.csv`, whose licence lies in the same folder.
+//! The crate does not depend on the kernel: the tests run the app in virtual time, and compare
+//! every value with the values of an independent implementation.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! Boots into a walk that was recorded, and prints the angle of its knee.
+//! Boots into a recorded walk, and prints the angles of its knee.
 
 #![no_std]
 #![no_main]
@@ -19,7 +19,7 @@ use sched_dag::Vertex;
 
 kernel::entry!(main);
 
-/// How many angles a machine line has at most.
+/// The most angles in a machine line.
 const ANGLES_A_LINE: usize = 128;
 
 fn main(machine: &Machine) -> Result<(), AppError> {

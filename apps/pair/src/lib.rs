@@ -1,14 +1,15 @@
-//! Two machines, one application: the left machine measures and acts, the right one decides.
+//! Two machines, one application: the left machine measures and acts, the right machine decides.
 //!
 //! | machine | DAG | released | takes | gives |
 //! |---|---|---|---|---|
 //! | left | `sense` | each 10 ms | a measurement | `reading`, over the link |
 //! | right | `act` | by `reading` | `reading` | `wish`, over the link |
-//! | left | `apply` | each 10 ms | `wish`, or its own wish if none came for 50 ms | the wish to apply |
+//! | left | `apply` | each 10 ms | `wish`, or its own wish if none came for 50 ms | the applied wish |
 //!
-//! A message names the job that has sent it, and says when: [`Hop`]. By the answers the left machine
-//! learns the offset of the right machine's clock, and so counts messages that took longer than the
-//! link's delay. The app states the delay; nothing proves it. The code here knows no kernel.
+//! A message names its sending job, and the time of sending: [`Hop`]. From the answers, the left
+//! machine learns the offset of the right machine's clock, and so counts messages slower than the
+//! link's delay. The app states the delay; nothing proves it. The crate does not depend on the
+//! kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -22,37 +23,39 @@ use ros::{ClockOffset, Hop, Node, Publication, Publisher, Subscription};
 /// The period of the left machine.
 pub const PERIOD: Duration = Duration::from_millis(10);
 
-/// The least time between two jobs of the right machine: messages may come closer than they were sent.
+/// The least time between two jobs of the right machine: messages may arrive closer together than
+/// they were sent.
 pub const LEAST: Duration = Duration::from_millis(5);
 
-/// For how long a wish counts, and the wish to apply without.
+/// The time for which a wish counts, and the wish applied without a fresh one.
 const FRESH_NS: u64 = 50_000_000;
 const OWN_WISH: f64 = 0.0;
 
 ros::message! {
-    /// A measurement, or what is to be applied.
+    /// A measurement, or the value to apply.
     pub struct Wish: "fass_msgs/msg/Wish",
         "12ed0826ea45770e91cd366d0a56e36b0cf2d10451b6d8d31728f16a2390fa30" {
-        /// Where it has come from.
+        /// The hop of this message.
         pub hop: Hop,
-        /// Where that had come from which it answers.
+        /// The hop of the message being answered.
         pub heard: Hop,
         /// The value.
         pub value: f64,
     }
 }
 
-/// Which of the two machines this is.
+/// The role of one of the two machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The one that measures and acts.
+    /// The machine that measures and acts.
     Left,
-    /// The one that decides.
+    /// The machine that decides.
     Right,
 }
 
-/// Builds a machine's part, and returns its DAGs and the wires of the topics `reading` and `wish`. It
-/// ends after so many jobs, one a period. The app states that the link takes up to `delay`.
+/// Builds the DAGs of one machine, and returns them with the wires of the topics `reading` and
+/// `wish`. The run ends after the given number of jobs, one in each period. The app states that the
+/// link takes up to `delay`.
 pub fn build(
     node: &mut Node,
     role: Role,
@@ -83,7 +86,7 @@ pub fn build(
     }
 }
 
-/// Registers a source that gives the newest message that has come.
+/// Registers a source that hands on the newest message received.
 fn hear(dag: &Dag, messages: &Subscription<Wish>, delay: Duration, topic: &'static str) {
     dag.record::<Option<Wish>>(topic);
     let hear = move |all: Received<'_, Wish>| {
@@ -97,7 +100,7 @@ fn hear(dag: &Dag, messages: &Subscription<Wish>, delay: Duration, topic: &'stat
     hear.writes(&[topic]).register(taking("hear", 100));
 }
 
-/// Registers a sink that sends a message, if there is one.
+/// Registers a sink that sends a message, if there is any.
 fn tell(dag: &Dag, messages: &Publication<Wish>, topic: &'static str, due: Duration) {
     dag.record::<Option<Wish>>(topic);
     let tell = |mut out: Publisher<'_, Wish>, (message,): (Option<Wish>,)| {

@@ -1,7 +1,7 @@
 //! A robot with two wheels, driven by ROS 2. The robot is simulated, the node is not.
 //!
-//! The node `turtle` takes velocities on the topic `cmd_vel`, and gives `odom` and `imu`, at 20 Hz.
-//! The DAG `drive` has three subtasks:
+//! The node `turtle` takes velocities on the topic `cmd_vel`, and publishes `odom` and `imu`, at 20
+//! Hz. The DAG `drive` has three subtasks:
 //!
 //! | subtask | takes | gives |
 //! |---|---|---|
@@ -10,7 +10,8 @@
 //! | `tell`, the sink | both | messages |
 //!
 //! Without a session with the router, or half a second after the last command, the wish is to stand
-//! still: where nobody can stop the robot, the robot stops. The code here knows no kernel.
+//! still: where nobody can stop the robot, the robot stops. The crate does not depend on the
+//! kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -30,11 +31,11 @@ use ros::{Node, Publisher, Text};
 /// The time between two jobs.
 pub const PERIOD: Duration = Duration::from_millis(50);
 
-/// For how long a command holds.
+/// The time for which a command holds.
 const HOLDS_NS: u64 = 500_000_000;
 
-/// How far the wheels are apart, in m; the highest speeds, in m/s and rad/s; and by how much the speed
-/// of a wheel changes in a period.
+/// The distance between the wheels, in m; the highest speeds, in m/s and rad/s; and the largest
+/// change of a wheel's speed in a period, in m/s.
 const TRACK_M: f64 = 0.2;
 const FASTEST: f64 = 0.5;
 const FASTEST_TURN: f64 = 2.0;
@@ -58,7 +59,7 @@ recording::recordable! {
     }
 }
 
-/// Builds the DAG, of so many jobs; 0: until the run is ended.
+/// Builds the DAG with the given number of jobs; 0: until somebody ends the run.
 pub fn build(node: &mut Node, jobs: u64) -> [Dag; 1] {
     let taking = |name| SubtaskAttributes::named(name).wcet(Duration::from_millis(1));
     let commands = node.subscribe::<Twist>("cmd_vel");
