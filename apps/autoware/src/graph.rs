@@ -1,4 +1,4 @@
-//! The six DAGs, and the pieces of work that their subtasks do, which take drawn times.
+//! The six DAGs, and the subtasks' pieces of work, which take drawn times.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -13,7 +13,7 @@ use random::Random;
 
 use crate::{WCET_OF_ENDS, Workload};
 
-/// The lidar job that a value goes back to, if any: what all topics carry.
+/// The lidar job from which a value originates, if any: the type of all topics.
 pub type Origin = Option<u64>;
 
 /// The argument of a sampling function.
@@ -25,17 +25,17 @@ const MAP: Duration = Duration::from_millis(120);
 const SETTINGS: Duration = Duration::from_millis(25);
 const VISUALIZER: Duration = Duration::from_millis(60);
 
-/// The system, built and not committed.
+/// The built system, before its commit.
 pub struct AutowareSystem {
     /// The DAGs: `lidar`, `map`, `settings`, `visualizer`, `route`, `behaviour`.
     pub dags: Vec<Dag>,
-    /// For each job of `behaviour` the lidar job whose obstacles it has acted on;
-    /// `u64::MAX`: none.
+    /// For each job of `behaviour`, the lidar job whose obstacles it has acted on; `u64::MAX`:
+    /// none.
     pub acted_on: Arc<[AtomicU64]>,
 }
 
-/// The topics that a recording has of each DAG: those of its sources, which a replay sends, then
-/// what other DAGs sample and what it comes to.
+/// The recorded topics of each DAG: first the topics of its sources, sent by a replay; then topics
+/// sampled by other DAGs, and results.
 const RECORDED: [&[&str]; 6] = [
     &[
         "FrontLidarDriver",
@@ -58,8 +58,8 @@ const RECORDED: [&[&str]; 6] = [
 ];
 
 impl AutowareSystem {
-    /// Records what a replay needs, and what it compares. All that records and replays is a
-    /// quarter of the image.
+    /// Records the topics needed and compared by a replay. Recording and replaying take a quarter
+    /// of the image.
     pub fn record(&self) {
         for (dag, topics) in self.dags.iter().zip(RECORDED) {
             for topic in topics {
@@ -68,8 +68,8 @@ impl AutowareSystem {
         }
     }
 
-    /// Returns a number that differs, as good as surely, if the vehicle has acted on other
-    /// lidar jobs (FNV-1a, over words).
+    /// Returns a hash (FNV-1a, over words) that almost certainly differs if the vehicle has acted
+    /// on other lidar jobs.
     pub fn digest(&self) -> u64 {
         let words = self.acted_on.iter().map(|job| job.load(Ordering::Relaxed));
         words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
@@ -105,7 +105,7 @@ impl Workload {
     }
 }
 
-/// A part's topic has its writer's name, as in the original.
+/// Builds parts of the graph. A part's topic has its writer's name, as in the original.
 impl GraphBuilder<'_> {
     fn dag(&self, name: &str, period: Duration) -> Dag {
         let dag = create_dag();
@@ -115,7 +115,7 @@ impl GraphBuilder<'_> {
         dag
     }
 
-    /// Returns the jobs of a DAG in the time in which the lidars have theirs.
+    /// Returns the number of a DAG's jobs during the jobs of the lidars.
     fn jobs(&self, period: Duration) -> u64 {
         let jobs = u128::from(self.workload.jobs);
         let jobs = (jobs * LIDAR.as_nanos()).div_ceil(period.as_nanos());
@@ -136,7 +136,7 @@ impl GraphBuilder<'_> {
         SubtaskAttributes::named(name).wcet(WCET_OF_ENDS)
     }
 
-    /// Registers a source that writes where its values come from.
+    /// Registers a source that writes the origin of its values.
     fn source(
         dag: &Dag,
         name: &str,
@@ -161,7 +161,7 @@ impl GraphBuilder<'_> {
         dag.register_subtask(transform, vec![input], vec![name], attributes);
     }
 
-    /// Registers a fusion of two topics of one DAG.
+    /// Registers a fusion of two topics of a DAG.
     fn fusion(&self, dag: &Dag, inputs: [&str; 2], name: &str) {
         let (attributes, mut crunch) = self.worker(name, 1);
         let fusion = move |(one, other): (Origin, Origin)| {
@@ -171,7 +171,7 @@ impl GraphBuilder<'_> {
         dag.register_subtask(fusion, inputs.to_vec(), vec![name], attributes);
     }
 
-    /// A DAG of one driver.
+    /// Builds a DAG with a driver alone.
     fn driver(&self, dag_name: &str, name: &str, period: Duration) -> (Dag, Latest<Origin>) {
         let dag = self.dag(dag_name, period);
         Self::source(&dag, name, period, || None);
@@ -187,7 +187,7 @@ impl GraphBuilder<'_> {
         (dag, latest)
     }
 
-    /// Returns the DAG, the obstacles and the pose.
+    /// Builds `lidar`; returns the DAG, the obstacles and the pose.
     fn lidar(
         &self,
         map: &Latest<Origin>,
@@ -241,7 +241,7 @@ impl GraphBuilder<'_> {
         (dag, obstacles, pose)
     }
 
-    /// Returns the DAG and what its four planners write.
+    /// Builds `route`; returns the DAG and the outputs of its four planners.
     fn route(&self, goal: &Latest<Origin>, pose: &Latest<Origin>) -> (Dag, [Latest<Origin>; 4]) {
         let dag = self.dag("route", LIDAR);
         Self::source(&dag, "Lanelet2Map", LIDAR, || None);
@@ -268,7 +268,7 @@ impl GraphBuilder<'_> {
         (dag, latest)
     }
 
-    /// Returns the DAG and what each of its jobs has acted on.
+    /// Builds `behaviour`; returns the DAG and, for each of its jobs, the lidar job acted on.
     fn behaviour(
         &self,
         obstacles: &Latest<Origin>,
@@ -296,7 +296,7 @@ impl GraphBuilder<'_> {
                     Sampled<'_>,
                     Sampled<'_>,
                 )| {
-                    // Sampled at the start, so what comes meanwhile is for the next job.
+                    // The sample is taken at the start, so a newer value is for the next job.
                     let origin = obstacles.and_then(|obstacles| *obstacles.value);
                     crunch.work();
                     (origin,)
@@ -343,8 +343,8 @@ impl SubtaskWork {
         }
     }
 
-    /// Does one piece of work: executes for between the least part of its WCET and
-    /// nearly all of it. A hundredth is left for what the machine adds.
+    /// Does one piece of work: executes for a time between the least part of its WCET and nearly
+    /// all of its WCET. A hundredth is left for the machine's overhead.
     fn work(&mut self) {
         let least = self.workload.least_percent.min(99);
         let per_mille = least * 10 + self.random.number() % ((99 - least) * 10 + 1);

@@ -1,4 +1,4 @@
-//! How long it takes from the lidars to where it matters, from a run's record.
+//! The latencies from the lidars to their effects, computed from a run's record.
 
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -9,16 +9,16 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 /// The latencies of one run, in nanoseconds.
 #[derive(Clone, Debug, Default)]
 pub struct Latencies {
-    /// From the lidars' nominal release to the completion of
-    /// `ObjectCollisionEstimator`, for each of their jobs.
+    /// From the lidars' nominal release to the completion of `ObjectCollisionEstimator`, for each
+    /// of the lidars' jobs.
     pub hot_path_ns: Vec<u64>,
-    /// From the lidars' nominal release to the completion of `VehicleDBWSystem`, for
-    /// each of *its* jobs that has acted on a lidar job: how old what it acts on is.
+    /// From the lidars' nominal release to the completion of `VehicleDBWSystem`, for each job of
+    /// the *vehicle* that has acted on a lidar job: the age of the data behind the action.
     pub to_vehicle_ns: Vec<u64>,
-    /// The jobs of the vehicle that have acted on the same lidar job as the one
-    /// before, because no newer one was complete.
+    /// The jobs of the vehicle that acted on the same lidar job as the vehicle's job before,
+    /// because no newer lidar job was complete.
     pub repeated: u64,
-    /// The lidar jobs that no job of the vehicle has acted on.
+    /// The lidar jobs on which no job of the vehicle has acted.
     pub unused: u64,
 }
 

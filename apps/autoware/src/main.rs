@@ -45,7 +45,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     report(&run, &latencies, bounds, system.digest())
 }
 
-/// Reads the app's words of the command line.
+/// Reads the app's options from the command line.
 fn workload(machine: &Machine) -> Result<Workload, AppError> {
     let options = machine.options();
     let jobs = options.number("jobs", 1..=10_000, 100)?;
@@ -66,7 +66,7 @@ fn workload(machine: &Machine) -> Result<Workload, AppError> {
     })
 }
 
-/// The bounds that the commit proves of the two latencies.
+/// The bounds proven by the commit for the two latencies.
 #[derive(Clone, Copy)]
 struct Bounds {
     hot_path_ns: Option<u64>,
@@ -85,8 +85,8 @@ impl Bounds {
             sample.reader.name == "BehaviorPlanner" && sample.topic == "ObjectCollisionEstimator"
         });
         let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        // A sample is taken after its job's release, so from there to the job's end
-        // it is at most the response time.
+        // A sample is taken after the release of its job, so the job's end comes at most the
+        // response time later.
         let to_vehicle = hop
             .and_then(|hop| hop.bound)
             .and_then(|hop| hop.checked_add(of_dag("behaviour")?));

@@ -1,7 +1,7 @@
-//! From a set to DAGs that execute for its times.
+//! The way from a set to DAGs executing for the set's times.
 //!
-//! Instances occupy their cores for their execution times. Those that wait sleep meanwhile, as
-//! long as a simulated device takes to answer.
+//! Instances occupy their cores for their execution times. Waiting instances sleep for as long as a
+//! simulated device takes to answer.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -14,19 +14,20 @@ use random::nth;
 
 use crate::times::ExecutionTimes;
 
-/// How a set is run.
+/// The settings of a set's run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunSettings {
-    /// How long instances execute.
+    /// The rule for execution times.
     pub execution: Execution,
-    /// The seed of what they draw.
+    /// The seed of the drawn times.
     pub seed: u64,
     /// How execution occupies a core.
     pub occupation: Occupation,
-    /// How many jobs there are.
+    /// The number of jobs, as a length.
     pub length: Length,
-    /// Not 0: a segment's execution counts from the latest multiple of this time on the clock, so
-    /// what the kernel takes before the segment is a part of it, as in a model without overheads.
+    /// Not 0: a segment's execution counts from the latest multiple of this time on the clock. So
+    /// the kernel's time before the segment is a part of the execution, as in a model without
+    /// overheads.
     pub grid_ns: u64,
 }
 

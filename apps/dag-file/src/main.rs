@@ -1,4 +1,4 @@
-//! Boots into the DAGs of the file that the loader left in memory.
+//! Boots into the DAGs of a file left in memory by the loader.
 
 #![no_std]
 #![no_main]
@@ -24,7 +24,7 @@ use report::SetReport;
 
 kernel::entry!(main);
 
-/// The app's words of the command line.
+/// The app's options on the command line.
 const WORDS: [&str; 11] = [
     "overheads",
     "overheads_margin",
@@ -39,7 +39,7 @@ const WORDS: [&str; 11] = [
     "window_us",
 ];
 
-/// Options of the command line besides how a set is run.
+/// Options of the command line besides the settings of a set's run.
 struct CommandOptions {
     settings: RunSettings,
     /// Whether a deadline miss makes the run a failure.
@@ -60,7 +60,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
             &set.certificate
         };
         machine.fix(certificate);
-        // What is wrong with the DAGs is wrong with the file that we were given.
+        // Faults of the DAGs are faults of the given file.
         let commit =
             commit(set, &wishes.settings).map_err(|error| usage(format!("DAG file: {error}")))?;
         for warning in commit.warnings() {
@@ -92,7 +92,7 @@ fn usage(message: impl Into<String>) -> AppError {
     AppError::Usage(UsageError::new(message))
 }
 
-/// Reads the loader's file, and checks all of it before anything runs.
+/// Reads the loader's file, and checks the whole file before anything runs.
 fn read(machine: &Machine, length: Length) -> Result<DagFile, AppError> {
     let module = machine
         .module()
@@ -102,7 +102,7 @@ fn read(machine: &Machine, length: Length) -> Result<DagFile, AppError> {
         usage(format!("DAG file, line {line}: it is not UTF-8 text"))
     })?;
     let file = parse(text).map_err(|malformed| usage(format!("DAG file, {malformed}")))?;
-    // Attributes are needed under static priorities only, so that asks for more.
+    // Only static priorities need all attributes, so a check under them asks for the most.
     let whole = CommitOptions::new(Policy::StaticPriority, machine.cores());
     let options = whole.with_clusters(machine.clusters());
     for set in &file.sets {

@@ -26,7 +26,7 @@ struct DagReport {
     answer: Verdict,
     statistics: DagStatistics,
     responses: Distribution,
-    /// If there are several.
+    /// For each sink, if there are several.
     sinks: Vec<SinkReport>,
 }
 
@@ -37,7 +37,7 @@ struct SinkReport {
 }
 
 impl SetReport {
-    /// Takes the figures from a run; prints each violation.
+    /// Collects the figures of a run, and prints each violation.
     pub(crate) fn new(set: &Set, answers: &[DagAnswer], run: &Run) -> Self {
         let dags = set.dags.iter().zip(answers);
         let dags = dags.map(|(dag, answer)| DagReport {
@@ -57,7 +57,7 @@ impl SetReport {
         }
     }
 
-    /// Prints a machine line for each DAG, and one for the set.
+    /// Prints a machine line for each DAG, and another for the set.
     pub(crate) fn emit(&self) {
         for dag in &self.dags {
             json::emit("dag_run", |line| {
@@ -105,7 +105,7 @@ impl SetReport {
         });
     }
 
-    /// Prints the same as a table.
+    /// Prints the same figures as a table.
     pub(crate) fn print_table(&self) {
         println!();
         if !self.set.is_empty() {
@@ -137,7 +137,7 @@ impl SetReport {
         println!("{} violations", self.violations);
     }
 
-    /// Says what makes the run a failure, if anything does.
+    /// Returns the reason that makes the run a failure, if any.
     pub(crate) fn complaint(&self, is_strict: bool) -> Option<String> {
         if self.violations > 0 {
             return Some(format!(
@@ -206,7 +206,7 @@ fn percent(permille: u64) -> String {
     format!("{}.{} %", permille / 10, permille % 10)
 }
 
-/// Returns the response times of all jobs that were completed.
+/// Returns the response times of all completed jobs.
 fn responses(dag: DagId, run: &Run) -> Distribution {
     if run.record().first_job(dag) > 0
         && let Some(times) = run.times()
@@ -230,7 +230,7 @@ fn sinks(answer: &DagAnswer, run: &Run) -> Vec<SinkReport> {
     answer.sinks.iter().map(report).collect()
 }
 
-/// Returns the response times of a sink in all jobs in which it has finished.
+/// Returns the response times of a sink in all jobs with a finished sink.
 fn sink_responses(dag: DagId, subtask: SubtaskId, run: &Run) -> Distribution {
     let vertex = |job| run.task_set().vertex(Instance { dag, job, subtask });
     if run.record().first_job(dag) > 0

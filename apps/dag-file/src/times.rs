@@ -1,13 +1,13 @@
-//! How long an instance executes, and waits.
+//! The times for which an instance executes and waits.
 //!
-//! The time that an instance draws follows from the seed, its set's position of the
-//! subtask and its job alone. So two policies, or two numbers of cores, get the
-//! same load. A sample has the times of all segments and waits. Without one, the segments of a
-//! subtask divide the instance's time as they divide its WCET.
+//! The time drawn by an instance follows only from the seed, the subtask's position in its set, and
+//! the job. So two policies, or two numbers of cores, get the same load. A sample contains the
+//! times of all segments and waits. Without a sample, the segments of a subtask divide the
+//! instance's time in the proportions of its WCET.
 //!
-//! A wait lasts until a simulated device answers, or to its limit. Where each instance
-//! takes its WCET, no device answers, which is the worst case of waits. Where there is no sample,
-//! the time of an answer is drawn, too: one of five comes beyond the limit.
+//! A wait lasts until a simulated device answers, or to its limit. Where each instance takes its
+//! WCET, no device answers, which is the worst case of waits. Without a sample the time of an
+//! answer is drawn, too: one in five answers comes beyond the limit.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -27,7 +27,7 @@ pub(crate) struct ExecutionTimes {
 }
 
 impl ExecutionTimes {
-    /// Returns how long a segment of a job's instance executes, in nanoseconds.
+    /// Returns the execution time of a segment of a job's instance, in nanoseconds.
     pub(crate) fn of_segment(&self, job: u64, number: usize) -> u64 {
         if let Some(sample) = self.sample(job) {
             return sample[2 * number];
@@ -40,16 +40,16 @@ impl ExecutionTimes {
             let later = self.waits.get(segments - 1..).unwrap_or_default();
             let later_ns: u64 = later.iter().filter_map(|wait| wait.segment_ns).sum();
             let part = u128::from(self.wcet_ns.saturating_sub(later_ns));
-            // Rounded down at both ends, the segments add up to the whole, and as that is at most the
-            // WCET, none exceeds its own.
+            // Rounded down at both ends, the segments add up to the whole. The whole is at most the
+            // WCET, so no segment exceeds its own WCET.
             u64::try_from(of_job * part / whole).unwrap_or(u64::MAX)
         };
         let before = if number == 0 { 0 } else { up_to(number) };
         up_to(number + 1) - before
     }
 
-    /// Returns how long a job's instance waits behind a segment, in nanoseconds; `None` behind the
-    /// last one.
+    /// Returns the wait of a job's instance after a segment, in nanoseconds; `None` after the last
+    /// segment.
     pub(crate) fn of_wait(&self, job: u64, number: usize) -> Option<u64> {
         let limit_ns = self.waits.get(number)?.limit_ns;
         if self.execution == Execution::Wcet {
@@ -63,7 +63,7 @@ impl ExecutionTimes {
         Some(scale(drawn, 0..=latest_ns).min(limit_ns))
     }
 
-    /// Returns how long a job's instance executes, in nanoseconds.
+    /// Returns the execution time of a job's instance, in nanoseconds.
     pub(crate) fn of_job(&self, job: u64) -> u64 {
         if let Some(sample) = self.sample(job) {
             return executed_ns(sample);
@@ -80,7 +80,7 @@ impl ExecutionTimes {
         }
     }
 
-    /// Returns the sample that a job's instance takes.
+    /// Returns the sample used by a job's instance, if any.
     fn sample(&self, job: u64) -> Option<&[u64]> {
         let len = 2 * self.waits.len() + 1;
         let count = self.samples_ns.len() / len;

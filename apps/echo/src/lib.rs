@@ -7,8 +7,7 @@
 //! | `tell`, the sink | the number of bytes | the packets, on the wire |
 //!
 //! The packets themselves stay in the DAG's state, so no edge copies them. The crate does not
-//! depend on
-//! the kernel.
+//! depend on the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,7 +1,7 @@
-//! Crimes: acts that no subtask may do, done on purpose. The machine must stop each.
+//! Crimes: acts forbidden to every subtask, done on purpose. The machine must stop each.
 //!
-//! If one of these returned, the protection that it is a test of would be
-//! missing; the caller can tell by [`Unpunished`].
+//! If a crime returned, the protection under test would be missing; the caller can tell by
+//! [`Unpunished`].
 
 use core::arch::asm;
 use core::hint::black_box;
@@ -10,11 +10,11 @@ use core::time::Duration;
 use fass::Occupation::{self, Hold as HOLD, Spin as SPIN};
 use kernel::{Event, Lock};
 
-/// The crime had no consequence, which is the failure of a protection.
+/// The result of a crime without any consequence: its protection has failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unpunished;
 
-/// Something that must end the subtask that does it.
+/// An act that must end its subtask.
 pub type Crime = fn() -> Unpunished;
 
 /// Every crime, by name.
@@ -40,7 +40,7 @@ pub const CRIMES: [(&str, Crime); 19] = [
     ("endless_wait", wait_for_ever),
 ];
 
-/// Those that come one after the other where faults come thick and fast.
+/// The crimes committed one after the other where faults come thick and fast.
 pub const RECURRING: [Crime; 7] = [
     panic,
     write_to_null,
@@ -55,7 +55,7 @@ fn panic() -> Unpunished {
     panic!("a panic on purpose")
 }
 
-/// Panics with a message whose own making panics.
+/// Panics with a message whose formatting panics, too.
 fn panic_twice() -> Unpunished {
     struct Unspeakable;
     impl core::fmt::Display for Unspeakable {
@@ -93,7 +93,7 @@ fn read_wildly() -> Unpunished {
     read(0x7fff_dead_b000)
 }
 
-/// Reads an address that is none: its upper bits do not repeat bit 47.
+/// Reads a non-canonical address: its upper bits do not repeat bit 47.
 fn read_non_canonical() -> Unpunished {
     read(0x8000_0000_0000_0000)
 }
@@ -112,14 +112,14 @@ fn execute_data() -> Unpunished {
     Unpunished
 }
 
-/// Divides by zero in an instruction, not in Rust, which would panic.
+/// Divides by zero in a machine instruction, because a division in Rust would panic.
 fn divide_by_zero() -> Unpunished {
     // SAFETY: none; the processor has to refuse it (see the module).
     unsafe { asm!("div ecx", inout("eax") 1 => _, inout("edx") 0 => _, in("ecx") 0) };
     Unpunished
 }
 
-/// Executes an instruction that is defined to be undefined.
+/// Executes an instruction defined as undefined.
 fn execute_undefined() -> Unpunished {
     // SAFETY: none; the processor has to refuse it (see the module).
     unsafe { asm!("ud2") };
@@ -138,7 +138,7 @@ fn sum_down(number: u64) -> u64 {
     frame[0].wrapping_add(sum_down(number.wrapping_sub(1)))
 }
 
-/// Recurses, with a call of the kernel's on each level: sooner or later it is that which hits
+/// Recurses, with a call into the kernel on each level: sooner or later the kernel's own frames hit
 /// the guard page.
 fn overflow_in(call: &dyn Fn()) -> Unpunished {
     descend(call, black_box(u64::MAX));
@@ -147,7 +147,7 @@ fn overflow_in(call: &dyn Fn()) -> Unpunished {
 
 #[expect(unconditional_recursion, reason = "that is the crime")]
 fn descend(call: &dyn Fn(), levels: u64) {
-    // Less than any section of the kernel takes.
+    // Smaller than the kernel's frames, so an overflow happens in the kernel.
     let frame = black_box([levels; 2]);
     call();
     descend(call, levels.wrapping_sub(1));
@@ -163,8 +163,8 @@ fn wait() {
     EVENT.wait(EVENT.version(), fass::now_ns() + 1_000);
 }
 
-/// The locks that the doomed DAG's middle subtask states. A fault in a section loses the lock: each
-/// crime has its own.
+/// The locks stated by the middle subtask of the doomed DAG. A fault in a section loses the lock,
+/// so each crime has a lock of its own.
 pub static LOCKS: [Lock<u32>; 4] = [
     Lock::new("free", 0),
     Lock::new("shared", 0),
@@ -176,13 +176,13 @@ fn lock() {
     LOCKS[0].with(|free| *free = free.wrapping_add(1));
 }
 
-/// Enters a section of a lock that its subtask does not state.
+/// Enters a section of a lock not stated by the calling subtask.
 fn enter_unstated() -> Unpunished {
     static UNSTATED: Lock<u32> = Lock::new("unstated", 0);
     UNSTATED.with(|_| Unpunished)
 }
 
-/// Panics while it holds a lock, which is lost with that, or because the lock is lost.
+/// Panics while holding a lock, and so loses the lock; or panics because the lock is already lost.
 fn panic_in_section() -> Unpunished {
     LOCKS[1].with(|_| panic!("a panic in a section"))
 }

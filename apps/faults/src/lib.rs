@@ -1,12 +1,11 @@
-//! Each fault that a subtask can commit, next to a DAG that must not notice.
+//! Each fault a subtask can commit, next to a DAG that must not notice.
 //!
-//! Two DAGs run at once. The *healthy* one has a deadline that it meets with
-//! ease. The *doomed* one does the same work until its job [`FATAL_JOB`], in
-//! which its middle subtask commits a crime. It shows how many jobs of
-//! the healthy DAG met their deadlines before, while and after that happened, and what
-//! it cost the doomed DAG, under each [`FaultPolicy`].
+//! Two DAGs run at once. The *healthy* DAG has a deadline that it meets with ease. The *doomed* DAG
+//! does the same work until its job [`FATAL_JOB`], in which its middle subtask commits a crime. The
+//! app shows how many jobs of the healthy DAG met their deadlines before, during and after the
+//! crime, and the price paid by the doomed DAG, under each [`FaultPolicy`].
 //!
-//! The crime may be a [driver's](served), whose DAG the questions of a third one release.
+//! The crime may be a [driver's](served): the questions of a third DAG release the driver's DAG.
 //!
 //! A [`restless`] DAG commits one crime after the other, thousands of them, and goes on.
 
@@ -32,13 +31,13 @@ pub const PERIOD: Duration = Duration::from_millis(10);
 /// How long each middle subtask executes.
 const EXECUTION: Duration = Duration::from_millis(2);
 
-/// After this time a middle subtask is at fault.
+/// The budget of a middle subtask.
 pub const BUDGET: Duration = Duration::from_millis(6);
 
 /// The job in which the doomed DAG commits its crime.
 pub const FATAL_JOB: u64 = 10;
 
-/// The faults that the doomed DAG survives, unless it is ended.
+/// The faults survived by the doomed DAG, unless a fault ends it.
 const FAULT_LIMIT: FaultLimit = FaultLimit::new(1, 10, 2);
 
 /// The jobs of each DAG.
@@ -47,12 +46,11 @@ pub const JOBS: u64 = 30;
 /// The fate of the doomed DAG after its crime.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultPolicy {
-    /// The DAG is ended.
+    /// The crime ends the DAG.
     End,
-    /// It goes on with the next job, and the middle subtask is made anew.
+    /// The DAG goes on with the next job, and the middle subtask is made anew.
     Restart,
-    /// It goes on with the next job, and the middle subtask falls back on a second
-    /// function.
+    /// The DAG goes on with the next job, and the middle subtask falls back on a second function.
     FallBack,
 }
 
@@ -71,8 +69,7 @@ pub fn healthy() -> Dag {
 /// The time between two jobs where faults come thick and fast.
 const SHORT_PERIOD: Duration = Duration::from_millis(1);
 
-/// Builds a healthy DAG, and a restless one that survives so many faults, one in every second
-/// job.
+/// Builds a healthy DAG, and a restless DAG that survives `faults` faults, in every second job.
 pub fn restless(faults: u32) -> [Dag; 2] {
     let jobs = u64::from(faults) * 2;
     let healthy = create_dag();
@@ -110,14 +107,14 @@ pub fn doomed(crime: Crime, policy: FaultPolicy) -> Dag {
     pipeline("doomed", 1, Some(crime), Some(BUDGET), policy)
 }
 
-/// Builds the DAG that is ended by its crime, with all the time it wants for that.
+/// Builds the doomed DAG without a budget, so its crime may take any time to end it.
 pub fn doomed_at_leisure(crime: Crime) -> Dag {
     pipeline("doomed", 1, Some(crime), None, FaultPolicy::End)
 }
 
-/// Builds a DAG that asks a device once a job, and the doomed one, which the questions release and
-/// which answers, until it commits `crime` in its job [`FATAL_JOB`]. The first one holds the answers
-/// against that, and would fail itself.
+/// Builds a DAG that asks a device once a job, and the doomed DAG serving the device. The questions
+/// release the doomed DAG, which answers until it commits `crime` in its job [`FATAL_JOB`]. The
+/// asking DAG expects answers and then timeouts, and is at fault itself on a difference.
 pub fn served(crime: Crime) -> [Dag; 2] {
     let (device, mut driver) = create_device::<u64, u64>("served");
     let (asks, serves) = (create_dag(), create_dag());
@@ -156,7 +153,7 @@ pub fn served(crime: Crime) -> [Dag; 2] {
     [asks, serves]
 }
 
-/// The uses of locks that the middle subtask is lent.
+/// The uses of locks lent to the middle subtask.
 type Locked = ((), (), (), ());
 
 fn locks() -> (LockUse, LockUse, LockUse, LockUse) {
@@ -164,7 +161,7 @@ fn locks() -> (LockUse, LockUse, LockUse, LockUse) {
     (free, shared, twice, held)
 }
 
-/// Builds source -> middle -> sink; the middle has a WCET if it has a budget.
+/// Builds source -> middle -> sink; the middle subtask has a WCET if it has a budget.
 fn pipeline(
     name: &str,
     priority: u32,

@@ -1,5 +1,6 @@
-//! Boots into one fault after the other and shows which DAGs survive; with `by=driver` each is that of
-//! a device's driver; with `faults=N` into N of one DAG, and shows what memory they cost.
+//! Boots into one fault after the other, and shows the DAGs that survive. With `by=driver`, a
+//! device's driver commits each fault. With `faults=N`, a single DAG commits N faults, and the app
+//! shows their cost in memory.
 
 #![no_std]
 #![no_main]
@@ -17,8 +18,8 @@ use sched_dag::DagStatistics;
 
 kernel::entry!(main);
 
-/// The jobs of the healthy DAG that overlap the fault: from the fatal job on as
-/// long as an endless loop may take to be ended.
+/// The number of the healthy DAG's jobs that overlap the fault: from the fatal job on, as long as
+/// an endless loop may take to be ended.
 const DURING: u64 = 2;
 
 fn main(machine: &Machine) -> Result<(), AppError> {
@@ -73,7 +74,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Runs a DAG with a hundred faults, and with so many, and judges what memory is left.
+/// Runs a DAG with a hundred faults, then a DAG with `times` faults, and compares the memory left.
 fn endure(machine: &Machine, times: u32) -> Result<(), AppError> {
     machine.accept_faults(); // here they are what is wanted
     let mut before = None;
@@ -111,10 +112,10 @@ fn endure(machine: &Machine, times: u32) -> Result<(), AppError> {
 enum FaultVerdict {
     /// Nothing.
     Contained,
-    /// The healthy DAG was late before the fault: the host is too busy to judge.
+    /// The healthy DAG was late before the fault, so the host is too busy to judge.
     Unclear,
-    /// The healthy DAG was late or incomplete, or the doomed one lost more jobs, or fewer,
-    /// than its policy says.
+    /// The healthy DAG was late or incomplete, or the doomed DAG lost more or fewer jobs than its
+    /// policy says.
     Harmful,
 }
 

@@ -11,7 +11,7 @@ use fass::Occupation;
 
 use crate::compute;
 
-/// The way in which a parallel subtask spends its execution time.
+/// The way a parallel subtask spends its execution time.
 #[derive(Clone, Copy, Debug)]
 pub enum ExecutionWork {
     /// The subtask occupies its core, and its execution is simulated.
@@ -30,7 +30,7 @@ impl ExecutionWork {
     }
 }
 
-/// The pace of a core without other work: the time of a round of computing, and the round's result.
+/// The pace of a core without other work: the time of a round, and its result.
 #[derive(Clone, Copy, Debug)]
 pub struct CorePace {
     round_ns: u64,
@@ -62,11 +62,11 @@ impl CorePace {
         self.round_ns
     }
 
-    /// Computes for `time`, as measured on a core without other work, in whole rounds.
+    /// Computes for `time`, as measured on an otherwise idle core, in whole rounds.
     ///
     /// # Panics
     ///
-    /// If a result is wrong: registers or memory were damaged while other code had the core.
+    /// If a result is wrong: something was damaged while others had the core.
     pub fn compute_for(self, time: Duration) {
         let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         for _ in 0..ns.div_ceil(self.round_ns) {

@@ -4,7 +4,7 @@
 //! |---|---|---|---|---|
 //! | left | `sense` | each 10 ms | a measurement | `reading`, over the link |
 //! | right | `act` | by `reading` | `reading` | `wish`, over the link |
-//! | left | `apply` | each 10 ms | `wish`, or its own wish if none came for 50 ms | the applied wish |
+//! | left | `apply` | each 10 ms | `wish`; its own wish after 50 ms without | the applied wish |
 //!
 //! A message names its sending job, and the time of sending: [`Hop`]. From the answers, the left
 //! machine learns the offset of the right machine's clock, and so counts messages slower than the
@@ -47,15 +47,15 @@ ros::message! {
 /// The role of one of the two machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The machine that measures and acts.
+    /// The measuring and acting machine.
     Left,
-    /// The machine that decides.
+    /// The deciding machine.
     Right,
 }
 
-/// Builds the DAGs of one machine, and returns them with the wires of the topics `reading` and
-/// `wish`. The run ends after the given number of jobs, one in each period. The app states that the
-/// link takes up to `delay`.
+/// Builds a machine's DAGs, and returns them with the wires of the topics `reading` and `wish`. The
+/// run ends after the given number of jobs, each a period long. The app states a delay of up to
+/// `delay` for the link.
 pub fn build(
     node: &mut Node,
     role: Role,
@@ -86,7 +86,7 @@ pub fn build(
     }
 }
 
-/// Registers a source that hands on the newest message received.
+/// Registers a source for the newest message received.
 fn hear(dag: &Dag, messages: &Subscription<Wish>, delay: Duration, topic: &'static str) {
     dag.record::<Option<Wish>>(topic);
     let hear = move |all: Received<'_, Wish>| {
@@ -100,7 +100,7 @@ fn hear(dag: &Dag, messages: &Subscription<Wish>, delay: Duration, topic: &'stat
     hear.writes(&[topic]).register(taking("hear", 100));
 }
 
-/// Registers a sink that sends a message, if there is any.
+/// Registers a sink to send the message, if there is any.
 fn tell(dag: &Dag, messages: &Publication<Wish>, topic: &'static str, due: Duration) {
     dag.record::<Option<Wish>>(topic);
     let tell = |mut out: Publisher<'_, Wish>, (message,): (Option<Wish>,)| {

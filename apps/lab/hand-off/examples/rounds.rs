@@ -1,10 +1,10 @@
 //! The graphs of `hand-off` on Linux, job after job, for a counter of instructions.
 //!
-//! One worker polls, and the time that would pass idly is skipped. Bodies are empty; no event is
-//! kept. The source calls [`round`] in the first job of each round: a counter that looks there counts
-//! whole rounds, without the start of the run and its end.
+//! One worker polls, and idle time is skipped. Bodies are empty; no event is kept. The source calls
+//! [`round`] in the first job of each round. A counter of instructions between two such calls
+//! counts whole rounds, without the start of the run and its end.
 //!
-//! Words: the shape, its size, the numbers of DAGs, of jobs a round, and of rounds.
+//! Words: the shape, its size, the number of DAGs, of jobs in a round, and of rounds.
 
 use std::env;
 use std::hint::black_box;
@@ -41,7 +41,7 @@ fn main() {
     drop(linux.run().expect("DAGs are committed"));
 }
 
-/// Marks the begin of a round; a counter knows the function by its name.
+/// Marks the beginning of a round; a counter knows the function by its name.
 #[inline(never)]
 fn round() {
     black_box(());

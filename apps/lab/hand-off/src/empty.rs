@@ -13,7 +13,7 @@ use crate::Shape;
 /// A function without values.
 pub type Tick = Box<dyn FnMut(u64) + Send>;
 
-/// Makes empty functions for so many DAGs, subtask by subtask; the first source calls `source`.
+/// Makes empty functions for `dags` DAGs, subtask by subtask; the first source calls `source`.
 pub fn empty(shape: Shape, dags: u16, mut source: impl FnMut() + Send + 'static) -> Vec<Vec<Tick>> {
     let of_dag = |_| (0..shape.subtasks()).map(|_| Box::new(|_| ()) as Tick);
     let mut all: Vec<Vec<Tick>> = (0..dags).map(|dag| of_dag(dag).collect()).collect();

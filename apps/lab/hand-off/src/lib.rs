@@ -1,12 +1,12 @@
-//! Workloads of empty bodies, and the stamps that measure what is between them.
+//! Workloads of empty bodies, and the stamps that measure the time between them.
 //!
-//! A *body* here does nothing but read the clock, so the time between two bodies
-//! is the system's alone. [`Shape`] describes the graphs, purely; [`build()`] makes
-//! DAGs of them through the same API that every app uses; [`BodyStamps`] holds the
-//! times that the bodies have read. Chains and fork-joins are typed, with one `u64` on each edge,
-//! for that is what an app writes; random graphs are made at run time, without values.
+//! A *body* here only reads the clock, so the time between two bodies is the system's alone.
+//! [`Shape`] describes the graphs, purely; [`build()`] makes DAGs of them through the API of every
+//! app; [`BodyStamps`] holds the times read by the bodies. Chains and fork-joins are typed, with
+//! one `u64` on each edge, because an app would write them so; random graphs are made at run time,
+//! without values.
 //!
-//! The code here knows no kernel: the tests run it in virtual time.
+//! The crate does not depend on the kernel: the tests run the workloads in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -30,12 +30,12 @@ use fork_join::each_arity;
 pub use empty::{Tick, commit, empty};
 pub use shape::Shape;
 
-/// Which bodies stamp.
+/// The bodies that stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stamping {
     /// Every body.
     All,
-    /// Only the source and the sink: the times in between have no stamp in them.
+    /// Only the source and the sink: no stamp lies within the times in between.
     Ends,
 }
 
@@ -46,17 +46,17 @@ pub struct Workload {
     pub shape: Shape,
     /// The number of jobs.
     pub jobs: u64,
-    /// The time between two jobs, which is also the relative deadline.
+    /// The time between two jobs, and the relative deadline.
     pub period: Duration,
-    /// Which bodies stamp.
+    /// The bodies that stamp.
     pub stamping: Stamping,
-    /// How long each subtask between source and sink computes; mostly zero.
+    /// The time for which each subtask between source and sink computes; mostly zero.
     pub work: Duration,
-    /// The WCET of each subtask, if they shall have one, and with it a budget.
+    /// The WCET of each subtask, and so a budget, if the subtasks have any.
     pub wcet: Option<Duration>,
 }
 
-/// Builds the DAG, and the place where its bodies leave their times.
+/// Builds the DAG, and the place of the times left by its bodies.
 ///
 /// # Panics
 ///
@@ -200,7 +200,7 @@ impl Builder<'_> {
     }
 }
 
-/// The whole body: first and last instruction.
+/// Stamps the first and the last instruction of a body: the whole body.
 #[inline]
 fn twice(pen: &mut StampPen) {
     pen.stamp();
@@ -215,14 +215,14 @@ pub struct BodyStamps {
     times: Vec<Arc<[AtomicU64]>>,
 }
 
-/// A pen, by which one body writes its times.
+/// A pen for the times of one body.
 pub struct StampPen {
     times: Arc<[AtomicU64]>,
     next: usize,
 }
 
 impl StampPen {
-    /// Makes a pen by itself with room for a given number of times.
+    /// Makes a separate pen with room for a given number of times.
     pub fn new(times: usize) -> Self {
         Self {
             times: (0..times).map(|_| AtomicU64::new(0)).collect(),
@@ -252,7 +252,7 @@ impl StampPen {
 }
 
 impl BodyStamps {
-    /// Makes a pen for the next subtask's body, which writes twice a job.
+    /// Makes a pen for the next subtask's body, with room for two times a job.
     pub fn pen(&mut self, jobs: u64) -> StampPen {
         let pen = StampPen::new(
             usize::try_from(jobs)
@@ -268,12 +268,12 @@ impl BodyStamps {
         self.times.push(Arc::new([]));
     }
 
-    /// Returns when a body's first instruction was, if it stamped.
+    /// Returns the time of a body's first instruction, if the body stamped.
     pub fn first(&self, subtask: usize, job: u64) -> Option<u64> {
         self.time(subtask, job, 0)
     }
 
-    /// Returns when a body's last instruction was, if it stamped.
+    /// Returns the time of a body's last instruction, if the body stamped.
     pub fn last(&self, subtask: usize, job: u64) -> Option<u64> {
         self.time(subtask, job, 1)
     }

@@ -1,7 +1,7 @@
 //! Boots, measures the way from a completion to its successor, and reports.
 //!
-//! Words of the command line: `part` is what to measure, `jobs` how many of each
-//! workload; `chain`, `branches` and `layered` are the sizes of the workloads.
+//! Options: `part` selects the measurements, `jobs` is the number of jobs of
+//! each workload; `chain`, `branches` and `layered` are the sizes of the workloads.
 
 #![no_std]
 #![no_main]
@@ -24,7 +24,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Makes some of the measurements.
+/// A function that takes some of the measurements.
 type Part = fn(&Machine, &MeasurementPlan) -> Result<(), AppError>;
 
 const PARTS: [(&str, Part); 3] = [
@@ -33,7 +33,7 @@ const PARTS: [(&str, Part); 3] = [
     ("elsewhere", elsewhere),
 ];
 
-/// Measures all that one core is enough for.
+/// Takes all measurements possible on one core.
 fn on_one_core(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     measure::clock();
     workloads(machine, plan)?;
@@ -44,7 +44,7 @@ fn on_one_core(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError
     wake_ups(machine, plan)
 }
 
-/// Measures what needs a second core.
+/// Takes the measurements that need a second core.
 fn elsewhere(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     measure::woken_cores(machine, plan.jobs)?;
     measure::joins(machine, plan.jobs)?;
@@ -72,7 +72,7 @@ fn wake_ups(machine: &Machine, plan: &MeasurementPlan) -> Result<(), AppError> {
     branches.try_for_each(|&parallel| measure::wake_ups(machine, parallel))
 }
 
-/// The measurements to be taken.
+/// The measurements to take.
 struct MeasurementPlan {
     part: Part,
     jobs: u64,

@@ -3,11 +3,10 @@
 //! *On the same core*: chains, fork-joins and layered graphs, from a completion to its successor.
 //! *Elsewhere*: from a completion to successors on other cores, and joins across cores.
 //!
-//! *Preemption*: from a release to the preemptor's first instruction, and back.
-//! A low subtask reads the clock all the time, and keeps the longest time between
-//! two readings of a job: that is when it was preempted. The preemptor stamps. The journal has the
-//! kernel's own times of request, suspension, start, finish and continuation, which no body can
-//! see.
+//! *Preemption*: from a release to the preemptor's first instruction, and back. A low subtask reads
+//! the clock all the time, and keeps the longest time between two readings of a job: the
+//! preemption. The preemptor stamps. The journal has the kernel's own times of request, suspension,
+//! start, finish and continuation, which no body can see.
 
 use alloc::format;
 use alloc::string::String;
@@ -23,7 +22,7 @@ use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
-/// Measures the cost of reading the clock, and of a stamp.
+/// Measures the cost of a reading of the clock, and of a stamp.
 pub(crate) fn clock() {
     const READINGS: usize = 200;
     let mut readings = [0; READINGS];
@@ -38,7 +37,7 @@ pub(crate) fn clock() {
     emit("clock", "stamp", 1, differences(pen.times()));
 }
 
-/// A chain: from each subtask to the next, and from end to end.
+/// Measures a chain: from each subtask to the next, and from end to end.
 pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("chain-{subtasks}");
     let shape = Shape::Chain(subtasks);
@@ -59,7 +58,7 @@ pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(),
     Ok(())
 }
 
-/// The same chain, where each subtask has a budget; and by deadlines.
+/// Measures the same chain with a budget for each subtask, in a table, and by deadlines.
 pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let mut workload = workload(Shape::Chain(subtasks), jobs, Stamping::Ends);
     workload.wcet = Some(Duration::from_millis(1));
@@ -73,7 +72,7 @@ pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(
     Ok(())
 }
 
-/// A chain in a table of so many cores, which take its subtasks in turn.
+/// Measures a chain in a table of `cores` cores, which take the chain's subtasks in turn.
 pub(crate) fn in_a_table(
     machine: &Machine,
     workload: Workload,
@@ -90,7 +89,7 @@ pub(crate) fn in_a_table(
     Ok(())
 }
 
-/// The same on two cores: each hop wakes the other one.
+/// Measures the same on two cores: each hop wakes the other core.
 pub(crate) fn hops_elsewhere(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     in_a_table(machine, workload(Shape::Chain(64), jobs, Stamping::Ends), 2)
 }
@@ -100,7 +99,7 @@ fn emit_hop(name: &str, ends: &MeasuredRun) {
     emit(name, "hop", hops, ends.source_to_sink());
 }
 
-/// A fork and its join: from the last return to the sink.
+/// Measures a fork and its join: from the last return to the sink.
 pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("fork-join-{parallel}");
     let shape = Shape::ForkJoin(parallel);
@@ -123,9 +122,8 @@ fn emit_join(name: &str, all: &MeasuredRun) {
     all.emit(name, "ready_to_start", &ready, &started);
 }
 
-/// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink
-/// for
-/// each of its inputs makes N wake-ups of a join of N.
+/// Counts for a fork and its join how often the scheduler makes the sink ready. A system waking a
+/// sink for each of its inputs needs N wake-ups for a join of N.
 pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), AppError> {
     const JOBS: u64 = 20;
     let shape = Shape::ForkJoin(parallel);
@@ -143,10 +141,10 @@ pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), AppErro
     Ok(())
 }
 
-/// A layered random graph: from end to end, for each instance.
+/// Measures a layered random graph: from end to end, for each instance.
 pub(crate) fn layered(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("layered-{subtasks}");
-    // As many instances as a chain has, and a few jobs at least.
+    // As many instances as in a chain, but at least a few jobs.
     let jobs = (jobs.saturating_mul(64) / subtasks as u64).clamp(3, jobs.max(3));
     let shape = Shape::Layered { subtasks, seed: 1 };
     let ends = MeasuredRun::run(machine, workload(shape, jobs, Stamping::Ends))?;
@@ -160,8 +158,8 @@ fn differences(times: impl Iterator<Item = u64> + Clone) -> impl Iterator<Item =
     later.zip(times).map(|(later, earlier)| later - earlier)
 }
 
-/// A fork into two on an otherwise idle machine: one branch follows on the
-/// source's core, the other on a core that has to be woken.
+/// Measures a fork into two on an otherwise idle machine: one branch follows on the source's core,
+/// the other on a woken core.
 pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let shape = Shape::ForkJoin(2);
     let all = MeasuredRun::run(machine, workload(shape, jobs, Stamping::All))?;
@@ -176,7 +174,7 @@ pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), AppError> 
     Ok(())
 }
 
-/// Joins of branches that compute for 2 us each, on different cores.
+/// Measures joins of branches that compute for 2 us each, on different cores.
 pub(crate) fn joins(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     const WORK: Duration = Duration::from_micros(2);
     for parallel in [2, 4] {
@@ -190,13 +188,13 @@ pub(crate) fn joins(machine: &Machine, jobs: u64) -> Result<(), AppError> {
 
 const PERIOD: Duration = Duration::from_millis(4);
 
-/// When the preemptor is released: amid what it preempts.
+/// The offset of the preemptor's release: amid the preempted work.
 const OFFSET: Duration = Duration::from_millis(1);
 
-/// How long the low subtasks compute.
+/// The time for which the low subtasks compute.
 const WORK_NS: u64 = 2_000_000;
 
-/// Preempts one of the low subtasks, of which each core has one.
+/// Measures a preemption of a low subtask; each core has such a subtask.
 pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let mut stamps = BodyStamps::default();
     let mut dags = alloc::vec![preemptor(jobs, stamps.pen(jobs))];
@@ -212,10 +210,10 @@ pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
         let instance = Instance::new(run.task_set().find(&dags[0]), job, SubtaskId(0));
         run.record().instance(instance)?.core
     };
-    // Of the lowest priority is the last, wherever it runs.
+    // The last DAG has the lowest priority, wherever it runs.
     let lowest = dags.len() - 1;
-    // Only core 0 has the release timer; another core is told. Where there are
-    // others, few jobs preempt core 0: they are left out.
+    // Only core 0 has the release timer, and it tells other cores. Where there are others, few jobs
+    // preempt core 0: they are left out.
     let is_told = machine.cores() > 1;
     let name = if is_told {
         "preemption of another core"
@@ -225,7 +223,7 @@ pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let jobs = || (0..jobs).filter(|job| (core(*job) != Some(CoreId(0))) == is_told);
     let release_ns = |job| Some(epoch_ns + offset_ns + job * period_ns);
     let (first, last) = (|job| stamps.first(0, job), |job| stamps.last(0, job));
-    // Another gap than the preemptor's was longer, where the host is busy.
+    // On a busy host another gap may be longer than the preemptor's.
     let gap = |job| {
         let gap = (stamps.first(lowest, job)?, stamps.last(lowest, job)?);
         (gap.0 <= first(job)? && last(job)? <= gap.1).then_some(gap)
@@ -245,14 +243,14 @@ pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Takes preemptions apart by the kernel's own times: those of core 0, or of all others.
+/// Splits preemptions by the kernel's own times: on core 0, or on all others.
 fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>); 3] {
     let mut parts = [
         ("request_to_suspended", Vec::new()),
         ("suspended_to_start", Vec::new()),
         ("finish_to_resumed", Vec::new()),
     ];
-    // They are in order of time only core by core.
+    // The journal is in order of time only core by core.
     let mut events: Vec<Event> = run.journal().events().collect();
     events.sort_by_key(|event| event.time_ns);
     for (place, request) in events.iter().enumerate() {
@@ -260,7 +258,7 @@ fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>
         if !is_meant || (request.core != CoreId(0)) != is_told {
             continue;
         }
-        // What happened next on that core, each after the one before.
+        // The next events on that core, each after the one before.
         let mut later = events[place..].iter();
         let mut next = |what, is_preemptors: bool| {
             let event = later.find(|event| {
@@ -321,10 +319,10 @@ fn periodic(jobs: u64, name: &str, priority: u32, body: impl FnMut(u64) + Send +
     dag
 }
 
-/// Describes a workload of empty bodies, released seldom enough for each job to be
-/// complete before the next.
+/// Describes a workload of empty bodies, released so seldom that each job is complete before the
+/// next.
 fn workload(shape: Shape, jobs: u64, stamping: Stamping) -> Workload {
-    /// Room for an instance, even where a nanosecond is a real one.
+    /// Room for an instance, even where the clock runs in real time.
     const PERIOD_OF_INSTANCE: Duration = Duration::from_micros(20);
     let instances = u32::try_from(shape.subtasks()).unwrap_or(u32::MAX);
     Workload {
@@ -337,7 +335,7 @@ fn workload(shape: Shape, jobs: u64, stamping: Stamping) -> Workload {
     }
 }
 
-/// A run that has ended, with its stamps.
+/// An ended run, with its stamps.
 struct MeasuredRun {
     run: Run,
     stamps: BodyStamps,
@@ -347,7 +345,7 @@ struct MeasuredRun {
 }
 
 impl MeasuredRun {
-    /// Commits and runs.
+    /// Commits the workload's DAG, and runs it.
     fn run(machine: &Machine, workload: Workload) -> Result<Self, AppError> {
         Self::run_in_order(machine, workload, &[])
     }
@@ -373,7 +371,7 @@ impl MeasuredRun {
         })
     }
 
-    /// Prints what every workload has.
+    /// Prints the figures common to all workloads.
     fn emit_common(&self, name: &str) {
         let period_ns = u64::try_from(self.workload.period.as_nanos()).unwrap_or(u64::MAX);
         let release_ns = |job: u64| self.run.epoch_ns() + job * period_ns;
@@ -396,7 +394,7 @@ impl MeasuredRun {
         }
     }
 
-    /// Prints the times from one instant of each job to another one.
+    /// Prints the times from one instant of each job to another.
     fn emit(
         &self,
         name: &str,
@@ -420,7 +418,7 @@ impl MeasuredRun {
             .filter_map(move |job| since(stamps.first(sink, job), stamps.first(0, job)))
     }
 
-    /// Returns when the last of the sink's predecessors in a fork-join returned.
+    /// Returns the time of the last return among the sink's predecessors in a fork-join.
     fn last_return(&self, job: u64) -> Option<u64> {
         let sink = self.workload.shape.subtasks() - 1;
         (1..sink)
@@ -428,12 +426,12 @@ impl MeasuredRun {
             .max()
     }
 
-    /// Returns when the scheduler made an instance ready.
+    /// Returns the time at which the scheduler made an instance ready.
     fn ready_ns(&self, subtask: usize, job: u64) -> Option<u64> {
         Some(self.run.epoch_ns() + self.instance(subtask, job)?.ready_ns?)
     }
 
-    /// Returns what the scheduler did with an instance.
+    /// Returns the scheduler's record of an instance.
     fn instance(&self, subtask: usize, job: u64) -> Option<&InstanceRecord> {
         let subtask = SubtaskId(u32::try_from(subtask).ok()?);
         let instance = Instance::new(self.dag, job, subtask);
@@ -441,7 +439,7 @@ impl MeasuredRun {
     }
 }
 
-/// Runs what is committed; a breach of the model's rules is an error.
+/// Runs the committed DAGs; a breach of the model's rules is an error.
 fn run(machine: &Machine) -> Result<Run, AppError> {
     let run = machine.run()?;
     if let Some(violation) = run.violations().next() {
@@ -454,7 +452,7 @@ fn since(later: Option<u64>, earlier: Option<u64>) -> Option<u64> {
     later?.checked_sub(earlier?)
 }
 
-/// Prints a measured quantity of one workload as a machine line; a sample is of `per` equal steps.
+/// Prints a measured quantity of a workload as a machine line; a sample covers `per` equal steps.
 fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
     let samples = Distribution::new(samples);
     json::emit("hand_off", |line| {

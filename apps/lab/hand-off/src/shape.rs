@@ -1,9 +1,8 @@
-//! The graphs that are measured, as lists of edges.
+//! The measured graphs, as lists of edges.
 //!
-//! Nothing here is of this project: to time another scheduler on the same graphs,
-//! these few lines and empty functions are enough. Subtasks are
-//! numbered from 0 in topological order; 0 is the one source, the last one is the
-//! one sink.
+//! Nothing here belongs to this project: a few such lines and empty functions are enough to time
+//! another scheduler on the same graphs. Subtasks are numbered from 0 in topological order; 0 is
+//! the only source, the last number is the only sink.
 
 use alloc::vec::Vec;
 
@@ -12,24 +11,23 @@ use random::Random;
 /// The number of subtasks side by side in a layered graph.
 const LAYER: usize = 32;
 
-/// A graph to be measured.
+/// A graph to measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// So many subtasks, one after the other; at least 1.
+    /// The given number of subtasks, one after the other; at least 1.
     Chain(usize),
     /// A source, this number of subtasks side by side, a sink.
     ForkJoin(usize),
     /// A random graph in layers.
     ///
-    /// Between source and sink are `subtasks - 2` subtasks, in layers of
-    /// 32; the last layer has what is left. One of the first layer follows
-    /// the source. One of any other layer follows 3 of the layer before, each
-    /// drawn by itself, uniformly; one that is drawn twice counts once. The sink
-    /// follows all that have no other successor.
+    /// Between source and sink are `subtasks - 2` subtasks, in layers of 32; the last layer has the
+    /// rest. Each subtask of the first layer follows the source. Each subtask of any other layer
+    /// follows 3 subtasks of the layer before, each drawn independently and uniformly; a subtask
+    /// drawn twice counts once. The sink follows all subtasks without another successor.
     ///
-    /// The draws are those of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014, doi
-    /// 10.1145/2660193.2660195) started with `seed`; a draw's high 5 bits are the
-    /// place in the layer. They are made in the order of the subtasks.
+    /// The draws come from SplitMix64 (Steele, Lea, Flood, OOPSLA 2014, doi
+    /// 10.1145/2660193.2660195), started with `seed`; the high 5 bits of a draw are the place in
+    /// the layer. The draws are made in the order of the subtasks.
     Layered {
         /// The number of subtasks, source and sink included; at least 3.
         subtasks: usize,
@@ -47,8 +45,7 @@ impl Shape {
         }
     }
 
-    /// Returns the edges, from smaller to larger numbers, ordered by the latter;
-    /// none stands twice.
+    /// Returns the edges, each once, from smaller to larger numbers, ordered by the larger.
     pub fn edges(self) -> Vec<(usize, usize)> {
         let sink = self.subtasks() - 1;
         match self {
