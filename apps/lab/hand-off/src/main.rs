@@ -1,7 +1,7 @@
 //! Boots, measures the way from a completion to its successor, and reports.
 //!
-//! Options: `part` selects the measurements, `jobs` is the number of jobs of
-//! each workload; `chain`, `branches` and `layered` are the sizes of the workloads.
+//! Options: `part` selects the measurements, `jobs` is the number of jobs of each workload;
+//! `chain`, `branches` and `layered` are the sizes of the workloads.
 
 #![no_std]
 #![no_main]

@@ -1,13 +1,12 @@
 //! The publish/subscribe conditions: the workload as callbacks, on all cores.
 //!
-//! One source, N parallel subtasks, one join, as in `fork-join`; but they are
-//! callbacks that publish on topics, and the join is made by a synchronizer that
-//! matches stamps. Each is a group of its own, so that different ones run side by
-//! side and none overlaps with itself.
+//! One source, N parallel subtasks and one join, as in `fork-join`. But here they are callbacks
+//! publishing on topics, and a synchronizer matching stamps makes the join. Each callback is a
+//! group of its own, so different callbacks run side by side and none overlaps with itself.
 //!
-//! The executor's workers are the parallel subtasks of a DAG that has one job: its
-//! source sets the epoch, then there is a worker on each core until all is joined.
-//! So the two worlds have the same kernel, the same cores and the same clock.
+//! The executor's workers are the parallel subtasks of a DAG with a single job: the DAG's source
+//! sets the epoch, then each core has a worker until everything is joined. So both worlds have the
+//! same kernel, the same cores and the same clock.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -39,7 +38,7 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Condition
     });
     fass::finish_create_dags(&[workers(machine.cores(), &shared)])?;
     let run = machine.run()?;
-    // The workers are at their end, and whatever they still hold of it stays.
+    // The workers have ended, and their clones of the cores stay: only the graph leaves.
     let graph = shared
         .graph
         .with(|graph| core::mem::replace(graph, Graph::new(0)));
@@ -79,29 +78,29 @@ fn workers(cores: u32, shared: &Arc<ExecutorCores>) -> Dag {
     dag
 }
 
-/// The cores as the executor's host.
+/// The cores as the host of the executor.
 struct ExecutorCores {
     graph: Lock<Graph<Message, GroupPart>>,
     event: Event,
     /// Time 0 of the graph on the kernel's clock.
     epoch_ns: AtomicU64,
-    /// Whether a worker watches the clock for all that wait.
+    /// Whether a worker watches the clock for all waiting workers.
     has_keeper: AtomicBool,
-    /// The latest version that a worker had seen when it began to wait.
+    /// The latest event version seen by a worker that began to wait.
     latest_seen: AtomicU64,
 }
 
 impl ExecutorCores {
-    /// Sets the epoch, a little ahead so that all workers are there.
+    /// Sets the epoch, a little ahead so that all workers are there in time.
     fn set_epoch(&self) {
         const LEAD_NS: u64 = 1_000_000;
         self.epoch_ns
             .store(fass::now_ns() + LEAD_NS, Ordering::Relaxed);
     }
 
-    /// Waits for time 0, before which the graph's time stands still. One worker has an
-    /// alarm, as in any wait: which of two cores comes first whose timers end at one
-    /// time depends on the host, also in `deterministic` mode.
+    /// Waits for time 0, before which the graph's time stands still. As in any wait, one worker has
+    /// an alarm. If two cores had timers ending at the same time, the host would decide which core
+    /// comes first, even in `deterministic` mode.
     fn wait_for_epoch(&self) {
         let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
         while fass::now_ns() < epoch_ns {
@@ -141,14 +140,15 @@ impl ExecutorCores {
         self.event.notify();
     }
 
-    /// Makes all workers end when they have executed what they are at.
+    /// Makes all workers end after their current callbacks.
     fn shut_down(&self) {
         self.graph.with(Graph::shut_down);
         self.event.notify();
     }
 
-    /// As in ROS 2's executor one idle worker at a time watches the clock, the others
-    /// wait for a notice. When it leaves, for whatever reason, one of them takes over.
+    /// Waits for a notice. As in ROS 2's executor, one idle worker at a time watches the clock, and
+    /// the others wait for a notice. When the watching worker leaves, for any reason, another takes
+    /// over.
     fn wait(&self, seen: u64, until_ns: u64) {
         self.latest_seen.fetch_max(seen, Ordering::SeqCst);
         if self.has_keeper.swap(true, Ordering::SeqCst) {
@@ -158,20 +158,20 @@ impl ExecutorCores {
         let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
         self.event.wait(seen, until_ns.saturating_add(epoch_ns));
         self.has_keeper.store(false, Ordering::SeqCst);
-        // A worker that found the place taken had noted before what it has seen. If that
-        // is all that has happened, it sleeps now, and nobody would wake it.
+        // A worker that found the place taken had noted its seen version before. If nothing newer
+        // has happened, that worker sleeps by now, and nobody else would wake it.
         if self.latest_seen.load(Ordering::SeqCst) >= self.event.version() {
             self.event.notify();
         }
     }
 }
 
-/// How messages are matched.
+/// The rule for matching messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MatchingPolicy {
-    /// By equal stamps. Parallel subtasks pass the source's stamp on.
+    /// By equal stamps. Parallel subtasks pass on the source's stamp.
     Exact,
-    /// By stamps at most so far apart. Parallel subtasks stamp anew.
+    /// By stamps within an interval. Parallel subtasks stamp anew.
     Approximate {
         /// The longest interval, inclusive, in nanoseconds.
         max_interval_ns: u64,
@@ -187,18 +187,18 @@ pub(crate) struct Experiment {
     pub(crate) jobs: usize,
     /// The seed of the execution times.
     pub(crate) seed: u64,
-    /// How messages are matched.
+    /// The rule for matching messages.
     pub(crate) matching: MatchingPolicy,
     /// The synchronizer's queue size.
     pub(crate) queue: NonZeroUsize,
-    /// The depth of all subscriptions. If one drops a message, the run is of no use:
-    /// then jobs and publications no longer have the same numbers.
+    /// The depth of all subscriptions. If a subscription drops a message, the run is useless: jobs
+    /// and publications no longer have the same numbers.
     pub(crate) depth: NonZeroUsize,
 }
 
 impl Experiment {
-    /// Builds the graph. Its time 0 is the run's epoch; it shuts down when all has
-    /// been published and joined.
+    /// Builds the graph. Time 0 of the graph is the run's epoch; the graph shuts down when
+    /// everything has been published and joined.
     fn graph(self) -> Graph<Message, GroupPart> {
         let mut graph = Graph::new(1 + self.parallel);
         let part = |role, executions| GroupPart {
@@ -247,38 +247,38 @@ type Message = Stamped<u64>;
 /// The source's topic.
 const INPUT: usize = 0;
 
-/// The topic of the first parallel subtask; those of the others follow, in their order.
+/// The topic of the first parallel subtask; the topics of the others follow, in their order.
 const FIRST_OUTPUT: usize = 1;
 
-/// The callbacks of one group, with what they have seen so far.
+/// The callbacks of one group, with their observations so far.
 struct GroupPart {
     experiment: Experiment,
     role: CallbackRole,
-    /// The executions of the source or a parallel subtask, one a job.
+    /// The executions of the source or of a parallel subtask, in the order of jobs.
     spans: Vec<ExecutionSpan>,
 }
 
 enum CallbackRole {
-    /// Publishes a job at each call of its timer, until all are published.
+    /// Publishes a job at each call of its timer, until all jobs are published.
     Source,
-    /// Executes each job it receives for a drawn time, and publishes it.
+    /// Executes each received job for a drawn time, and publishes the job.
     Parallel {
         output: usize,
         times: ExecutionTimes,
     },
-    /// Joins what the parallel subtasks publish.
+    /// Joins the publications of the parallel subtasks.
     Join {
         synchronizer: Box<dyn Synchronizer<u64> + Send>,
         joins: Vec<CompletedJoin>,
-        /// The jobs that were joined, as in [`RunSamples::indices`].
+        /// The joined jobs, as in [`RunSamples::indices`].
         indices: Vec<u64>,
-        /// How many messages are to come; after that, nothing can happen any more.
+        /// The number of messages still to come; after the last, nothing more can happen.
         expected: usize,
     },
 }
 
 impl GroupPart {
-    /// Executes one of them: for a message, which comes with its topic, or for the timer.
+    /// Executes a callback: for a message, given with its topic, or for the timer.
     fn call(&mut self, message: Option<(usize, Message)>, cores: &ExecutorCores) {
         let start_ns = cores.now_ns();
         let spans = &mut self.spans;
@@ -330,14 +330,14 @@ impl GroupPart {
                     cores.shut_down();
                 }
             }
-            // A source that is through; and the graph registers no other timer.
+            // A source after its last job; the graph registers no other timer.
             (CallbackRole::Source, _) | (_, None) => {}
         }
     }
 }
 
-/// Where sets go: to the join's function, which is called at once, as the original
-/// calls it. Like the DAG's sink, it only looks.
+/// The outlet for sets: the function of the join, called at once, as in the original. Like the
+/// DAG's sink, the function only looks.
 struct JoinOutlet<'a> {
     cores: &'a ExecutorCores,
     joins: &'a mut Vec<CompletedJoin>,
@@ -357,7 +357,7 @@ impl Outlet<u64> for JoinOutlet<'_> {
     }
 }
 
-/// Takes what a graph has seen when it was shut down and no worker uses it.
+/// Takes the samples out of a graph that is shut down and used by no worker.
 fn samples(graph: Graph<Message, GroupPart>) -> RunSamples {
     let mut samples = RunSamples {
         lost_inputs: graph.dropped(),

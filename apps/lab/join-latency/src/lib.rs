@@ -1,22 +1,23 @@
-//! The times of a run of the evaluation, the same whatever joined.
+//! The times of a run of the evaluation, in one form for every kind of join.
 //!
-//! One source, N parallel subtasks, one join. By the DAG of `fork-join` the scheduler joins them;
-//! in publish/subscribe form they are callbacks, and a synchronizer matches stamps. Whatever is
-//! joined, parallel subtask b executes its i-th job for the same time, which depends on the seed, b
-//! and i alone ([`fork_join::ExecutionTimes`]).
+//! A workload has one source, N parallel subtasks and one join. In the DAG of `fork-join` the
+//! scheduler joins them; in publish/subscribe form they are callbacks, and a synchronizer matches
+//! stamps. In both forms, parallel subtask b executes its i-th job for the same time, which depends
+//! on the seed, b and i alone ([`fork_join::ExecutionTimes`]).
 //!
-//! Some words for what the joins of a run amount to. A parallel subtask publishes on a topic of its
-//! own. *Index* i of a topic is its i-th publication, from 0: that of job i. The *last publication*
-//! of index i is when the last topic has published it: no join of job i can come sooner. A join
-//! *covers* index i if all that it joins has index i or a later one.
+//! Some terms describe the joins of a run. Each parallel subtask publishes on its own topic.
+//! *Index* i of a topic is the topic's i-th publication, from 0: the publication of job i. The
+//! *last publication* of index i is the time at which the last topic has published index i: no join
+//! of job i can come sooner. A join *covers* index i if all joined values have index i or a later
+//! index.
 //!
-//! The join latency as the paper defines it compares the i-th join with the last publication of
-//! index i. If joins are skipped, all later ones are compared with indices that they have nothing
-//! to do with, so that it grows with the length of the run and never converges.
-//! [`RunSamples::cover_delays_ns`] has no such trouble. Either says nothing of joins that never
-//! happened: state these, too.
+//! The paper's join latency compares the i-th join with the last publication of index i. If joins
+//! are skipped, all later joins are compared with unrelated indices, so the latency grows with the
+//! length of the run and never converges. [`RunSamples::cover_delays_ns`] avoids such trouble.
+//! Neither figure says anything about joins that never happened: state the number of missing joins,
+//! too.
 //!
-//! Nothing here knows the kernel, and figures computed from the times are exact.
+//! The crate does not depend on the kernel, and figures computed from the times are exact.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -25,39 +26,39 @@ extern crate alloc;
 
 use alloc::vec::Vec;
 
-/// From when to when something executed.
+/// The start and the end of an execution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExecutionSpan {
     /// The function's first instruction.
     pub start_ns: u64,
-    /// For the source and the parallel subtasks: the publication. For a join: the
-    /// function's last instruction.
+    /// The publication, for the source and the parallel subtasks. For a join, the function's last
+    /// instruction.
     pub finish_ns: u64,
 }
 
-/// A join that happened.
+/// A completed join.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CompletedJoin {
-    /// When all that is joined had been put together.
+    /// The time at which the set of joined values was complete.
     pub ready_ns: u64,
-    /// When the function that uses it executed.
+    /// The execution of the function that uses the values.
     pub span: ExecutionSpan,
 }
 
 /// The times of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunSamples {
-    /// For each job the source's execution.
+    /// The source's execution, for each job.
     pub source: Vec<ExecutionSpan>,
-    /// For each parallel subtask and job its execution; it publishes at the end.
+    /// The execution of each parallel subtask for each job; the subtask publishes at the end.
     pub parallel: Vec<Vec<ExecutionSpan>>,
-    /// The joins in their order.
+    /// The joins, in their order.
     pub joins: Vec<CompletedJoin>,
-    /// For each join the jobs whose values it joined, one a parallel subtask; all
-    /// joins one after the other.
+    /// The jobs whose values each join joined, one for each parallel subtask; the joins follow one
+    /// another.
     pub indices: Vec<u64>,
-    /// Messages that queues before the synchronizer dropped. More than 0 means that
-    /// the i-th publication is not job i.
+    /// Messages dropped by queues before the synchronizer. If there are any, the i-th publication
+    /// is not job i.
     pub lost_inputs: u64,
 }
 
@@ -68,8 +69,8 @@ impl RunSamples {
         &self.indices[join * parallel..(join + 1) * parallel]
     }
 
-    /// Returns how many joins there are, how many of them are of one job and how many across jobs,
-    /// and how many never happened: one for each index that all topics have published.
+    /// Returns the number of joins, of joins of one job, of joins across jobs, and of joins that
+    /// never happened: one is expected for each index published by all topics.
     pub fn counts(&self) -> [usize; 4] {
         let joins = self.joins.len();
         let is_of_one = |join: &usize| {
@@ -81,20 +82,20 @@ impl RunSamples {
         [joins, of_one, joins - of_one, indices.saturating_sub(joins)]
     }
 
-    /// Returns the join latency as the paper defines it, for each join: from the last publication
-    /// of index i to the i-th join.
+    /// Returns the paper's join latency for each join: from the last publication of index i to the
+    /// i-th join.
     pub fn join_latencies_ns(&self) -> Vec<u64> {
         self.delays_ns(0..self.joins.len())
     }
 
-    /// Returns for each index that a join covers how long that took: from the last publication of
-    /// the index to the first join that covers it.
+    /// Returns a delay for each index covered by a join: from the last publication of the index to
+    /// the first join covering the index.
     pub fn cover_delays_ns(&self) -> Vec<u64> {
         self.delays_ns(self.covering_joins())
     }
 
-    /// Returns how long each join was ready after the last publication of the index at its place
-    /// in the list.
+    /// Returns the delay from the last publication of each index to the readiness of the join at
+    /// the index's place in the list.
     fn delays_ns(&self, joins: impl IntoIterator<Item = usize>) -> Vec<u64> {
         let pairs = joins.into_iter().zip(self.last_publications_ns());
         pairs
@@ -102,14 +103,14 @@ impl RunSamples {
             .collect()
     }
 
-    /// Returns for each index that a join covers the position of the first such join. If no join
-    /// covers an index, none covers a later one.
+    /// Returns, for each covered index, the position of the first join covering the index. If no
+    /// join covers an index, none covers a later index.
     pub fn covering_joins(&self) -> Vec<usize> {
         let mut first = 0;
         let indices = (0..).take(self.last_publications_ns().count());
         let covering = indices.map_while(|index| {
             let covers = |join: &usize| self.indices_of(*join).iter().all(|own| *own >= index);
-            // A join that does not cover this index covers no later one.
+            // A join without this index covers no later index either.
             first = (first..self.joins.len()).find(covers)?;
             Some(first)
         });

@@ -1,8 +1,8 @@
-//! Boots into one condition of the evaluation and prints the times of all jobs.
+//! Boots into one condition of the evaluation, and prints the times of all jobs.
 //!
-//! The DAG-native condition runs `fork-join`'s DAG, joined by the scheduler; the others run
-//! callbacks whose messages a synchronizer matches (`by_stamps`). Printed are all times in batches,
-//! and a summary.
+//! The DAG-native condition runs the DAG of `fork-join`, joined by the scheduler. The other
+//! conditions run callbacks, and a synchronizer matches their messages (`by_stamps`). The app
+//! prints all times in batches, and a summary.
 
 #![no_std]
 #![no_main]
@@ -28,7 +28,7 @@ use sched_dag::{Instance, SubtaskId};
 
 kernel::entry!(main);
 
-/// The words of the command line that are the app's.
+/// The app's options on the command line.
 const WORDS: [&str; 7] = [
     "policy_under_test",
     "max_interval_ms",
@@ -120,8 +120,8 @@ fn at_least_one(number: u64) -> NonZeroUsize {
 /// Runs all jobs.
 fn run_dag(machine: &Machine, workload: &Workload) -> Result<ConditionOutcome, AppError> {
     let (dag, joins) = workload.build();
-    // As many jobs in flight as the subscriptions' queues have room for by default,
-    // so that no release waits for the backlog on either side.
+    // As many jobs may be in flight as fit in the subscriptions' queues by default, so no release
+    // waits for the backlog on either side.
     dag.in_flight(
         u32::try_from(workload.jobs)
             .unwrap_or(u32::MAX)
@@ -136,8 +136,8 @@ fn run_dag(machine: &Machine, workload: &Workload) -> Result<ConditionOutcome, A
     })
 }
 
-/// Reads the times from the scheduler's record. Each join has the values of its own
-/// job, which `fork-join` checks and counts otherwise.
+/// Reads the times from the scheduler's record. Each join has the values of its own job;
+/// `fork-join` checks for other values and counts them.
 fn samples(run: &Run, parallel: usize) -> RunSamples {
     let dag = run.task_set().find("fork-join");
     let jobs = run.record().numbered(dag).map(|(job, _)| job);
@@ -178,20 +178,20 @@ fn span(times: &InstanceRecord) -> Option<ExecutionSpan> {
     })
 }
 
-/// How many executions or joins one line holds.
+/// The number of executions or joins in a line.
 const BATCH: usize = 32;
 
 /// The outcome of a condition.
 pub(crate) struct ConditionOutcome {
     pub(crate) samples: RunSamples,
-    /// Allocations while it ran.
+    /// Allocations during the run.
     pub(crate) allocations: u64,
     /// Breaches of the scheduler's rules, and joins of a DAG that mix jobs.
     pub(crate) violations: u64,
 }
 
 impl ConditionOutcome {
-    /// Says what makes the condition worthless, if anything does.
+    /// Returns the reason that makes the condition worthless, if any.
     fn complaint(&self, jobs: u64) -> Option<String> {
         let Self {
             samples,

@@ -1,48 +1,44 @@
 //! Close stamps make a set.
 //!
-//! Each topic has a [ring](TopicRing) of messages in order of arrival. A *search*
-//! walks through them by advancing cursors, always that of the earliest head. The
-//! fronts of all rings may be a *candidate*: the best set that was found so far,
-//! from its earliest to its latest stamp. The *pivot* is the topic that was latest
-//! in the first candidate: once the search passes that message, all sets that
-//! contain it have been seen, so the candidate is emitted. A set is better than the
-//! candidate if it ends only a little later (the age penalty tells how little)
-//! and starts later by more. The numbered steps go on where
-//! [`ExactTime`](crate::ExactTime)'s end:
+//! Each topic has a [ring](TopicRing) of messages in order of arrival. A *search* walks through the
+//! rings by advancing cursors, always the cursor of the earliest head. The fronts of all rings may
+//! be a *candidate*: the best set found so far, from its earliest to its latest stamp. The *pivot*
+//! is the topic with the latest stamp in the first candidate: once the search passes the pivot's
+//! message, all sets containing that message have been seen, so the candidate is emitted. A set is
+//! better than the candidate if it ends only a little later (the age penalty tells how little) and
+//! starts later by more. The numbered steps go on from the last step of
+//! [`ExactTime`](crate::ExactTime):
 //!
 //! 5.  Without a candidate all cursors are at the front.
-//! 6.  An arrival is appended, then searched, and only then overflows: the search
-//!     sees one entry more than the queue size.
-//! 7.  An overflow rewinds all cursors and drops the front of the topic's ring,
-//!     which is lossy from then on. If there was a candidate, it is forgotten, and
-//!     the search starts again.
-//! 8.  A pass of the search compares the heads. Of equal stamps the lowest topic is
-//!     the earliest, the highest the latest.
+//! 6.  An arrival is appended, then searched, and only then overflows: the search sees one entry
+//!     more than the queue size.
+//! 7.  An overflow rewinds all cursors and drops the front of the topic's ring, which is lossy from
+//!     then on. If there was a candidate, the synchronizer forgets the candidate, and the search
+//!     starts again.
+//! 8.  A pass of the search compares the heads. Of equal stamps the lowest topic is the earliest,
+//!     the highest the latest.
 //! 9.  In every pass all topics but the latest cease to be lossy.
-//! 10. Without a candidate: if the heads are further apart than the longest
-//!     interval, or the latest topic is lossy, the earliest head is dropped.
-//!     Otherwise the heads become the candidate. Only here the interval counts.
-//! 11. With one: if the heads are better, all passed entries are dropped, so that the
-//!     heads become the candidate. The pivot stays.
+//! 10. Without a candidate: if the heads are further apart than the longest interval, or the latest
+//!     topic is lossy, the earliest head is dropped. Otherwise the heads become the candidate. Only
+//!     here the interval counts.
+//! 11. With a candidate: if the heads are better, all passed entries are dropped, so the heads
+//!     become the candidate. The pivot stays.
 //! 12. In both cases the earliest head is passed.
-//! 13. If it was the pivot's, or if any later set would be worse, the candidate is
-//!     emitted.
-//! 14. If a topic has no head then, the search goes on *virtually*: a message yet to
-//!     come is taken to be as early as it can be. That may prove the candidate
-//!     best. Otherwise the search waits for the next arrival.
-//! 15. Emitting takes the fronts of all rings and rewinds all cursors: what was
-//!     passed can be in later sets. The search goes on, so an arrival can emit
-//!     several sets.
+//! 13. If that was the pivot's head, or if any later set would be worse, the candidate is emitted.
+//! 14. If a topic has no head then, the search goes on *virtually*: it assumes that a future
+//!     message comes as early as possible. The assumption may prove the candidate best. Otherwise
+//!     the search waits for the next arrival.
+//! 15. Emitting takes the fronts of all rings and rewinds all cursors: passed entries can be in
+//!     later sets. The search goes on, so an arrival can emit several sets.
 //!
-//! So a set usually waits for a message that comes after it, a candidate lives on
-//! across arrivals, and every topic's messages are used in order of arrival, each
-//! at most once. Those are properties of the original, not to be mended.
+//! So a set usually waits for a message that comes after it, a candidate lives on across arrivals,
+//! and every topic's messages are used in order of arrival, each at most once. Such are the
+//! properties of the original, not to be mended.
 //!
-//! Storage for the queue size plus one messages a topic is reserved at
-//! construction. A pass costs O(topics). Between two sets there is at most one pass
-//! for each message held, as each passes or drops one, and then at most as many
-//! virtual ones; an arrival emits at most the queue size plus one sets. Typically an
-//! arrival takes a few passes.
+//! Storage for the queue size plus one messages a topic is reserved at construction. A pass costs
+//! O(topics). Between two sets there is at most one pass for each held message, because each pass
+//! passes or drops a message, and then at most as many virtual passes; an arrival emits at most the
+//! queue size plus one sets. Typically an arrival takes a few passes.
 
 use alloc::collections::VecDeque;
 use alloc::vec;
@@ -64,16 +60,16 @@ use crate::{Outlet, Stamped, Synchronizer};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Parameters {
-    /// How many messages of a topic are held between arrivals, at most.
+    /// The most messages of a topic held between arrivals.
     pub queue_size: NonZeroUsize,
-    /// How far the earliest and the latest stamp of a first candidate may be apart, itself
-    /// included; `None` for no limit. Later candidates are not tested: they are better.
+    /// The longest distance between the earliest and the latest stamp of a first candidate,
+    /// inclusive; `None` for no limit. Later candidates are not tested, because they are better.
     pub max_interval_ns: Option<u64>,
-    /// How much a later set has to be better by.
+    /// The amount by which a later set must be better.
     pub age_penalty: AgePenalty,
-    /// For each topic how far two successive stamps are apart at least, so that a set may be
-    /// proved best without waiting for the next message. It is believed: a promise that is not
-    /// kept changes which sets come out.
+    /// The least distance between two successive stamps of each topic, so that a set may be proved
+    /// best without waiting for the next message. The synchronizer believes the bounds: a broken
+    /// promise changes the emitted sets.
     pub lower_bounds_ns: Vec<u64>,
 }
 
@@ -98,13 +94,12 @@ impl Parameters {
     }
 }
 
-/// How much an older set is preferred to a newer one: a factor on the time by which
-/// the newer one ends later. It is normally 1 or more; a smaller one prefers newer
-/// sets.
+/// The preference for an older set over a newer set: a factor on the time by which the newer set
+/// ends later. The factor is normally 1 or more; a smaller factor prefers newer sets.
 ///
-/// The original multiplies by a floating-point 1 + p and rounds toward zero. Here
-/// the factor is the exact value of such a number, M / 2^K, and the product is
-/// exact too. A floating-point product would be wrong where it ties.
+/// The original multiplies by a floating-point 1 + p and rounds toward zero. Here the factor is the
+/// exact value of such a number, M / 2^K, and the product is exact too. A floating-point product
+/// would be wrong at ties.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AgePenalty {
     /// M, from 1 to [`MOST_FACTOR`](Self::MOST_FACTOR).
@@ -114,16 +109,15 @@ pub struct AgePenalty {
 }
 
 impl AgePenalty {
-    /// The largest M. Differences of stamps have at most 65 bits, with which the
-    /// product stays below 2^127.
+    /// The largest M. Differences of stamps have at most 65 bits, so the product stays below 2^127.
     pub const MOST_FACTOR: u64 = (1 << 62) - 1;
 
     /// The largest K.
     pub const MOST_SHIFT: u32 = 127;
 
-    /// Returns the penalty whose factor 1 + p is `factor / 2^shift`, or `None` if
-    /// one of them is out of range: M from 1 to [`MOST_FACTOR`](Self::MOST_FACTOR),
-    /// K from 0 to [`MOST_SHIFT`](Self::MOST_SHIFT).
+    /// Returns the penalty with the factor 1 + p = `factor / 2^shift`, or `None` if either is out
+    /// of range: M from 1 to [`MOST_FACTOR`](Self::MOST_FACTOR), K from 0 to
+    /// [`MOST_SHIFT`](Self::MOST_SHIFT).
     ///
     /// ```
     /// use pub_sub::AgePenalty;
@@ -155,32 +149,32 @@ impl Default for AgePenalty {
     }
 }
 
-/// The policy that makes sets of stamps that are close to each other.
+/// The policy of making sets from stamps close to each other.
 pub struct ApproximateTime<M> {
     parameters: Parameters,
     rings: Vec<TopicRing<M>>,
     candidate: Option<Candidate>,
-    /// Where the cursors were when a virtual search began.
+    /// The cursors at the start of a virtual search.
     cursors: Vec<usize>,
     /// The set being emitted; otherwise empty.
     set: Vec<Stamped<M>>,
 }
 
-/// The part of its candidate that a search remembers. The candidate itself needs no place:
-/// it is the fronts of all rings.
+/// The search's memory of its candidate. The candidate itself needs no place, being the fronts of
+/// all rings.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     earliest_ns: i128,
     latest_ns: i128,
-    /// The topic that was latest in the first candidate.
+    /// The topic with the latest stamp in the first candidate.
     pivot: usize,
     pivot_ns: i128,
 }
 
-/// The ends of a set of stamps, and whose they are.
+/// The ends of a set of stamps, and their topics.
 ///
-/// Stamps are compared as `i128`: their differences, and stamps that a lower bound
-/// moves on, do not fit 64 bits.
+/// Stamps are compared as `i128`: differences of stamps, and stamps moved on by a lower bound, do
+/// not fit 64 bits.
 #[derive(Clone, Copy, Debug)]
 struct StampEnds {
     earliest_ns: i128,
@@ -281,7 +275,7 @@ impl<M> ApproximateTime<M> {
         StampEnds::of(self.rings.iter().filter_map(TopicRing::head_ns))
     }
 
-    /// Whether heads cannot be a first candidate (step 10).
+    /// Returns whether the heads cannot be a first candidate (step 10).
     fn is_hopeless(&self, heads: StampEnds) -> bool {
         let interval_ns = heads.latest_ns - heads.earliest_ns;
         let longest_ns = self.parameters.max_interval_ns;
@@ -289,25 +283,25 @@ impl<M> ApproximateTime<M> {
             || self.rings[heads.latest].lossy
     }
 
-    /// Whether heads are better than the candidate (step 11). At a tie they are not.
+    /// Returns whether the heads are better than the candidate (step 11). At a tie they are not.
     fn is_better(&self, heads: StampEnds, candidate: Candidate) -> bool {
         let ends_later_ns = heads.latest_ns - candidate.latest_ns;
         let starts_later_ns = heads.earliest_ns - candidate.earliest_ns;
         self.parameters.age_penalty.scaled(ends_later_ns) < starts_later_ns
     }
 
-    /// Whether no set that ends at `latest_ns` or later can be better than the
-    /// candidate (step 13): as long as the pivot is not passed, it would have to
-    /// start no later than the pivot.
+    /// Returns whether no set ending at `latest_ns` or later can be better than the candidate (step
+    /// 13): as long as the pivot is not passed, such a set would have to start no later than the
+    /// pivot.
     fn rules_out_later_sets(&self, latest_ns: i128, candidate: Candidate) -> bool {
         let ends_later_ns = latest_ns - candidate.latest_ns;
         self.parameters.age_penalty.scaled(ends_later_ns)
             >= candidate.pivot_ns - candidate.earliest_ns
     }
 
-    /// Searches on with the earliest messages that may still come, and returns
-    /// whether that proves the candidate best (step 14). If not, the cursors are
-    /// where they were.
+    /// Continues the search with the earliest possible future messages, and returns whether the
+    /// continuation proves the candidate best (step 14). If not, the cursors are back in their old
+    /// places.
     fn virtual_search(&mut self, candidate: Candidate) -> bool {
         for (cursor, ring) in self.cursors.iter_mut().zip(&self.rings) {
             *cursor = ring.cursor;
@@ -319,8 +313,8 @@ impl<M> ApproximateTime<M> {
             if self.is_better(heads, candidate) {
                 break;
             }
-            // Its head is no virtual one: that would not be before the pivot, and
-            // then one of the two tests above would have held.
+            // The earliest head is no virtual head: a virtual head would not be before the pivot,
+            // and then one of the two tests above would have held.
             self.rings[heads.earliest].advance();
         }
         for (&cursor, ring) in self.cursors.iter().zip(&mut self.rings) {
@@ -329,8 +323,8 @@ impl<M> ApproximateTime<M> {
         false
     }
 
-    /// Returns the ends of the heads; where a topic has none, the earliest stamp that
-    /// its next message can have counts.
+    /// Returns the ends of the heads; a topic without a head counts with the earliest possible
+    /// stamp of its next message.
     fn virtual_heads(&self, candidate: Candidate) -> Option<StampEnds> {
         let lower_bounds_ns = &self.parameters.lower_bounds_ns;
         let stamps_ns = self.rings.iter().zip(lower_bounds_ns);
@@ -394,14 +388,14 @@ impl<M> Synchronizer<M> for ApproximateTime<M> {
     }
 }
 
-/// The messages of one topic, oldest arrival first, and how far a search got. A *cursor* parts
-/// them: those before it are *passed*, those from it on are *waiting*. The first waiting one is the
-/// *head*. Entries leave at the front.
+/// The messages of one topic, oldest arrival first, and the progress of a search. A *cursor*
+/// divides them: messages before it are *passed*, messages from it on are *waiting*. The first
+/// waiting message is the *head*. Entries leave at the front.
 struct TopicRing<M> {
     entries: VecDeque<Stamped<M>>,
     cursor: usize,
-    /// Whether an entry was discarded for want of room, and nothing since has shown
-    /// that this could not have hidden a better set.
+    /// Whether an entry was discarded for want of room, and the discarded entry could still have
+    /// hidden a better set.
     lossy: bool,
 }
 
@@ -432,7 +426,7 @@ impl<M> TopicRing<M> {
         self.cursor += 1;
     }
 
-    /// Removes the front entry, which the cursor must not depend on.
+    /// Removes the front entry, while the cursor is at the front.
     fn take_front(&mut self) -> Option<Stamped<M>> {
         debug_assert!(self.cursor == 0, "the front may be passed: rewind first");
         self.entries.pop_front()

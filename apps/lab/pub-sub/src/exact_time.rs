@@ -1,29 +1,30 @@
 //! Equal stamps make a set.
 //!
-//! An *entry* is a stamp with a slot for each topic. A message goes into its
-//! topic's slot of its stamp's entry. The numbered steps, which `./scripts/oracle synchronizer`
-//! holds against traces of the original:
+//! An *entry* is a stamp with a slot for each topic. A message goes into its topic's slot of its
+//! stamp's entry. `./scripts/oracle synchronizer` compares the numbered steps with traces of the
+//! original:
 //!
 //! 1. Entries are ordered by stamp. A message whose slot is taken replaces the
 //!    older one, silently.
 //! 2. An entry with all slots full is emitted and deleted; then every entry with a
 //!    smaller stamp is dropped. Newer entries stay.
-//! 3. While there are more entries than the queue size, the one with the smallest
-//!    stamp is dropped, even if the message that just arrived made it. So a topic
-//!    more than a queue's length of stamps behind can never match again.
-//! 4. Nothing is refused for being old: a late stamp makes a new entry that may
-//!    still be completed, so the stamps of successive sets can go backwards.
+//! 3. While there are more entries than the queue size, the entry with the smallest stamp is
+//!    dropped, even if the latest message made it. So a topic more than a queue's length of stamps
+//!    behind can never match again.
+//! 4. Nothing is refused for being old: a late stamp makes a new entry that may still be completed,
+//!    so the stamps of successive sets can go backwards.
 //!
-//! Storage for the queue size plus one entries is reserved at construction. The
-//! order is kept in a ring of stamps with their slots elsewhere, so that an arrival costs a
-//! binary search, and moves at most half of the ring when it makes an entry in the middle. Without a limit the storage grows with the largest backlog.
+//! Storage for the queue size plus one entries is reserved at construction. A ring holds the stamps
+//! in order, with their slots elsewhere. So an arrival costs a binary search, and moves at most
+//! half of the ring when it makes an entry in the middle. Without a limit the storage grows with
+//! the largest backlog.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use crate::{Outlet, Stamped, Synchronizer};
 
-/// The policy that makes sets of equal stamps.
+/// The policy of making sets from equal stamps.
 ///
 /// ```
 /// use pub_sub::{ExactTime, Outlet, Set, Stamped, Synchronizer};
@@ -60,13 +61,13 @@ type Slots<M> = Vec<Option<M>>;
 
 struct Entry<M> {
     stamp_ns: u64,
-    /// At least one of them is full.
+    /// At least one slot is full.
     slots: Slots<M>,
 }
 
 impl<M> ExactTime<M> {
-    /// Makes a synchronizer that keeps at most `queue_size` incomplete sets; 0 is no
-    /// limit. It holds at most that many messages of a topic between arrivals.
+    /// Makes a synchronizer that keeps at most `queue_size` incomplete sets; 0 is no limit. Between
+    /// arrivals it holds at most that many messages of a topic.
     ///
     /// # Panics
     ///
@@ -92,13 +93,13 @@ impl<M> ExactTime<M> {
         exact
     }
 
-    /// Returns the position of a stamp's entry, which it makes if there is none.
+    /// Returns the position of a stamp's entry, and makes the entry if there is none.
     fn entry(&mut self, stamp_ns: u64) -> usize {
         let known = self
             .entries
             .binary_search_by_key(&stamp_ns, |entry| entry.stamp_ns);
         known.unwrap_or_else(|position| {
-            // Only without a limit there may be none: all that a limit allows is reserved.
+            // Spare slots run out only without a limit: all entries within a limit are reserved.
             let slots = self.spare.pop().unwrap_or_else(|| empty(self.topics));
             let entry = Entry { stamp_ns, slots };
             self.entries.insert(position, entry);

@@ -1,44 +1,42 @@
 //! Topics, timers and subscriptions with their callbacks, as data.
 //!
-//! Some words. A *callback* is what an app wants done when a *timer* is due or when a
-//! *subscription* has a message. A *topic* hands what is published on it to all its
-//! subscriptions, each of which queues up to its *depth* and then drops the oldest
-//! (`KEEP_LAST` in ROS 2). A *group* is callbacks that exclude each other (a mutually
-//! exclusive callback group; in ROS 2 all callbacks of one node by default). A
-//! *worker* executes callbacks; several share a graph.
+//! Some terms. A *callback* is an app's function for the time when a *timer* is due or a
+//! *subscription* has a message. A *topic* hands each published message to all its subscriptions.
+//! Each subscription queues up to its *depth*, and then drops the oldest message (`KEEP_LAST` in
+//! ROS 2). A *group* is a number of callbacks excluding each other (a mutually exclusive callback
+//! group; in ROS 2 all callbacks of a node by default). A *worker* executes callbacks; several
+//! workers share a graph.
 //!
-//! Callbacks of a group never overlap, so they can own state in common: a group is
-//! one value. A worker [takes](Graph::take)
-//! the value out of the graph, calls it while the graph is free for others, and
-//! [gives it back](Graph::give_back); meanwhile nobody else can. No lock is needed
-//! for that state, and when all is over [`Graph::into_callbacks`] returns it.
+//! Callbacks of a group never overlap, so they can own common state: a group is a single value. A
+//! worker [takes](Graph::take) the value out of the graph, calls it while the graph is free for
+//! others, and [gives it back](Graph::give_back); meanwhile no other worker can take it. The state
+//! needs no lock, and in the end [`Graph::into_callbacks`] returns it.
 //!
-//! Ready work is taken in this order, as in ROS 2: timers before subscriptions,
-//! each in the order of their registration. Also as in ROS 2, a timer that is served
-//! more than a period late skips what it has missed, and nothing makes the order
-//! fair: an earlier registration wins as long as it is ready. Unlike there, a worker
-//! looks anew each time instead of working off what was ready when it looked.
+//! Workers take ready work in the order of ROS 2: timers before subscriptions, each in the order of
+//! their registration. Also as in ROS 2, a timer served more than a period late skips the missed
+//! times, and nothing makes the order fair: an earlier registration wins as long as it is ready.
+//! Unlike ROS 2, a worker looks anew each time, instead of working off everything found ready at
+//! one look.
 //!
-//! It guarantees that a group's callbacks do not overlap, that a subscription's
-//! messages come in the order of their publication, that dropped ones are counted,
-//! and that nothing is allocated after registration. There is no clock here: times
-//! are given.
+//! The graph guarantees that the callbacks of a group do not overlap, that a subscription's
+//! messages come in the order of their publication, that dropped messages are counted, and that
+//! nothing is allocated after registration. The graph has no clock: callers pass the times.
 //!
 //! Any number of workers share a graph under a lock, as in ROS 2's `MultiThreadedExecutor`. Each
-//! takes a ready callback out of it, executes it while the graph is free, gives it back, and waits
-//! when nothing is ready. A callback that publishes wakes all workers that wait; the first finds
-//! the
-//! message, the others wait again. (`apps/lab/join-latency` has them.)
+//! worker takes a ready callback out of the graph, executes the callback while the graph is free,
+//! gives it back, and waits when nothing is ready. A publishing callback wakes all waiting workers;
+//! the first worker finds the message, the others wait again. (`apps/lab/join-latency` has such
+//! workers.)
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-/// Topics, groups, timers and subscriptions that belong together. `M` is the type of
-/// all messages, `C` of all groups' callbacks. Topics and groups are numbered from 0.
+/// Topics, groups, timers and subscriptions. `M` is the type of all messages, `C` of all groups'
+/// callbacks. Topics and groups are numbered from 0.
 pub struct Graph<M, C> {
-    /// For each topic its subscriptions.
+    /// The subscriptions of each topic.
     topics: Vec<Vec<usize>>,
-    /// Each group's callbacks, unless a worker has them.
+    /// Each group's callbacks, unless a worker has taken them.
     groups: Vec<Option<C>>,
     timers: Vec<Timer>,
     subscriptions: Vec<Subscription<M>>,
@@ -61,18 +59,18 @@ struct Subscription<M> {
 
 /// The next work of a worker.
 pub enum NextCallback<M, C> {
-    /// Call the callbacks of this group and give them back: for a message, which comes with its
-    /// topic, or for the timer that is due.
+    /// Call the callbacks of the group and give them back: for a message, given with its topic, or
+    /// for the due timer.
     Call(usize, C, Option<(usize, M)>),
-    /// Look again when something was published or given back, or at this time;
-    /// `u64::MAX` is never.
+    /// Look again after a publication or a return of callbacks, or at the given time; `u64::MAX` is
+    /// never.
     WaitUntil(u64),
-    /// Nothing more: the graph was shut down.
+    /// No more work: the graph was shut down.
     End,
 }
 
 impl<M, C> Graph<M, C> {
-    /// Makes a graph of so many topics, without groups.
+    /// Makes a graph with the given number of topics, without groups.
     pub fn new(topics: usize) -> Self {
         Self {
             topics: (0..topics).map(|_| Vec::new()).collect(),
@@ -89,7 +87,7 @@ impl<M, C> Graph<M, C> {
         self.groups.len() - 1
     }
 
-    /// Adds a timer to a group: due first at `first_ns`, then each `period_ns`.
+    /// Adds a timer to a group: due first at `first_ns`, then every `period_ns`.
     ///
     /// # Panics
     ///
@@ -107,7 +105,7 @@ impl<M, C> Graph<M, C> {
     ///
     /// # Panics
     ///
-    /// If the depth is 0 or there is no such topic.
+    /// If the depth is 0 or the topic does not exist.
     pub fn subscribe(&mut self, group: usize, topic: usize, depth: usize) {
         assert!(depth > 0, "a subscription queues at least 1 message");
         self.topics[topic].push(self.subscriptions.len());
@@ -124,7 +122,7 @@ impl<M, C> Graph<M, C> {
     ///
     /// # Panics
     ///
-    /// If there is no such topic.
+    /// If the topic does not exist.
     pub fn publish(&mut self, topic: usize, message: M)
     where
         M: Clone,
@@ -134,7 +132,7 @@ impl<M, C> Graph<M, C> {
         }
     }
 
-    /// Returns what is ready and takes it, or says what to wait for.
+    /// Takes ready work and returns it, or returns the time to wait for.
     pub fn take(&mut self, now_ns: u64) -> NextCallback<M, C> {
         if self.is_shut_down {
             return NextCallback::End;
@@ -155,18 +153,18 @@ impl<M, C> Graph<M, C> {
                 return NextCallback::Call(subscription.group, callbacks, message);
             }
         }
-        // A timer that is due has a busy group: the worker that gives that back sees it.
+        // A due timer has a busy group: the worker giving the group back sees the timer.
         let to_come = self.timers.iter().filter(|timer| !timer.is_due(now_ns));
         let next_ns = to_come.map(|timer| timer.next_ns).min();
         NextCallback::WaitUntil(next_ns.unwrap_or(u64::MAX))
     }
 
-    /// Takes a group's callbacks back, and returns whether another callback of the
-    /// group waits for that.
+    /// Takes a group's callbacks back, and returns whether another callback of the group is ready
+    /// and waits for them.
     ///
     /// # Panics
     ///
-    /// If there is no such group.
+    /// If the group does not exist.
     pub fn give_back(&mut self, group: usize, callbacks: C, now_ns: u64) -> bool {
         self.groups[group] = Some(callbacks);
         let mut timers = self.timers.iter();
@@ -175,18 +173,17 @@ impl<M, C> Graph<M, C> {
             || subscriptions.any(|one| one.group == group && !one.queue.is_empty())
     }
 
-    /// Ends the taking of callbacks for good.
+    /// Ends the taking of callbacks, for good.
     pub fn shut_down(&mut self) {
         self.is_shut_down = true;
     }
 
-    /// Returns how many messages the subscriptions have dropped, all together.
+    /// Returns the number of messages dropped by all subscriptions together.
     pub fn dropped(&self) -> u64 {
         self.subscriptions.iter().map(|one| one.dropped).sum()
     }
 
-    /// Returns the callbacks of all groups, in order; those that a worker has are
-    /// missing.
+    /// Returns the callbacks of all groups, in order, without callbacks still taken by a worker.
     pub fn into_callbacks(self) -> impl Iterator<Item = C> {
         self.groups.into_iter().flatten()
     }
@@ -197,7 +194,7 @@ impl Timer {
         self.next_ns <= now_ns
     }
 
-    /// Moves on to the next time that is not past.
+    /// Moves on to the next time not in the past.
     fn serve(&mut self, now_ns: u64) {
         let behind = now_ns.saturating_sub(self.next_ns.saturating_add(self.period_ns));
         let periods = 1 + behind.div_ceil(self.period_ns);
