@@ -11,18 +11,18 @@ use crate::view::View;
 /// The times of a chain in a run, and their bounds.
 #[derive(Debug)]
 pub struct MeasuredChain {
-    /// Its subtasks, each with the name of its DAG.
+    /// The subtasks of the chain, each with the name of its DAG.
     pub names: Vec<String>,
     /// The age of an output, the data age and the reaction time.
     pub times: [(Distribution, Result<u64, DagId>); 3],
-    /// The longest of each for which a bound holds, by clocks that may be wrong.
+    /// The longest time of each kind with a bound, by clocks that may be wrong.
     pub longest_ns: [u64; 3],
-    /// The stated delay of the links that it leads over, if any.
+    /// The stated delay of the links on the chain, if any.
     pub stated_ns: Option<u64>,
 }
 
 impl MeasuredChain {
-    /// Returns how many of its times are beyond their bounds, by more than the tolerance.
+    /// Returns the number of times beyond their bounds by more than the tolerance.
     pub fn exceeded(&self, tolerance_ns: u64) -> usize {
         let is_beyond = |(longest_ns, (_, bound)): &(&u64, &(_, Result<u64, DagId>))| {
             bound.is_ok_and(|ns| **longest_ns > ns.saturating_add(tolerance_ns))
@@ -32,7 +32,7 @@ impl MeasuredChain {
     }
 }
 
-/// Returns the chains of a run by its samplings and links: all, or those between two subtasks.
+/// Returns the chains of a run by its samplings and links: all, or only those between two subtasks.
 pub fn of(run: &Run, ends: Option<(SubtaskRef, SubtaskRef)>) -> Vec<Chain> {
     let links = run.links.iter().map(|link| link.edge);
     let samplings: Vec<_> = run.samplings.iter().copied().chain(links).collect();

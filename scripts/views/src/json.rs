@@ -1,23 +1,22 @@
-//! JSON as the machine lines use it: one value a line, read strictly.
+//! JSON as in the machine lines: one value a line, read strictly.
 //!
-//! The serial protocol and cargo's messages are JSON Lines; both are read by
-//! this one parser. *Strict* means: exactly RFC 8259, nothing before or after
-//! the value but blanks, no key twice in one object, and no nesting deeper
-//! than [`DEEPEST`]. A text that breaks a rule is refused with the column of the offence, so that a
-//! damaged serial line is found and never guessed at.
+//! The serial protocol and cargo's messages are JSON Lines; this parser reads both. *Strict* means:
+//! exactly RFC 8259, only blanks before or after the value, no key twice in one object, and no
+//! nesting deeper than [`DEEPEST`]. The parser refuses a text that breaks a rule, with the column
+//! of the offence, so a damaged serial line is found and never guessed at.
 //!
-//! Integers stay integers (`i128` holds every `u64` of nanoseconds); only a
-//! number with a fraction or an exponent becomes a float. The host writes JSON by [`Object`] and
-//! [`quoted`], with members in the order of the calls; machine lines are printed by the guest.
+//! Integers stay integers (`i128` holds every `u64` of nanoseconds); only a number with a fraction
+//! or an exponent becomes a float. The host writes JSON by [`Object`] and [`quoted`], with members
+//! in the order of the calls; guests print the machine lines.
 //!
 //! The reader is a recursive descent over the bytes. Its `position` is the next byte to read, and
-//! is at a character's first byte whenever an error is made.
+//! is at the first byte of a character whenever an error is made.
 
 use std::fmt::{self, Write};
 
 use text::repeated;
 
-/// The deepest nesting of arrays and objects that is read.
+/// The deepest nesting of arrays and objects allowed in a text.
 pub const DEEPEST: usize = 32;
 
 /// A JSON value.
@@ -31,17 +30,17 @@ pub enum Value {
     Integer(i128),
     /// Any other number.
     Decimal(f64),
-    /// A string, its escapes resolved.
+    /// A string, with its escapes resolved.
     Text(String),
     /// An array.
     Array(Vec<Value>),
-    /// An object, its members in the order of the text.
+    /// An object, with its members in the order of the text.
     Object(Vec<(String, Value)>),
 }
 
 impl Value {
-    /// Returns the member `name` of an object; `None` if there is none, or if
-    /// this is not an object.
+    /// Returns the member `name` of an object; `None` without such a member, or for any other
+    /// value.
     pub fn get(&self, name: &str) -> Option<&Value> {
         let Value::Object(members) = self else {
             return None;
@@ -56,7 +55,7 @@ impl Value {
         path.iter().try_fold(self, |value, name| value.get(name))
     }
 
-    /// Returns the string, if this is one.
+    /// Returns the string, if the value is a string.
     pub fn as_text(&self) -> Option<&str> {
         match self {
             Value::Text(text) => Some(text),
@@ -64,7 +63,7 @@ impl Value {
         }
     }
 
-    /// Returns the number, if this is an integer within `u64`.
+    /// Returns the number, if the value is an integer within `u64`.
     pub fn as_u64(&self) -> Option<u64> {
         match self {
             Value::Integer(number) => u64::try_from(*number).ok(),
@@ -72,7 +71,7 @@ impl Value {
         }
     }
 
-    /// Returns the elements of an array; nothing if this is not an array.
+    /// Returns the elements of an array; nothing for any other value.
     pub fn elements(&self) -> &[Value] {
         match self {
             Value::Array(elements) => elements,
@@ -86,7 +85,7 @@ impl Value {
 pub struct JsonError {
     /// The column of the offending byte, counted from 1.
     pub column: usize,
-    /// The text that was found, and what may stand there instead.
+    /// The text found, and the text allowed there instead.
     pub message: String,
 }
 
@@ -96,7 +95,7 @@ impl fmt::Display for JsonError {
     }
 }
 
-/// Reads the one value that `text` consists of.
+/// Reads the single value in `text`.
 ///
 /// # Errors
 ///
@@ -125,7 +124,7 @@ impl<'t> JsonParser<'t> {
         }
     }
 
-    /// Reads one value and makes sure that nothing follows it.
+    /// Reads one value and makes sure that nothing follows.
     fn whole(&mut self) -> Result<Value, JsonError> {
         let value = self.value()?;
         self.skip_blanks();
@@ -262,7 +261,7 @@ impl<'t> JsonParser<'t> {
         Ok(resolved)
     }
 
-    /// Reads `uXXXX`, or a pair of them that makes one character.
+    /// Reads `uXXXX`, or a pair of such escapes for a single character.
     fn unicode_escape(&mut self) -> Result<char, JsonError> {
         let first = self.hexadecimal()?;
         let code = match first {
@@ -384,7 +383,7 @@ impl<'t> JsonParser<'t> {
     }
 }
 
-/// An object that is being written.
+/// An object being written.
 #[derive(Clone, Debug, Default)]
 #[must_use]
 pub struct Object(String);
@@ -406,7 +405,7 @@ impl Object {
         self.json(name, &quoted(value))
     }
 
-    /// Adds a member with a value that is JSON already.
+    /// Adds a member with a value already in JSON.
     pub fn json(mut self, name: &str, value: &str) -> Object {
         let separator = if self.0.is_empty() { "" } else { "," };
         // Writing into a `String` cannot fail.
@@ -414,7 +413,7 @@ impl Object {
         self
     }
 
-    /// Adds a member with a list of values that are JSON already.
+    /// Adds a member with a list of values already in JSON.
     pub fn list(self, name: &str, values: impl IntoIterator<Item = impl ToString>) -> Object {
         let values = values.into_iter().map(|value| value.to_string());
         self.json(name, &format!("[{}]", values.collect::<Vec<_>>().join(",")))

@@ -1,14 +1,15 @@
-//! Views of a run: its record, read, and what people and pages see of it.
+//! Views of a run, computed from its record, for people and pages.
 //!
 //! - [`json`], [`protocol`]: a guest's output, read strictly;
-//! - [`record`]: the record of a boot; [`notes`]: what it committed;
-//!   [`links`]: those of several machines, read as one;
-//! - [`view`](mod@view): a run in the order of time; [`marks`]: its faults, modes and pauses;
-//! - [`findings`]: its breaches of the model's rules, and its figures; [`certification`]: whether
-//!   the proofs of its bounds hold of it; [`chains`]: its latencies from DAG to DAG;
+//! - [`record`]: the record of a boot; [`notes`]: its commits; [`links`]: records of several
+//!   machines, read as one;
+//! - [`view`](mod@view): a run in the order of time; [`marks`]: faults, modes and pauses of a run;
+//! - [`findings`]: breaches of the model's rules in a run, and the run's figures;
+//!   [`certification`]: whether the proofs of the bounds hold for a run; [`chains`]: the latencies
+//!   from DAG to DAG;
 //! - [`picture`]: a run drawn as [`svg`], below its tables ([`planned`]); [`units`]: times as text.
 //!
-//! The crate has no I/O: the commands of `scripts/` and the page share it.
+//! The crate has no I/O: the commands of `scripts/` and the page share the crate.
 
 #![forbid(unsafe_code)]
 

@@ -1,17 +1,17 @@
 //! Records of several machines, read as one: by the [hops](crate::record::Hop) of their messages.
 //!
-//! A source whose values have hops *receives*. Its sender is the one subtask of the other records that
-//! has put such messages, by its events: a reader of a topic of the same name, or the writer if there
-//! is none. Hops of other jobs, as of a run before, are left out. Nothing is guessed: where no subtask
-//! has put messages, or several may have, that is said.
+//! A source whose values have hops *receives*. The sender is the one subtask of the other records
+//! that put such messages, by its events: a reader of a topic of the same name, or the topic's
+//! writer if there is no reader. Hops of other jobs, such as jobs of an earlier run, are left out.
+//! Nothing is guessed: where no subtask has put messages, or several may have, an error says so.
 //!
-//! The *offset* of a clock from the first record's is that of the exchange with the least round
-//! trip: half the difference of the least delays both ways, and wrong by half their sum at most, and
-//! by what the clocks may drift in a run. With messages one way only, the least delay is
-//! taken for 0, so that all times across are lower bounds, but for that drift.
+//! The *offset* of a clock from the first record's clock comes from the exchange with the least
+//! round trip. It is half the difference of the least delays both ways, and wrong by half their sum
+//! at most, plus the possible drift of the clocks in a run. With messages one way only, the least
+//! delay counts as 0, so all times across are lower bounds, but for the drift.
 //!
-//! The joint run has all DAGs and cores, and one axis of time, whose 0 is the epoch of the run that
-//! began first. Each machine is judged alone by the rules; the joint run has the chains.
+//! The joint run has all DAGs and cores, and one axis of time. Time 0 is the epoch of the earliest
+//! run. Each machine is judged alone by the rules; the joint run has the chains.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -30,11 +30,11 @@ use crate::view::{View, complete_from_ns};
 
 type Records = [(String, Record)];
 
-/// Joins records that name each other. `None`: they do not.
+/// Joins records that name each other; `None` if they do not.
 ///
 /// # Errors
 ///
-/// In words: what stands in the way.
+/// In words: the obstacle.
 pub fn join(records: &Records) -> Result<Option<Run>, String> {
     if records.len() < 2 || records.iter().all(|(_, record)| record.heard.is_empty()) {
         return Ok(None);
@@ -114,7 +114,7 @@ fn joint(records: &Records, machines: &[Machine]) -> Result<Run, String> {
     Ok(run)
 }
 
-/// Returns the place in the joint run of a subtask.
+/// Returns the place of a subtask in the joint run.
 fn there(machine: &Machine, (dag, subtask): SubtaskRef) -> SubtaskRef {
     (DagId(dag.0 + machine.dags.start), subtask)
 }
@@ -123,7 +123,7 @@ fn instance((dag, subtask): SubtaskRef, job: u64) -> Instance {
     Instance { dag, job, subtask }
 }
 
-/// Finds the sender of the messages that a source of the record `to` has heard.
+/// Finds the sender of the messages heard by a source of the record `to`.
 fn link(records: &Records, view: &View<'_>, to: usize, heard: &Heard) -> Result<Link, String> {
     let machines = &view.run.machines;
     let has_put = |sender: SubtaskRef, hop: &Hop| {
@@ -169,15 +169,16 @@ fn link(records: &Records, view: &View<'_>, to: usize, heard: &Heard) -> Result<
     }
 }
 
-/// Returns how long a message took, by two clocks.
+/// Returns the time taken by a message, by two clocks.
 fn taken_ns(hop: &Hop) -> i128 {
     i128::from(hop.received_ns) - i128::from(hop.sent_ns)
 }
 
-/// In so many nanoseconds two clocks may drift apart by one: each crystal by 100 millionths.
+/// The nanoseconds in which two clocks may drift apart by one: each crystal by 100 millionths.
 const DRIFT: u64 = 5_000;
 
-/// Finds the offsets of the clocks from the first one, and when each run began on the joint axis.
+/// Finds the offsets of the clocks from the first clock, and the begin of each run on the joint
+/// axis.
 fn set_clocks(machines: &mut [Machine], links: &[Link], drift_ns: i128) -> Result<(), String> {
     let least_ns = |way: [usize; 2]| {
         let links = links.iter().filter(|link| link.machines == way);
@@ -205,7 +206,7 @@ fn set_clocks(machines: &mut [Machine], links: &[Link], drift_ns: i128) -> Resul
     Ok(())
 }
 
-/// Judges the messages of a link; `view` is by the clocks.
+/// Judges the messages of a link; the times of `view` are by the machines' own clocks.
 fn judge(link: &mut Link, view: &View<'_>, machines: &[Machine]) {
     let [from, to] = link.machines.map(|at| &machines[at]);
     let wrong_ns = from.wrong_ns.zip(to.wrong_ns);
@@ -220,12 +221,12 @@ fn judge(link: &mut Link, view: &View<'_>, machines: &[Machine]) {
         link.exceeded += usize::from(exceeds);
         let due_ns = view.release_ns(link.edge.reader.0, *job);
         let has_waited = match model.is_sporadic() {
-            // A late job before has put off all up to it, of which some have no message.
+            // A late job has put off all later jobs up to this one, some of them without a message.
             true => late.is_some_and(|(late_job, late_ns): (u64, u64)| {
                 let after_ns = (job - late_job).saturating_mul(model.period_ns());
                 due_ns == late_ns.saturating_add(after_ns) && due_ns > hop.received_ns
             }),
-            // Jobs before it were skipped in a pause.
+            // Earlier jobs were skipped in a pause.
             false => due_ns > hop.received_ns.saturating_add(model.renewal_ns()),
         };
         let is_late = exceeds || has_waited;
@@ -239,7 +240,7 @@ fn judge(link: &mut Link, view: &View<'_>, machines: &[Machine]) {
     link.lost = sent.count().saturating_sub(link.heard.hops.len());
 }
 
-/// Returns the senders and receivers of all messages, or of those over which bounds hold.
+/// Returns the senders and receivers of all messages, or only of the messages with valid bounds.
 pub fn messages(run: &Run, with_late: bool) -> impl Iterator<Item = (Instance, Instance)> {
     run.links.iter().flat_map(move |link| {
         let hops = link.heard.hops.iter();
@@ -251,15 +252,15 @@ pub fn messages(run: &Run, with_late: bool) -> impl Iterator<Item = (Instance, I
     })
 }
 
-/// Returns who has got whose value, by samples and by messages.
+/// Returns the jobs that got a value of another job, by samples and by messages.
 pub fn sampled(run: &Run, with_late: bool, events: &[Event]) -> SampledJobs {
     let mut sampled = SampledJobs::new(&run.samplings, events.iter().copied());
     messages(run, with_late).for_each(|(writer, reader)| sampled.add(reader, writer));
     sampled
 }
 
-/// Returns the links of a chain with their stated delays, and by how much messages may have exceeded
-/// these unnoticed.
+/// Returns the links of a chain with their stated delays, and the time by which messages may have
+/// exceeded the delays unnoticed.
 pub fn of_chain(run: &Run, chain: &Chain) -> (Vec<(SampledEdge, u64)>, u64) {
     let link = |edge| run.links.iter().find(|link| link.edge == edge);
     let over: Vec<&Link> = chain.edges().filter_map(link).collect();
@@ -268,7 +269,7 @@ pub fn of_chain(run: &Run, chain: &Chain) -> (Vec<(SampledEdge, u64)>, u64) {
     (stated.collect(), wrong_ns.fold(0, u64::saturating_add))
 }
 
-/// Returns the text about links for people, and their machine lines.
+/// Returns the text about links for people, and the machine lines about links.
 pub fn told(files: &str, run: &Run) -> (String, Vec<String>) {
     let mut text = format!("{files}: read as one, by the hops of messages\n");
     let mut lines = Vec::new();

@@ -1,5 +1,5 @@
-//! The moments of a run that are no execution: faults, modes, pauses, and releases and signals that
-//! came to nothing. What became of each job in the end is in the [`view`](crate::view).
+//! The moments of a run besides executions: faults, modes, pauses, and releases and signals without
+//! effect. The fate of each job is in the [`view`](crate::view).
 
 use sched_dag::DagId;
 use sched_dag::journal::{Event, EventKind};
@@ -9,9 +9,9 @@ use crate::view::View;
 /// A moment of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mark {
-    /// When.
+    /// The time of the moment.
     pub time_ns: u64,
-    /// The DAG; `None` if it happened to the run.
+    /// The DAG; `None` for a moment of the whole run.
     pub dag: Option<DagId>,
     /// A word for its kind.
     pub kind: &'static str,

@@ -1,7 +1,8 @@
-//! Notes on committed DAGs and their subtasks: what a graph of them does not show.
+//! Notes on committed DAGs and their subtasks, besides the picture of the graph.
 //!
 //! Of a DAG: its jobs, its cores, its topics with the types of messages and the subtasks of any DAG
-//! that sample them, and its states. Of a subtask: its waits, its priority, its core, its own deadline.
+//! sampling them, and its states. Of a subtask: its waits, its priority, its core, its own
+//! deadline.
 
 use recording::{CommittedDag, CommittedTopic};
 use sched_dag::{DagId, Policy, SubtaskId};
@@ -9,7 +10,7 @@ use sched_dag::{DagId, Policy, SubtaskId};
 use crate::record::CommittedDags;
 use crate::units::briefly;
 
-/// Returns the notes on a DAG of a commit; none if there is no such DAG.
+/// Returns the notes on a DAG of a commit; none for a DAG outside the commit.
 pub fn of_dag(commit: &CommittedDags, dag: DagId) -> Vec<String> {
     let Some(told) = commit.told.dags.get(dag.index()) else {
         return Vec::new();
@@ -38,7 +39,7 @@ pub fn of_dag(commit: &CommittedDags, dag: DagId) -> Vec<String> {
     notes
 }
 
-/// Returns the note on a topic: its type, its writer and its readers.
+/// Returns the note on a topic: the type, the writer and the readers.
 fn of_topic(
     commit: &CommittedDags,
     (dag, told): (DagId, &CommittedDag),
@@ -74,7 +75,7 @@ fn of_topic(
     note
 }
 
-/// Returns the notes on a subtask of a commit; none if there is no such subtask.
+/// Returns the notes on a subtask of a commit; none for a subtask outside the commit.
 pub fn of_subtask(commit: &CommittedDags, dag: DagId, subtask: SubtaskId) -> Vec<String> {
     let told = commit.told.dags.get(dag.index());
     let Some((told, of)) = told.and_then(|of| Some((of, of.subtasks.get(subtask.index())?))) else {
@@ -109,14 +110,14 @@ pub fn of_subtask(commit: &CommittedDags, dag: DagId, subtask: SubtaskId) -> Vec
     notes
 }
 
-/// Returns the name of a subtask, or its number if it has none.
+/// Returns the name of a subtask, or the number of a nameless subtask.
 fn name(dag: &CommittedDag, subtask: u32) -> String {
     let of = dag.subtasks.get(SubtaskId(subtask).index());
     let of = of.filter(|of| !of.name.is_empty());
     of.map_or(format!("subtask {subtask}"), |of| of.name.clone())
 }
 
-/// Returns a type's name without the paths of its parts.
+/// Returns a type's name without the paths of the name's parts.
 fn without_paths(name: &str) -> String {
     let mut short = String::new();
     for part in name.split_inclusive(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')) {

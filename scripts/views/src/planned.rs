@@ -1,4 +1,4 @@
-//! The entries of the tables in a run: when each is to execute at the latest.
+//! The entries of the tables in a run, with the latest time for each to execute.
 
 use sched_dag::{CoreId, Instance, TableEntry};
 
@@ -11,7 +11,7 @@ pub struct PlannedEntry {
     pub core: CoreId,
     /// The entry's instance.
     pub instance: Instance,
-    /// How many entries it is nested in.
+    /// The number of entries around this entry.
     pub depth: u32,
     /// The latest start.
     pub from_ns: u64,
@@ -20,7 +20,7 @@ pub struct PlannedEntry {
 }
 
 impl PlannedEntry {
-    /// Reports whether it was late by more than a platform may take for its own work.
+    /// Returns whether the entry was late by more than a platform may take for its own work.
     pub fn is_late(&self, view: &View<'_>) -> bool {
         let history = view.histories.get(&self.instance);
         let finish_ns = history.and_then(|history| history.finish_ns);
@@ -29,8 +29,8 @@ impl PlannedEntry {
     }
 }
 
-/// Returns the entries of the jobs that a run has released, by start, the outer before the inner. A
-/// table without times has none.
+/// Returns the entries of a run's released jobs, by start, the outer before the inner. A table
+/// without times has no such entries.
 pub fn entries(view: &View<'_>) -> Vec<PlannedEntry> {
     let (task_set, mut all) = (&view.run.task_set, Vec::new());
     for table in task_set.tables() {
@@ -73,7 +73,7 @@ pub fn entries(view: &View<'_>) -> Vec<PlannedEntry> {
     all
 }
 
-/// Returns the entry that was late first.
+/// Returns the entry that was the first to be late.
 pub fn first_late(view: &View<'_>) -> Option<PlannedEntry> {
     let late = entries(view).into_iter().filter(|of| of.is_late(view));
     late.min_by_key(|of| of.to_ns)

@@ -1,27 +1,26 @@
-//! The serial protocol on the host's side: the one reader of a guest's output.
+//! The serial protocol on the host's side: the only reader of a guest's output.
 //!
-//! A *machine line* begins with `{` in column 0 and is one JSON object with a
-//! text member `kind`; every other line is for people. A [`Transcript`] is a
-//! whole serial log taken apart into both. The last line of every run is the
-//! *verdict*, a machine line of kind `verdict`; a run without it has failed,
-//! whatever else it printed.
+//! A *machine line* begins with `{` in column 0 and is a JSON object with a text member `kind`;
+//! every other line is for people. A [`Transcript`] is a whole serial log, split into both. The
+//! last line of every run is the *verdict*, a machine line of kind `verdict`; a run without a
+//! verdict has failed, whatever else the run printed.
 //!
-//! The reader is strict: a line that begins with `{` and is damaged, or lacks
-//! a member that its kind must have, is a fault with its line number. Which
-//! these are is read from the page that describes the kinds for people. A kind
-//! that has no section there passes, so that an app may add its own.
+//! The reader is strict: a line beginning with `{` is a fault, reported with its line number, if
+//! the line is damaged or lacks a required member of its kind. The page that describes the kinds
+//! for people also tells the reader which members are required. A kind without a section on the
+//! page passes, so an app may add kinds of its own.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use crate::json::{self, Value};
 
-/// The page that describes the kinds of machine lines, each in a section with a table of its
-/// members.
+/// The page about the kinds of machine lines, with a section for each kind and a table of the
+/// kind's members.
 const PAGE: &str = include_str!("../../../docs/formats.md");
 
-/// The members that each line of a kind has: those of all rows of its section whose first cell
-/// does not call them optional.
+/// The members of each line of a kind: from all rows of the kind's section whose first cell does
+/// not call them optional.
 static MEMBERS: LazyLock<BTreeMap<&str, Vec<&str>>> = LazyLock::new(|| {
     let sections = PAGE.split("\n#");
     let kinds = sections.filter_map(|section| section.strip_prefix("## `")?.split_once('`'));
@@ -39,16 +38,16 @@ static MEMBERS: LazyLock<BTreeMap<&str, Vec<&str>>> = LazyLock::new(|| {
     kinds.map(|(kind, text)| (kind, members(text))).collect()
 });
 
-/// A machine line that was understood.
+/// A machine line, understood.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MachineLine {
     /// The line's number in the log, counted from 1.
     pub number: usize,
-    /// The kind of report, its member `kind`.
+    /// The kind of report, from the member `kind`.
     pub kind: String,
     /// The whole object, `kind` included.
     pub value: Value,
-    /// The line as it was printed.
+    /// The line as the guest printed the line.
     pub text: String,
 }
 
@@ -59,7 +58,7 @@ impl MachineLine {
         self.value.at(&names).and_then(Value::as_u64)
     }
 
-    /// Returns the string member `name`, if there is one.
+    /// Returns the string member `name`, if there is any.
     pub fn text_at(&self, name: &str) -> Option<&str> {
         self.value.get(name).and_then(Value::as_text)
     }
@@ -76,12 +75,12 @@ pub enum Status {
     Usage,
 }
 
-/// The last line of a run, or what the host says of it in its place.
+/// The last line of a run, or the host's statement in place of a missing line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verdict {
-    /// Whether it is good.
+    /// The status of the run.
     pub status: Status,
-    /// Why, in one line of words; may be empty.
+    /// The reason, in one line of words; may be empty.
     pub reason: String,
 }
 
@@ -90,7 +89,7 @@ pub struct Verdict {
 pub struct Transcript {
     /// The machine lines in their order.
     pub machine: Vec<MachineLine>,
-    /// The defects of damaged ones, in words, each with the number of its line.
+    /// The defects of damaged lines, in words, each with the number of its line.
     pub faults: Vec<String>,
     /// The number of the last line that is not blank.
     last_line: usize,
@@ -123,8 +122,8 @@ impl Transcript {
     ///
     /// # Errors
     ///
-    /// In words: there is none, there are several, it is not the last line,
-    /// or its status is not one of `success`, `failure`, `usage`.
+    /// In words: there is no verdict, there are several, the verdict is not the last line, or its
+    /// status is none of `success`, `failure`, `usage`.
     pub fn verdict(&self) -> Result<Verdict, String> {
         let mut verdicts = self.of_kind("verdict");
         let line = verdicts.next().ok_or("the guest printed no verdict line")?;
@@ -135,7 +134,7 @@ impl Transcript {
                 line.number, second.number
             ));
         }
-        // Lines after it show that the guest went on, so the verdict was not its end.
+        // Lines after the verdict show that the guest went on, so the verdict was not its end.
         if line.number != self.last_line {
             return Err(format!(
                 "the verdict stands in line {}, but the log goes on to line {}",
@@ -153,8 +152,8 @@ impl Transcript {
     }
 }
 
-/// Returns the part of a line that the guest has printed: without the line end, and without the
-/// remains of a firmware's output before the last carriage return.
+/// Returns the part of a line printed by the guest: without the line end, and without the remains
+/// of a firmware's output before the last carriage return.
 pub fn written(line: &str) -> &str {
     let line = line.trim_end_matches(['\r', '\n']);
     line.rsplit_once('\r').map_or(line, |(_, own)| own)
@@ -164,7 +163,7 @@ pub fn written(line: &str) -> &str {
 ///
 /// # Errors
 ///
-/// In words, with the line's number: it begins with `{` and is no valid machine line.
+/// In words, with the line's number: the line begins with `{` and is no valid machine line.
 pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, String>> {
     let line = written(line);
     line.starts_with('{').then(|| {

@@ -1,6 +1,6 @@
 //! Pictures as SVG: text and shapes at whole pixels, on white.
 //!
-//! A picture is a text that grows with each shape; what comes later covers what was there before.
+//! A picture is a text, and grows with each shape; later shapes cover earlier shapes.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ pub struct Svg(String);
 
 // Writing into a `String` cannot fail.
 impl Svg {
-    /// Adds text on a line that ends in the middle, begins or ends at a point, as `anchor` says.
+    /// Adds text on a line that begins, ends or has its middle at a point, as `anchor` says.
     pub fn text(&mut self, (x, y): (u64, u64), anchor: &str, text: &str) {
         let text = text.replace('&', "&amp;").replace('<', "&lt;");
         let at = format!(r#"x="{x}" y="{y}" text-anchor="{anchor}""#);

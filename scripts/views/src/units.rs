@@ -1,6 +1,6 @@
-//! Times as text, in a unit that fits.
+//! Times as text, in a fitting unit.
 
-/// Formats a time in the largest unit that it reaches, with three decimals (none for ns).
+/// Formats a time in the largest unit not above the time, with three decimals (none for ns).
 pub fn shown(ns: u64) -> String {
     let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
     match units.into_iter().find(|(unit, _)| ns >= *unit) {

@@ -12,7 +12,7 @@ use crate::record::Run;
 pub struct View<'r> {
     /// The run.
     pub run: &'r Run,
-    /// The first instant from which on no event is missing.
+    /// The first instant after all missing events.
     pub from_ns: u64,
     /// The time of the last event.
     pub end_ns: u64,
@@ -29,32 +29,32 @@ pub struct View<'r> {
 /// The times of a job's first events of each kind.
 #[derive(Clone, Debug, Default)]
 pub struct JobHistory {
-    /// Its release.
+    /// The release of the job.
     pub released_ns: Option<u64>,
-    /// Its end by the overrun policy.
+    /// The end of the job by the overrun policy.
     pub aborted_ns: Option<u64>,
-    /// Its miss.
+    /// The deadline miss of the job.
     pub missed_ns: Option<u64>,
-    /// Its completion.
+    /// The completion of the job.
     pub completed_ns: Option<u64>,
 }
 
 /// The times of an instance's first events of each kind.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// Its readiness.
+    /// The readiness of the instance.
     pub ready_ns: Option<u64>,
-    /// Its first start.
+    /// The first start of the instance.
     pub start_ns: Option<u64>,
-    /// Its finish.
+    /// The finish of the instance.
     pub finish_ns: Option<u64>,
-    /// The time of its cancellation, or of its end by a fault.
+    /// The time of the cancellation, or of the end by a fault.
     pub dropped_ns: Option<u64>,
     /// The times on a core.
     pub slices: Vec<ExecutionSlice>,
-    /// When each wait began and ended; `None`: it went on when the trace ended.
+    /// The begin and the end of each wait; `None`: the wait went on at the end of the trace.
     pub waits: Vec<(u64, Option<u64>)>,
-    /// How many times it was preempted.
+    /// The number of preemptions.
     pub suspensions: u64,
 }
 
@@ -63,13 +63,13 @@ pub struct History {
 pub struct ExecutionSlice {
     /// The core.
     pub core: CoreId,
-    /// Its begin.
+    /// The begin of the stretch.
     pub from_ns: u64,
-    /// `None`: it ran when the trace ended.
+    /// The end of the stretch; `None`: the instance ran at the end of the trace.
     pub to_ns: Option<u64>,
 }
 
-/// How a stretch of execution ended.
+/// The way in which a stretch of execution ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SliceEnd {
     /// With its instance.
@@ -80,7 +80,7 @@ pub enum SliceEnd {
     Waits,
     /// By a fault.
     Fault,
-    /// Not before the trace.
+    /// Not before the end of the trace.
     Open,
 }
 
@@ -125,7 +125,7 @@ impl<'r> View<'r> {
         events.filter(|event| event.time_ns >= self.from_ns)
     }
 
-    /// Returns the nominal release of a job; 0 if that of a sporadic one is unknown.
+    /// Returns the nominal release of a job; 0 if the release of a sporadic job is unknown.
     pub fn release_ns(&self, dag: DagId, job: u64) -> u64 {
         let model = self.run.task_set.dag(dag);
         match model.is_sporadic() {
@@ -141,13 +141,13 @@ impl<'r> View<'r> {
     }
 }
 
-/// Returns the first instant after which no event is missing.
+/// Returns the first instant after all missing events.
 pub(crate) fn complete_from_ns(run: &Run) -> u64 {
     if run.lost == 0 {
         return 0;
     }
-    // Ends of turns and due times may be dated before their writing; the others bear the time at
-    // which they were written, so every lost event is older.
+    // Ends of turns and due times may be dated before their writing; all other events bear the time
+    // of their writing, so every lost event is older.
     let is_dated_back = |what| matches!(what, EventKind::Finish | EventKind::Wait | EventKind::Due);
     let mut events = run.events.iter();
     let first = events.find(|event| !is_dated_back(event.what));
@@ -169,13 +169,13 @@ impl JobHistory {
 }
 
 impl History {
-    /// Returns the wait that ended a stretch of execution, if one did.
+    /// Returns the wait that ended a stretch of execution, if any.
     pub fn wait_after(&self, slice: ExecutionSlice) -> Option<(u64, Option<u64>)> {
         let mut waits = self.waits.iter().copied();
         waits.find(|(from_ns, _)| slice.to_ns == Some(*from_ns))
     }
 
-    /// Returns how the stretch of execution of this number ended.
+    /// Returns how the stretch of execution with this number ended.
     pub fn end_of(&self, number: usize) -> SliceEnd {
         let is_last = number + 1 == self.slices.len();
         match self.slices[number] {
@@ -197,7 +197,7 @@ impl History {
             EventKind::Suspend | EventKind::Wait | EventKind::Finish | EventKind::Ended
         );
         if is_lossy && is_first && ran {
-            // Its start is lost: it has run since before the trace.
+            // The start is lost: the instance has run since before the trace.
             self.begin_slice(event.core, from_ns);
         }
         // Any later event of the instance ends the slice; a second one does not move its end.

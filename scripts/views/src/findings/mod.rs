@@ -1,29 +1,29 @@
 //! The findings in a run: its breaches of the model's rules, and its figures.
 //!
-//! The judge is [`sched_dag::law`], which judges all runs, within a stated *bound*, because a
-//! decision takes effect after an interrupt.
+//! The judge is [`sched_dag::law`], as for all runs, within a stated *bound*, because a decision
+//! takes effect only after an interrupt.
 //!
-//! Lost events are always the oldest, and only events after the instant of the first one that is
-//! left are judged. An instance that has not finished when the trace ends breaks no rule, unless
-//! the run says that it is complete.
+//! Lost events are always the oldest, and the judge looks only at events after the instant of the
+//! first event left. An instance unfinished at the end of the trace breaks no rule, unless the run
+//! says that it is complete.
 //!
 //! The figures of a trace:
 //!
 //! - *finish to ready*: from the last finish that an instance waited for to its readiness; the
 //!   largest.
-//! - *ready to start*: from readiness to the function's call, of instances for
-//!   which a core was idle when they became ready, unless another instance with
-//!   a smaller key became ready meanwhile and took it.
-//! - *preemption latency*: from the scheduler's request that a core run an
-//!   instance to that instance's start or resumption there. A request that is
-//!   overtaken, by another one for the core or because the instance runs
-//!   elsewhere, does not count.
-//! - *longest inversion*: the longest time for which an instance that should
-//!   have run by R5 waited while one of lower priority ran or a core was idle.
-//! - *load*: the part of the time from the first event to the last for which a
-//!   core had an instance, in thousandths.
+//! - *ready to start*: from readiness to the function's call, of instances that became ready while
+//!   a core was idle, unless another instance with a smaller key became ready meanwhile and took
+//!   the core.
+//! - *preemption latency*: from the scheduler's request that a core run an instance to the start or
+//!   resumption of the instance there. An overtaken request does not count: another request for the
+//!   core came, or the instance runs elsewhere.
+//! - *longest inversion*: the longest time for which an instance entitled to a core by R5 waited
+//!   while an instance of lower priority ran or a core was idle.
+//! - *load*: the part of the time from the first event to the last for which a core had an
+//!   instance, in thousandths.
 //!
-//! A trace is *complete from* the first instant after the first event that is left; earlier events
+//! A trace is *complete from* the first instant after the first event left; earlier events are left
+//! out.
 //! are left out.
 
 use std::collections::BTreeMap;
@@ -46,8 +46,8 @@ pub struct Findings {
     pub figures: RunFigures,
 }
 
-/// Judges a run. `bound_ns` is the longest time for which an instance may wait for a core that it
-/// is owed; 0 is for virtual time.
+/// Judges a run. `bound_ns` is the longest time for which an instance may wait for a core owed to
+/// the instance; 0 is for virtual time.
 pub fn check(run: &Run, bound_ns: u64) -> Findings {
     let (view, terms) = (View::new(run), run.terms(bound_ns));
     let verdict = law::judge(&run.task_set, terms, view.in_the_order_of_the_log());
@@ -72,12 +72,11 @@ pub struct RunFigures {
     pub instances: usize,
     /// The number of suspensions.
     pub preemptions: u64,
-    /// The first instant from which the trace is complete; 0 if nothing was
-    /// lost.
+    /// The first instant from which the trace is complete; 0 if no event was lost.
     pub from_ns: u64,
     /// The time from the first judged event to the last.
     pub span_ns: u64,
-    /// See the module; 0 if there was none.
+    /// See the module; 0 if there was no such time.
     pub finish_to_ready_max_ns: u64,
     /// See the module.
     pub ready_to_start: Distribution,
@@ -112,7 +111,7 @@ fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
     let mut latencies_ns = Vec::new();
     // For each core, the time of the next request after the one at hand.
     let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
-    // Backwards, so that the next request for the core is known already.
+    // Backwards, so the next request for the core is already known.
     let requests = view.events.iter().rev();
     for event in requests.filter(|event| event.what == EventKind::Request) {
         let overtaken_ns = next_ns.insert(event.core, event.time_ns);
@@ -133,7 +132,7 @@ fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
 fn load_permille(view: &View<'_>, first_ns: u64, span_ns: u64) -> Vec<u64> {
     let mut busy_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     for slice in view.histories.values().flat_map(|it| &it.slices) {
-        // An instance that ran when the trace ended has its core up to there.
+        // An instance running at the end of the trace has its core up to there.
         let to_ns = slice.to_ns.unwrap_or(view.end_ns);
         let from_ns = slice.from_ns.max(first_ns);
         let busy_ns = busy_ns.entry(slice.core).or_insert(0);
