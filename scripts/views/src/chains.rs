@@ -15,7 +15,7 @@ pub struct MeasuredChain {
     pub names: Vec<String>,
     /// The age of an output, the data age and the reaction time.
     pub times: [(Distribution, Result<u64, DagId>); 3],
-    /// The longest time of each kind with a bound, by clocks that may be wrong.
+    /// The longest of each for which a bound holds, by clocks that may be wrong.
     pub longest_ns: [u64; 3],
     /// The stated delay of the links on the chain, if any.
     pub stated_ns: Option<u64>,

@@ -1,14 +1,15 @@
 //! A run as a picture: each DAG above its schedule, as SVG.
 //!
-//! At the top stands each graph: a box for each subtask with its WCET, and an arrow for each
-//! edge. Below are the first jobs on a common axis of time: a row for each core with what it
-//! executed, in the colour of its subtask, above that the core's table in thin bars with the first
-//! late entry in red, arrows of messages between machines, and a thin bar below for each wait; then a row for each DAG with the response time of each job, its
-//! proven bound and its deadline.
+//! At the top stand the graphs: a box for each subtask with its WCET, and an arrow for each edge.
+//! Below are the first jobs on a common axis of time. Each core has a row of its executions, in the
+//! colours of the subtasks. Above the row are the core's table in thin bars, with the first late
+//! entry in red, and below the row is a thin bar for each wait; arrows are messages between
+//! machines. Then each DAG has a row with the response time of each job, the proven bound and the
+//! deadline.
 //!
-//! A [`TimeWindow`] says which jobs of which DAGs are drawn. Coordinates are whole pixels, so that a run
-//! whose times differ by less than that has the same picture, byte by byte. Pages keep such pictures,
-//! and tests draw them again.
+//! A [`TimeWindow`] says which jobs of which DAGs are drawn. Coordinates are whole pixels, so runs
+//! with times that differ by less than a pixel have the same picture, byte by byte. Pages keep such
+//! pictures, and tests draw them again.
 
 use std::ops::Range;
 
@@ -21,7 +22,7 @@ use crate::svg::Svg;
 use crate::view::View;
 
 const WIDTH: u64 = 820;
-/// The least width of the rows' names, and where the axis of time begins.
+/// The least width of the rows' names, at whose end the axis of time begins.
 const LEFT: u64 = 84;
 /// The room behind the axis, for half a label.
 const RIGHT: u64 = 36;
@@ -29,7 +30,7 @@ const ROW: u64 = 30;
 const BOX: (u64, u64) = (104, 40);
 /// The distance of two boxes.
 const GAP: (u64, u64) = (44, 12);
-/// About how wide a letter is.
+/// The approximate width of a letter.
 const LETTER: u64 = 7;
 /// The colours of subtasks: light enough for black letters, and different without colour, too.
 pub const COLOURS: [&str; 10] = [
@@ -37,30 +38,31 @@ pub const COLOURS: [&str; 10] = [
     "#90d5c9", "#e3e3e3",
 ];
 
-/// The part of a run that a person asks for, in the person's words.
+/// The part of a run requested by a person, in the person's words.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WindowRequest<'w> {
-    /// The first time of release, such as `20ms`; else 0, or where machines first hear of each other.
+    /// The first time of release, such as `20ms`; else the time of the first job that sends to
+    /// another machine, or 0.
     pub from: Option<&'w str>,
-    /// The time of release from which on nothing is drawn.
+    /// The first time of release that is no longer drawn.
     pub to: Option<&'w str>,
-    /// The names of the DAGs, with commas between; else all are drawn.
+    /// The names of the DAGs, with commas between them; else all DAGs are drawn.
     pub dags: Option<&'w str>,
-    /// Without `to`: how many times the longest of their periods; else once.
+    /// Without `to`: the length as a multiple of the longest period; else 1.
     pub periods: Option<u64>,
 }
 
-/// The part of a run that a picture shows.
+/// The part of a run shown by a picture.
 #[derive(Clone, Debug)]
 pub struct TimeWindow {
-    /// Jobs that are released then are drawn.
+    /// The times of release of the drawn jobs.
     pub released_ns: Range<u64>,
     /// The DAGs.
     pub dags: Vec<DagId>,
 }
 
 impl TimeWindow {
-    /// Finds the part of a run that is asked for.
+    /// Finds the requested part of a run.
     ///
     /// # Errors
     ///
@@ -102,11 +104,11 @@ impl TimeWindow {
     }
 }
 
-/// Draws what the jobs of a window did.
+/// Draws the jobs of a window.
 ///
 /// # Errors
 ///
-/// In words: no job is left of that time.
+/// In words: no job of that time is left.
 pub fn draw(view: &View<'_>, window: TimeWindow) -> Result<String, String> {
     let mut picture = Picture::new(view, window);
     let jobs = view.jobs.iter();
@@ -140,7 +142,7 @@ pub fn graphs(view: &View<'_>) -> String {
     picture.svg.into_text((picture.right, height))
 }
 
-/// Shortens a name for a box: its end stays, where generated names differ.
+/// Shortens a name for a box. The end of the name stays, because generated names differ there.
 fn fitted(name: &str) -> String {
     let (count, most) = (name.chars().count(), ((BOX.0 - LETTER) / LETTER) as usize);
     let end: String = name
@@ -158,10 +160,10 @@ struct Picture<'v> {
     view: &'v View<'v>,
     svg: Svg,
     left: u64,
-    /// Where the widest graph ends.
+    /// The end of the widest graph.
     right: u64,
     window: TimeWindow,
-    /// Where the axis of time ends.
+    /// The end of the axis of time.
     end_ns: u64,
 }
 
@@ -191,7 +193,7 @@ impl<'v> Picture<'v> {
             && released_ns.is_some_and(|at_ns| self.window.released_ns.contains(&at_ns))
     }
 
-    /// Where an instant is on the axis.
+    /// Returns the place of an instant on the axis.
     fn x(&self, time_ns: u64) -> u64 {
         let pixels = u128::from(WIDTH - self.left - RIGHT);
         let from_ns = self.window.released_ns.start;
@@ -202,20 +204,20 @@ impl<'v> Picture<'v> {
         self.left + u64::try_from(x).expect("within the picture")
     }
 
-    /// The colour of a subtask: the next one for each of all DAGs.
+    /// Returns the colour of a subtask: the next colour for each subtask of all DAGs.
     fn colour(&self, dag: DagId, subtask: SubtaskId) -> &'static str {
         let before = &self.view.run.task_set.dags()[..dag.index()];
         let before: usize = before.iter().map(|model| model.subtasks().len()).sum();
         COLOURS[(before + subtask.0 as usize) % COLOURS.len()]
     }
 
-    /// Draws all graphs, and returns where they end.
+    /// Draws all graphs, and returns their lower end.
     fn graphs(&mut self) -> u64 {
         let dags = self.dags().into_iter();
         dags.fold(12, |y, (dag, model)| self.graph(dag, model, y) + 18)
     }
 
-    /// Draws a DAG from `y` on, by layers: a subtask's is the longest path to it.
+    /// Draws a DAG from `y` on, by layers: the longest path to a subtask is the subtask's layer.
     fn graph(&mut self, dag: DagId, model: &Dag, y: u64) -> u64 {
         let mut layers: Vec<Vec<SubtaskId>> = Vec::new();
         let mut layer_of = vec![0; model.subtasks().len()];
@@ -269,7 +271,7 @@ impl<'v> Picture<'v> {
         y + tallest * height
     }
 
-    /// Draws what each core executed, from `y` on.
+    /// Draws the executions of each core, from `y` on.
     fn cores(&mut self, y: u64) -> u64 {
         let cores = u64::from(self.view.run.options.cores);
         for (name, of) in self.view.run.cores() {
@@ -285,7 +287,7 @@ impl<'v> Picture<'v> {
             }
             let model = self.view.run.task_set.dag(instance.dag);
             let name = model.subtask(instance.subtask).name();
-            // Also of jobs that were released before or after the others: a core is never shown idle
+            // Jobs released before or after the window are drawn, too: a core is never shown idle
             // while it executes.
             for slice in &history.slices {
                 let to_ns = slice.to_ns.unwrap_or(self.end_ns).min(self.end_ns);
@@ -440,7 +442,7 @@ impl<'v> Picture<'v> {
 
 const UNITS: [(u64, &str); 3] = [(1_000_000_000, "s"), (1_000_000, "ms"), (1000, "us")];
 
-/// Writes a time with at most one decimal, in the largest unit that makes it 1 or more.
+/// Formats a time with at most one decimal, in the largest unit not above the time.
 fn time(ns: u64) -> String {
     let (unit_ns, unit) = UNITS.into_iter().find(|it| ns >= it.0).unwrap_or((1, "ns"));
     if ns == 0 {

@@ -29,30 +29,30 @@ pub struct View<'r> {
 /// The times of a job's first events of each kind.
 #[derive(Clone, Debug, Default)]
 pub struct JobHistory {
-    /// The release of the job.
+    /// The release.
     pub released_ns: Option<u64>,
-    /// The end of the job by the overrun policy.
+    /// The end by the overrun policy.
     pub aborted_ns: Option<u64>,
-    /// The deadline miss of the job.
+    /// The deadline miss.
     pub missed_ns: Option<u64>,
-    /// The completion of the job.
+    /// The completion.
     pub completed_ns: Option<u64>,
 }
 
 /// The times of an instance's first events of each kind.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// The readiness of the instance.
+    /// The readiness.
     pub ready_ns: Option<u64>,
-    /// The first start of the instance.
+    /// The first start.
     pub start_ns: Option<u64>,
-    /// The finish of the instance.
+    /// The finish.
     pub finish_ns: Option<u64>,
     /// The time of the cancellation, or of the end by a fault.
     pub dropped_ns: Option<u64>,
     /// The times on a core.
     pub slices: Vec<ExecutionSlice>,
-    /// The begin and the end of each wait; `None`: the wait went on at the end of the trace.
+    /// The begin and the end of each wait; `None`: it went on when the trace ended.
     pub waits: Vec<(u64, Option<u64>)>,
     /// The number of preemptions.
     pub suspensions: u64,
@@ -63,9 +63,9 @@ pub struct History {
 pub struct ExecutionSlice {
     /// The core.
     pub core: CoreId,
-    /// The begin of the stretch.
+    /// The begin.
     pub from_ns: u64,
-    /// The end of the stretch; `None`: the instance ran at the end of the trace.
+    /// The end; `None`: the instance ran when the trace ended.
     pub to_ns: Option<u64>,
 }
 

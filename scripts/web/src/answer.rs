@@ -1,8 +1,8 @@
-//! A run as the page draws it: a head in JSON, and columns of slices and jobs.
+//! A run in the form drawn by the page: a head in JSON, and columns of slices and jobs.
 //!
-//! A *slice* is a stretch of execution on one core. Slices stand by core and time, jobs by DAG and
-//! number, so that the page finds those of an interval by halving. Times are nanoseconds from the
-//! begin of the run.
+//! A *slice* is a stretch of execution on one core. Slices are ordered by core and time, jobs by
+//! DAG and number, so the page finds the slices and jobs of an interval by halving. Times are
+//! nanoseconds from the begin of the run.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,13 +20,13 @@ use crate::opened::OpenedRecords;
 use crate::request::{Faults, Request};
 use crate::tables::TypedColumns;
 
-/// So many breaches are told; all are counted.
+/// The most breaches in an answer; all breaches are counted.
 const MOST_BREACHES: usize = 100;
 
-/// So many marks are told.
+/// The most marks in an answer.
 const MOST_MARKS: usize = 10_000;
 
-/// Answers a request for all that is to be seen of a run.
+/// Answers a request for the whole picture of a run.
 pub(crate) fn picture(
     opened: &OpenedRecords<'_>,
     request: &Request<'_>,
@@ -66,7 +66,7 @@ pub(crate) fn picture(
         .list("first_of_core", firsts)
         .list("dags", dags(&view, opened))
         .text("graph", &picture::graphs(&view));
-    // It takes more than half of the time, so the page asks for it once the picture is there.
+    // Judging takes more than half of the time, so the page asks for it once the picture is there.
     let is_judged = request.choice("judge", &[("yes", true), ("no", false)])?;
     let tolerance_ns = match opened.warnings {
         Some(_) => 0,
@@ -81,7 +81,7 @@ pub(crate) fn picture(
     }))
 }
 
-/// Adds what is found by the rules, as `check-trace` does, and by the times of chains and links.
+/// Adds the breaches of the rules, as `check-trace` does, and the times of chains and links.
 fn judged(head: Object, view: &View<'_>, tolerance_ns: u64) -> Object {
     let (run, terms) = (view.run, view.run.terms(tolerance_ns));
     let (mut breaches, mut told) = (Vec::new(), String::new());
@@ -131,7 +131,7 @@ fn or_null(number: Option<u64>) -> String {
     number.map_or("null".into(), |number| number.to_string())
 }
 
-/// The DAGs with their bounds and what was observed.
+/// Returns the DAGs with their bounds and their observed times.
 fn dags(view: &View<'_>, opened: &OpenedRecords<'_>) -> Vec<String> {
     let told = opened.commits(view.run).flat_map(|(_, commit, _)| {
         let own = (0..).map(DagId).zip(&commit.told.dags);
@@ -186,7 +186,7 @@ fn dag(view: &View<'_>, (id, model): (DagId, &Dag), told: (&CommittedDags, DagId
         .into_text()
 }
 
-/// Returns the first moments of the run that are no execution.
+/// Returns the first moments of the run besides executions.
 fn marks(view: &View<'_>, warnings: &mut Vec<String>) -> Vec<String> {
     let mut all = marks::of(view);
     let told = all.by_ref().take(MOST_MARKS).map(|mark| {
@@ -220,7 +220,7 @@ fn plan(view: &View<'_>, columns: &mut TypedColumns) {
     columns.bytes("plan_late", each().map(is_late));
 }
 
-/// Returns the number of the subtasks of the DAGs before each one.
+/// Returns the number of subtasks in the DAGs before each DAG.
 fn first_subtasks(view: &View<'_>) -> Vec<u64> {
     let mut before = vec![0];
     for dag in view.run.task_set.dags() {
@@ -229,7 +229,7 @@ fn first_subtasks(view: &View<'_>) -> Vec<u64> {
     before
 }
 
-/// Adds the slices; returns where those of each core begin, and where the last ones end.
+/// Adds the slices; returns the begin of each core's slices, and the end of the last.
 fn slices(view: &View<'_>, columns: &mut TypedColumns) -> Vec<usize> {
     let before = first_subtasks(view);
     let mut all = Vec::new();

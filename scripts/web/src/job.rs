@@ -1,7 +1,7 @@
-//! A job's values, as far as they are recorded.
+//! A job's recorded values.
 //!
-//! Each is told with the subtask that took or gave it, and where it was sampled, with the job that
-//! it came from.
+//! Each value is given with the subtask that took or gave the value; a sampled value also with the
+//! job of its origin.
 
 use recording::{CommittedDag, Decoder, Entry, EntryKind, Recordable, Recording, Role, Shown};
 use sched_dag::{DagId, SubtaskId};
@@ -38,7 +38,7 @@ pub(crate) fn job(opened: &OpenedRecords<'_>, request: &Request<'_>) -> Result<V
     Ok(framed(&head.into_text(), &[]))
 }
 
-/// Adds a value, once for each subtask that took or gave it.
+/// Adds a value, once for each subtask that took or gave the value.
 fn add(
     entry: &Entry<'_>,
     recording: &Recording<'_>,

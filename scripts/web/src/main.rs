@@ -1,11 +1,12 @@
 //! The page's engine: a request on standard input, an answer on standard output.
 //!
-//! A *request* is a line `WHAT NAME=VALUE ...` and a body behind it: a DAG file, or records. An
-//! *answer* is a head in JSON with columns of numbers behind it ([`answer`]), or the bytes of a
-//! file that the page saves.
+//! A *request* is a line `WHAT NAME=VALUE ...` followed by a body: a DAG file, or records. An
+//! *answer* is a head in JSON followed by columns of numbers ([`answer`]), or the bytes of a file
+//! saved by the page.
 //!
-//! In a browser the program is wasm, started anew for each request. It is the same on the host,
-//! where tests compare its answers. A request that it refuses is answered, too: no input ends it.
+//! In a browser the program is wasm, started anew for each request. The same program runs on the
+//! host, where tests compare its answers. A refused request is answered, too: no input ends the
+//! program.
 
 #![forbid(unsafe_code)]
 
@@ -22,14 +23,15 @@ use std::io::{self, Read, Write};
 use opened::OpenedRecords;
 use request::{Faults, Request};
 
-/// The memory of wasm ends at 4 GiB, and a record takes some twenty-five times its size.
+/// The most bytes of a request: the memory of wasm ends at 4 GiB, and a record takes some
+/// twenty-five times its size.
 const MOST_BYTES: usize = 100 << 20;
 
 fn main() -> io::Result<()> {
     let mut bytes = Vec::new();
     io::stdin().read_to_end(&mut bytes)?;
-    // Most is taken at once, if it is there: each growth of wasm's memory costs a browser as much
-    // as thousands of allocations.
+    // Most memory is taken at once, if available: each growth of wasm's memory costs a browser as
+    // much as thousands of allocations.
     let mut memory = Vec::<u8>::new();
     let _ = memory.try_reserve_exact((25 * bytes.len()).clamp(32 << 20, 1 << 30));
     drop(std::hint::black_box(memory));

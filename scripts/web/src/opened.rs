@@ -1,4 +1,4 @@
-//! Opened records: of a play, or of a file or several.
+//! Opened records: of a play, or of one or several files.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -19,12 +19,12 @@ pub(crate) struct OpenedRecords<'r> {
     bytes: Vec<Cow<'r, [u8]>>,
     /// The records of several machines, joined.
     joint: Option<Run>,
-    /// The warnings of a play's commit; `None`: this is no play, and times are not exact.
+    /// The warnings of a play's commit; `None` for other records, with inexact times.
     pub(crate) warnings: Option<Vec<String>>,
 }
 
 impl<'r> OpenedRecords<'r> {
-    /// Plays, and opens the play's record: so a play is seen as its record will be.
+    /// Plays, and opens the play's record, so the page shows a play as its record.
     pub(crate) fn played(request: &Request<'r>) -> Result<Self, Faults> {
         let (record, warnings) = play::play(request)?;
         Ok(Self {
@@ -70,7 +70,7 @@ impl<'r> OpenedRecords<'r> {
         Ok(opened)
     }
 
-    /// Returns the run of the request's number.
+    /// Returns the run with the request's number.
     pub(crate) fn run(&self, request: &Request<'_>) -> Result<&Run, String> {
         let number = request.number("run", 0..=usize::MAX, 0)?;
         let runs = &self.records[0].1.runs;
@@ -79,7 +79,7 @@ impl<'r> OpenedRecords<'r> {
         found.ok_or_else(|| format!("run: it has no run {number}, but {count} of them; {keep}"))
     }
 
-    /// Returns each record's bytes and commit, with its DAGs in the run that is shown.
+    /// Returns each record's bytes and commit, with its DAGs in the shown run.
     pub(crate) fn commits(&self, run: &Run) -> impl Iterator<Item = Part<'_>> {
         let number = usize::try_from(run.number).unwrap_or(usize::MAX);
         let all = self.records.iter().zip(&self.bytes).enumerate();
@@ -98,10 +98,10 @@ impl<'r> OpenedRecords<'r> {
 
 type Part<'o> = (&'o [u8], &'o CommittedDags, Range<u32>);
 
-/// Draws the run that a request names, or a window of it.
+/// Draws the run named by a request, or a window of the run.
 pub(crate) fn svg(opened: &OpenedRecords<'_>, request: &Request<'_>) -> Result<Vec<u8>, Faults> {
     let view = View::new(opened.run(request)?);
-    // Those of a play say how long it runs.
+    // The `periods` of a play are the play's length.
     let periods = match opened.warnings {
         Some(_) => 1,
         None => request.number("periods", 1..=1000, 1)?,

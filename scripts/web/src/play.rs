@@ -1,4 +1,4 @@
-//! DAGs run in virtual time: their record, as `./scripts/run --keep` writes that of a boot.
+//! DAGs run in virtual time, and their record, like a boot's record by `./scripts/run --keep`.
 
 use dag_file::{RunSettings, build};
 use fass::commit::{ConstructionPolicy, Overheads, finish_create_dags_in_order};
@@ -11,10 +11,10 @@ use virtual_time::VirtualTime;
 use crate::request::{Faults, Request};
 use crate::stamps;
 
-/// So many instances take some ten seconds, and a gigabyte.
+/// The most instances of a play: they take some ten seconds, and a gigabyte.
 const MOST_INSTANCES: u64 = 500_000;
 
-/// Plays the app or the file of a request; returns its record, and what the commit warns of.
+/// Plays the app or the file of a request; returns the record, and the warnings of the commit.
 pub(crate) fn play(request: &Request<'_>) -> Result<(Vec<u8>, Vec<String>), Faults> {
     let (machine, options) = machine(request)?;
     let seed = request.number("seed", 0..=u64::MAX, 1)?;
@@ -55,7 +55,7 @@ pub(crate) fn play(request: &Request<'_>) -> Result<(Vec<u8>, Vec<String>), Faul
     Ok((machine.recording(), warnings.chain(say()).collect()))
 }
 
-/// Builds the DAGs of a file. Returns its lists of cores, too.
+/// Builds the DAGs of a file, and returns also the file's lists of cores.
 fn of_file(
     request: &Request<'_>,
     options: &CommitOptions,
@@ -89,7 +89,7 @@ fn of_file(
     Ok((build(set, &settings), lists.collect()))
 }
 
-/// Makes the machine that a request describes, and what a commit on it demands.
+/// Makes the machine described by a request, and the demands of a commit on the machine.
 fn machine(request: &Request<'_>) -> Result<(VirtualTime, CommitOptions), String> {
     let cores = request.number("cores", 1..=MOST_CORES, 4)?;
     let policy = request.choice("policy", &Policy::ALL.map(|it| (it.word(), it)))?;

@@ -1,4 +1,4 @@
-//! Requests, read, and refusals of them.
+//! Requests, read, and refusals of requests.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -9,16 +9,16 @@ use views::json::Object;
 
 use crate::tables::framed;
 
-/// The words of all requests. A request may have some that are of no use to it.
+/// The words of all requests. A request may have some words without using them.
 const NAMES: &str = "app clusters cores dag dags execution from job judge live names of overheads \
                      periods policy preemption run seed set sizes to";
 
 /// A request.
 pub(crate) struct Request<'r> {
-    /// Its first word.
+    /// The first word.
     pub(crate) what: &'r str,
     words: Vec<(&'r str, String)>,
-    /// The bytes behind its line.
+    /// The bytes behind the line.
     pub(crate) body: &'r [u8],
 }
 
@@ -43,14 +43,14 @@ impl<'r> Request<'r> {
         })
     }
 
-    /// Returns the value of a word; an empty one is as none.
+    /// Returns the value of a word; an empty value counts as no value.
     pub(crate) fn text(&self, name: &str) -> Option<&str> {
         let mut words = self.words.iter().rev();
         let (_, value) = words.find(|word| word.0 == name)?;
         (!value.is_empty()).then_some(value)
     }
 
-    /// Returns the number of a word, or another one without it.
+    /// Returns the number of a word, or `otherwise` without the word.
     pub(crate) fn number<N: FromStr + PartialOrd + Display>(
         &self,
         name: &str,
@@ -65,7 +65,7 @@ impl<'r> Request<'r> {
         number.ok_or_else(|| format!("{name}: {text} is no number from {least} to {most}"))
     }
 
-    /// Returns the choice of a word; without the word the first.
+    /// Returns the choice of a word; without the word, the first choice.
     pub(crate) fn choice<T: Copy>(&self, name: &str, from: &[(&str, T)]) -> Result<T, String> {
         let text = self.text(name).unwrap_or(from[0].0);
         let chosen = from.iter().find(|(word, _)| *word == text);
@@ -77,7 +77,7 @@ impl<'r> Request<'r> {
     }
 }
 
-/// Returns a value with its blanks, which a word has as `%20`, and percent signs.
+/// Returns a value with its blanks and percent signs, written in a word as `%20` and `%25`.
 fn decoded(value: &str) -> String {
     value.replace("%20", " ").replace("%25", "%")
 }
@@ -92,7 +92,7 @@ impl From<String> for Faults {
 }
 
 impl Faults {
-    /// Returns the answer that tells them.
+    /// Returns the answer that tells the reasons.
     pub(crate) fn answer(&self) -> Vec<u8> {
         let faults = self.0.iter().map(|Malformed { line, reason }| {
             let fault = Object::new().number("line", *line as u64);

@@ -1,9 +1,10 @@
 //! A lab: why a join must not match by stamps.
 //!
-//! A camera and a lidar of one period publish frames, each with the time of its arrival at the
-//! driver, as is usual. DAG `joined` has both, and an AND-join: `fuse` gets frames of one job. In
-//! DAGs `camera`, `lidar` and `apart` the same subtasks publish and subscribe, and the frame of the
-//! nearest stamp is taken, perhaps of another job: a lidar may take longer than half a period.
+//! A camera and a lidar with the same period publish frames, each with the time of its arrival at
+//! the driver, as is usual. DAG `joined` has both, and an AND-join: `fuse` gets frames of one job.
+//! In DAGs `camera`, `lidar` and `apart` the same subtasks publish and subscribe, and `fuse` takes
+//! the frame with the nearest stamp, perhaps of another job: a lidar may take longer than half a
+//! period.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -17,9 +18,9 @@ recording::recordable! {
     /// A frame.
     #[derive(Clone, Copy, Debug, Default)]
     pub struct Frame {
-        /// Its job.
+        /// The job of the frame.
         pub job: u64,
-        /// The time of its arrival at the driver.
+        /// The time of arrival at the driver.
         pub stamp_ns: u64,
     }
 }
@@ -27,7 +28,7 @@ recording::recordable! {
 type Pair = (Frame, Frame);
 type Latest<'a> = Option<Sample<'a, Frame>>;
 
-/// Builds the DAGs, whose times follow from a seed, and a report of how many pairs did not match.
+/// Builds the DAGs, whose times follow from a seed, and a report on the number of mismatched pairs.
 pub(crate) fn build(seed: u64) -> ([Dag; 4], impl Fn() -> String) {
     let dags = ["joined", "camera", "lidar", "apart"].map(|name| {
         let dag = create_dag();
@@ -53,7 +54,7 @@ pub(crate) fn build(seed: u64) -> ([Dag; 4], impl Fn() -> String) {
     });
     let join = joined.subtask(join).reads(&["seen", "points"]);
     join.writes(&["pair"]).register(taking("fuse", 1));
-    // None yet, and so none that is near.
+    // No scan has come yet, so none is near.
     let none = Frame {
         job: u64::MAX,
         stamp_ns: u64::MAX,
@@ -86,8 +87,8 @@ pub(crate) fn build(seed: u64) -> ([Dag; 4], impl Fn() -> String) {
     (dags, told)
 }
 
-/// Registers a sensor, its topic, the subtask behind it and its topic. The sensor takes at
-/// most so many milliseconds.
+/// Registers a sensor with its topic, and the subtask behind the sensor with another topic. The
+/// sensor takes at most `most_ms` milliseconds.
 fn register(dag: &Dag, names: [&'static str; 4], [most_ms, wcet]: [u64; 2], seed: u64) {
     let [sensor, raw, branch, topic] = names;
     let mut jobs = 0..;

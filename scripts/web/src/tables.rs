@@ -1,8 +1,8 @@
 //! The form of an answer: a head in JSON, then columns of numbers.
 //!
-//! The head's length comes first, in four bytes, the least significant one first. The head is
-//! padded with blanks so that the columns begin at a multiple of 8, as each column does: then a
-//! script sees them as arrays of numbers without copying.
+//! The head's length comes first, in four bytes, the least significant byte first. Blanks pad the
+//! head so that the columns begin at a multiple of 8, as each column does. So a script sees the
+//! columns as arrays of numbers without copying.
 
 use views::json::Object;
 
@@ -25,7 +25,7 @@ impl TypedColumns {
         self.head.push(column.into_text());
     }
 
-    /// Adds a column of times in nanoseconds; without a time NaN.
+    /// Adds a column of times in nanoseconds; NaN for a missing time.
     pub(crate) fn times(&mut self, name: &str, values: impl Iterator<Item = Option<u64>>) {
         #[allow(
             clippy::cast_precision_loss,
@@ -46,7 +46,7 @@ impl TypedColumns {
         self.add([name, "Uint8Array"], values.map(|value| [value]));
     }
 
-    /// Returns the answer of a head, to which the columns are added.
+    /// Returns the answer with a head and the columns.
     pub(crate) fn under(self, head: Object) -> Vec<u8> {
         framed(&head.list("columns", self.head).into_text(), &self.bytes)
     }

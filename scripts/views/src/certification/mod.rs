@@ -1,28 +1,30 @@
-//! Certification of a run: whether its record shows all that the proofs of its bounds assume.
+//! Certification of a run: whether its record shows everything assumed in the proofs of its bounds.
 //!
 //! The theorems of `sched-dag/proofs` are about each run by the rules whose instances execute for
-//! their WCETs at most. A run is *certified* if it was such a run, so that each bound held by its
-//! theorem. These conditions are asked in this order, and the first that fails is told:
+//! their WCETs at most. A run is *certified* if it was such a run, so each bound held by its
+//! theorem. The conditions are checked in this order, and the first failure is reported:
 //!
-//! 1. *record*: it has the whole run, no job that is due twice, and none of those due is missing;
-//! 2. *witness*: the bounds are those that the same analysis answers here;
+//! 1. *record*: the record has the whole run, no job is due twice, and no due job is missing;
+//! 2. *witness*: the bounds are the answers of the same analysis here;
 //! 3. *rules*: the [findings](crate::findings) have no breach;
-//! 4. *order* (`order.rs`): no instance with a core to keep began before a more urgent instance,
-//!    ready by the step in which the core was given;
-//! 5. *cut*: each released job of a DAG with a bound has executed to its end, and on one core,
-//!    where a bound may rest on the demand of all, each of any DAG;
+//! 4. *order* (`order.rs`): no instance with a core to keep began before a more urgent instance
+//!    that was ready by the step in which the core was given;
+//! 5. *cut*: each released job of a DAG with a bound has executed to its end; on one core, where a
+//!    bound may rest on the demand of all, each released job of any DAG has;
 //! 6. *WCET*: no segment executes for longer than its WCET and its charges;
 //! 7. *lost*: nor do execution and lost time together take longer;
-//! 8. *bound*: no response is above its bound. By hand this follows from all others, so that
-//!    a failure is an error of ours.
+//! 8. *bound*: no response is above its bound. By hand this follows from all other conditions, so a
+//!    failure is an error of ours.
 //!
-//! *Lost* are the time until an instance is ready, from the nominal release or the last finish
-//! that it waits for; the time for which a wait goes on beyond its limit; and for each segment the
-//! run's longest inversion, with preemption twice: before its own first instruction, and before the
-//! next one of the instance that it preempts. `docs/proving.md` argues why an instance
-//! pays for that, by hand. A charge that is too small does no harm where WCETs were not used up.
+//! *Lost* times are the time until an instance is ready, from the nominal release or the last
+//! finish that the instance waits for; the time for which a wait goes on beyond its limit; and for
+//! each segment the run's longest inversion, with preemption twice: before the segment's own first
+//! instruction, and before the next instruction of the preempted instance. `docs/proving.md` argues
+//! by hand why an instance pays for lost time. A charge too small does no harm where WCETs were not
+//! used up.
 //!
-//! No witness is checked here: `./scripts/check-witness --proven` does, and names the theorems.
+//! No witness is checked here: `./scripts/check-witness --proven` checks witnesses, and names the
+//! theorems.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,11 +37,11 @@ use crate::record::Run;
 use crate::units::shown;
 use crate::view::{History, SliceEnd, View};
 
-/// Certifies a run that has bounds.
+/// Certifies a run with bounds.
 ///
 /// # Errors
 ///
-/// The word and the words for the first condition that failed.
+/// The name of the first failed condition, and the reason in words.
 pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, String)> {
     match (run.lost, run.complete) {
         _ if run.bounds_ns.iter().all(Option::is_none) => {
@@ -69,7 +71,7 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
             return Err((condition, why));
         }
     }
-    // A member of a table that moves to another core has nobody to pay for it but its own charge.
+    // Nothing but its own charge pays for a member of a table that moves to another core.
     let (task_set, move_ns) = (&run.task_set, run.commit.told.move_ns);
     let mut dags = (0..).map(DagId).take(task_set.dags().len());
     let moves = |dag| {
@@ -84,7 +86,7 @@ pub fn certify(run: &Run, findings: &Findings) -> Result<(), (&'static str, Stri
     exceeded(&view, &answer).map_or(Ok(()), |why| Err(("bound", why)))
 }
 
-/// Says which job is due twice: responses would count from the last time.
+/// Returns which job is due twice, if any: responses would count from the last time.
 fn due_again(view: &View<'_>) -> Option<String> {
     let mut due = BTreeSet::new();
     let mut jobs = view.events.iter().filter(|it| it.what == EventKind::Due);
@@ -93,9 +95,9 @@ fn due_again(view: &View<'_>) -> Option<String> {
     Some(format!("dag `{name}` job {} is due twice", again.job))
 }
 
-/// Says which job of a periodic DAG with a bound is one of a stated number, or should have been
-/// complete, and was not released.
-/// Nothing is asked of a DAG that was paused or closed, or that modes leave out.
+/// Returns which job was not released, if any, although it is one of a stated number or should have
+/// been complete. Only periodic DAGs with a bound are checked, except DAGs that were paused or
+/// closed or may be left out by a mode.
 fn missing(view: &View<'_>) -> Option<String> {
     let run = view.run;
     let modes = view.events.iter().any(|it| it.what == EventKind::Entered);
@@ -124,8 +126,8 @@ fn missing(view: &View<'_>) -> Option<String> {
     })
 }
 
-/// Says what cut a job short, or which instance of a released job never finished, where theorems
-/// ask each to.
+/// Returns the event that cut a job short, or the instance of a released job that never finished,
+/// where theorems ask each to finish.
 fn cut(view: &View<'_>) -> Option<String> {
     let Run {
         task_set, options, ..
@@ -150,7 +152,7 @@ fn cut(view: &View<'_>) -> Option<String> {
     })
 }
 
-/// The events by which a job ends before its instances do.
+/// The events by which a job ends before its instances.
 const CUTS: [EventKind; 5] = [
     EventKind::Aborted,
     EventKind::Cancelled,
@@ -159,21 +161,22 @@ const CUTS: [EventKind; 5] = [
     EventKind::Restarted,
 ];
 
-/// A segment, or all of an instance if the WCETs of its segments are not known.
+/// A segment, or a whole instance if the WCETs of its segments are unknown.
 struct Segment {
     instance: Instance,
     /// The number of segments.
     count: u64,
     from_ns: u64,
     executed_ns: u64,
-    /// The time until it was ready, or beyond the limit of the wait before.
+    /// The time until readiness, or the time beyond the limit of the wait before.
     late_ns: u64,
-    /// Its WCET with charges.
+    /// The WCET with charges.
     charged_ns: u64,
 }
 
 impl Segment {
-    /// Says that execution was too long, or with an inversion execution and lost time.
+    /// Describes an execution that was too long or, given an inversion, execution and lost time
+    /// together.
     fn excess(&self, run: &Run, owed_ns: Option<u64>) -> Option<String> {
         let times = self.count * (1 + u64::from(run.options.preemption == Preemption::Enabled));
         let lost_ns = |owed_ns: u64| owed_ns.saturating_mul(times).saturating_add(self.late_ns);
@@ -219,11 +222,11 @@ fn segments(view: &View<'_>) -> Vec<Segment> {
     let charges: Vec<Option<u64>> = charges.collect();
     let mut over_ns = BTreeMap::new();
     let mut all = Vec::new();
-    // By job: the one before comes first.
+    // In the order of jobs: the job before comes first.
     for (&instance, history) in &view.histories {
         let Instance { dag, job, subtask } = instance;
         let model = task_set.dag(dag);
-        // A bound stands whenever DAGs without one release.
+        // A bound holds whenever DAGs without a bound release, so their lateness does not count.
         let release_ns = view.run.bounds_ns[dag.index()].map(|_| view.release_ns(dag, job));
         let over = |of: &History| of.finish_ns.or(of.dropped_ns);
         let before = |&subtask| over(view.histories.get(&Instance { dag, job, subtask })?);
@@ -233,7 +236,7 @@ fn segments(view: &View<'_>) -> Vec<Segment> {
         let ready_ns = history.ready_ns.unwrap_or(0);
         let late_ns = ready_ns.saturating_sub(due_ns.unwrap_or(ready_ns));
         let subtask = model.subtask(subtask);
-        // What has no WCET delays nothing that has a bound.
+        // An instance without a WCET delays no instance with a bound.
         let Some(charged_ns) = charges[dag.index()].and_then(|ns| charged(subtask, ns)) else {
             continue;
         };
@@ -255,19 +258,20 @@ fn segments(view: &View<'_>) -> Vec<Segment> {
     all
 }
 
-/// Returns the WCETs of a subtask's segments with charges, or of all together if they are unknown.
+/// Returns the WCETs of a subtask's segments with charges, or their sum if the parts are unknown.
 fn charged(subtask: &Subtask, charge_ns: u64) -> Option<Vec<u64>> {
     let whole_ns = subtask.charged_ns(charge_ns)?;
     let Some(mut segments_ns) = subtask.segments_ns() else {
         return Some(vec![whole_ns]);
     };
-    // The first one has all waits for locks.
+    // The first segment has all waits for locks.
     segments_ns[0] += subtask.charged_ns(0)? - subtask.wcet_ns()?;
     let segments_ns = segments_ns.into_iter().map(|ns| ns.checked_add(charge_ns));
     segments_ns.collect()
 }
 
-/// Returns of each segment its begin, its execution, and how late it was, the first one so late.
+/// Returns the begin, the execution and the lateness of each segment; the first is late by
+/// `late_ns`.
 fn executed(history: &History, of: &Subtask, late_ns: u64, end_ns: u64) -> Vec<(u64, u64, u64)> {
     let mut found: Vec<(u64, u64, u64)> = Vec::new();
     let mut next_late_ns = Some(late_ns);
@@ -287,7 +291,7 @@ fn executed(history: &History, of: &Subtask, late_ns: u64, end_ns: u64) -> Vec<(
     found
 }
 
-/// Says which instance finished beyond the bound of its DAG, or of its sink.
+/// Returns which instance finished beyond the bound of its DAG, or of its sink, if any.
 fn exceeded(view: &View<'_>, answer: &AnalysisResult) -> Option<String> {
     view.histories.iter().find_map(|(&instance, history)| {
         let Instance { dag, job, subtask } = instance;

@@ -1,15 +1,17 @@
-//! Whether all that keeps its core began in the order of the policy.
+//! Whether all instances that keep their cores began in the order of the policy.
 //!
 //! A decision takes effect late, so the law lets an instance wait for a while for the core of its
-//! turn. An instance with a core to keep ends such a wait by its start, so there a wrong choice
+//! turn. The start of an instance with a core to keep ends such a wait, so there a wrong choice
 //! would look like a slow dispatch. Here no time counts: events stand in the order in which the
-//! scheduler learnt of them. The core was given at the request, or else when the instance was
-//! ready and the core free. More urgent instances, ready by that step, need other cores: at some
-//! moment from then until the start, idle cores, or cores with less urgent, preemptible work.
+//! scheduler learnt of them. The core was given at the request or, without a request, when the
+//! instance was ready and the core free. More urgent instances, ready by that step, need other
+//! cores: at some moment from then until the start, there must be idle cores, or cores with less
+//! urgent, preemptible work.
 //!
 //! Preemptible instances are not judged: if chosen wrongly, they go on for no longer than the
-//! inversion, and this is measured. Of entries of tables the law judges the order without time,
-//! too; but the start of a member of the group on the core of a due entry within its tolerance.
+//! inversion, and the inversion is measured. The law judges the order of table entries without
+//! time, too; but the start of a member of the group on the core of a due entry within its
+//! tolerance.
 
 use std::collections::BTreeMap;
 
@@ -21,20 +23,20 @@ use crate::record::Run;
 use crate::units::shown;
 use crate::view::View;
 
-/// The smaller one goes first.
+/// The key of an instance; the smaller key goes first.
 type Key = (u64, Instance);
 
 /// The instances at hand between two events.
 struct Dispatch<'v> {
     view: &'v View<'v>,
-    /// By DAG the policy's numbers.
+    /// The policy's numbers, by DAG.
     numbers: Vec<Vec<u64>>,
-    /// Since which event.
+    /// The event since which each instance waits.
     waiting: BTreeMap<Key, usize>,
     running: BTreeMap<CoreId, Key>,
-    /// The event that freed a core last.
+    /// The event that last freed each core.
     freed: BTreeMap<CoreId, usize>,
-    /// The latest request for a core.
+    /// The latest request for each core.
     requests: BTreeMap<CoreId, (Instance, usize)>,
 }
 
@@ -42,13 +44,13 @@ struct Dispatch<'v> {
 struct KeeperStart {
     key: Key,
     core: CoreId,
-    /// The last event of the step from which on it may have been given the core.
+    /// The last event of the step from which on the instance may have been given the core.
     chosen: usize,
-    /// The event by which it begins.
+    /// The event of the start.
     at: usize,
 }
 
-/// Says which instance began out of order.
+/// Describes an instance that began out of order, if any.
 pub(super) fn broken(view: &View<'_>) -> Option<String> {
     let events: Vec<Event> = view.in_the_order_of_the_log().collect();
     let mut dispatch = Dispatch::new(view);
@@ -119,7 +121,7 @@ impl<'v> Dispatch<'v> {
         is_free.then_some((dag.cluster(), dag.affinity()))
     }
 
-    /// Returns what the event of a number begins, before it is taken.
+    /// Returns the start made by an event at a position, before the event is taken.
     fn begin(&self, events: &[Event], at: usize) -> Option<KeeperStart> {
         let Event { what, core, .. } = events[at];
         let instance = events[at].instance()?;
@@ -133,7 +135,7 @@ impl<'v> Dispatch<'v> {
             .filter(|(of, at)| *of == instance && *at > ready);
         let free = self.freed.get(&core).copied().unwrap_or(0);
         let since = request.map_or(ready.max(free), |(_, at)| *at);
-        // Behind stands all else that the same step of the scheduler made ready.
+        // The events behind it may belong to the same step of the scheduler.
         let in_step = |event: &&Event| {
             let of = (event.core, event.time_ns) == (events[since].core, events[since].time_ns);
             of && !event.what.is_of_machine()
@@ -147,10 +149,10 @@ impl<'v> Dispatch<'v> {
         })
     }
 
-    /// Takes the event of a number.
+    /// Takes the event at a position.
     fn take(&mut self, at: usize, event: &Event) {
         if event.what == EventKind::DagEnded {
-            // What has not started never will; what has may go on, with nothing owed.
+            // Unstarted instances never start now; started instances may go on, with nothing owed.
             self.waiting.retain(|(_, of), _| of.dag != event.dag);
         }
         let Some(instance) = event.instance() else {
@@ -178,8 +180,7 @@ impl<'v> Dispatch<'v> {
         }
     }
 
-    /// Returns the first instance that goes before one that is to begin, and for which there is no
-    /// other core.
+    /// Returns the first instance that goes before a beginning instance and finds no other core.
     fn first(&self, begin: &KeeperStart) -> Option<Key> {
         let Run {
             task_set, options, ..

@@ -1,7 +1,7 @@
-//! Hops: what a record says of the messages that another machine has sent.
+//! Hops: the facts in a record about messages sent by another machine.
 //!
-//! A message between machines is a [`Hop`], or has one as its field `hop`. The source that receives
-//! the messages returns them, so the hops are in its recorded values.
+//! A message between machines is a [`Hop`], or has a hop as its field `hop`. The source that
+//! receives the messages returns them, so the recorded values of the source contain the hops.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -13,24 +13,24 @@ use sched_dag::law::Distribution;
 use sched_dag::{DagId, SubtaskId};
 
 recording::recordable! {
-    /// Where a value has come from, as `ros::Hop`. Times are those of clocks, not of runs.
+    /// The origin of a value, as in `ros::Hop`. Times are readings of clocks, not times of runs.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub struct Hop {
         /// The sending job.
         pub job: u64,
-        /// When it was put, by the sender's clock.
+        /// The time of sending, by the sender's clock.
         pub sent_ns: u64,
-        /// When it was heard, by the receiver's clock; 0: it was not.
+        /// The time of receiving, by the receiver's clock; 0 if nobody received the message.
         pub received_ns: u64,
-        /// The delay that the app states for the link.
+        /// The delay stated by the app for the link.
         pub delay_ns: u64,
     }
 }
 
-/// The messages that a source has heard from another machine.
+/// The messages heard by a source from another machine.
 #[derive(Clone, Debug)]
 pub struct Heard {
-    /// The topic that it writes, named as that of the sender.
+    /// The topic written by the source, with the name of the sender's topic.
     pub topic: String,
     /// The source.
     pub source: SubtaskRef,
@@ -38,55 +38,56 @@ pub struct Heard {
     pub hops: Vec<(u64, Hop)>,
 }
 
-/// A machine of several whose runs are read as one.
+/// One of several machines with runs read as one.
 #[derive(Clone, Debug)]
 pub struct Machine {
-    /// The name of its record.
+    /// The name of the machine's record.
     pub name: String,
-    /// Its DAGs in the joint run.
+    /// The machine's DAGs in the joint run.
     pub dags: Range<u32>,
-    /// Its cores in the joint run.
+    /// The machine's cores in the joint run.
     pub cores: Range<u32>,
-    /// When its run began, on the joint axis of time.
+    /// The begin of the machine's run, on the joint axis of time.
     pub began_ns: u64,
-    /// How much its clock is ahead of the first machine's.
+    /// The time by which the clock is ahead of the first machine's clock.
     pub ahead_ns: i128,
-    /// By how much that may be wrong, if it is known.
+    /// The uncertainty of `ahead_ns`, if known.
     pub wrong_ns: Option<u64>,
 }
 
-/// A link between machines: a subtask sends the messages of a topic, and another one receives them.
+/// A link between machines: a subtask sends the messages of a topic, and another subtask receives
+/// them.
 #[derive(Clone, Debug)]
 pub struct Link {
     /// The sender, and the receiver.
     pub edge: SampledEdge,
-    /// The positions of their machines.
+    /// The positions of the two machines.
     pub machines: [usize; 2],
-    /// The messages, each with the first job that has it.
+    /// The messages, each with the first job that has the message.
     pub heard: Heard,
-    /// How much the receiver's clock is ahead of the sender's.
+    /// The time by which the receiver's clock is ahead of the sender's clock.
     pub ahead_ns: i128,
-    /// By how much that may be wrong, if it is known.
+    /// The uncertainty of `ahead_ns`, if known.
     pub wrong_ns: Option<u64>,
-    /// How long each took, by the offset of the clocks.
+    /// The time taken by each message, by the offset of the clocks.
     pub delays: Distribution,
-    /// How many took longer than stated, by more than the offset may be wrong.
+    /// The number of messages slower than stated, by more than the uncertainty of the offset.
     pub exceeded: usize,
-    /// The receiving jobs for which no bound holds.
+    /// The receiving jobs without a valid bound.
     pub late: BTreeSet<u64>,
-    /// How many jobs of the sender have no message.
+    /// The number of the sender's jobs without a message.
     pub lost: usize,
 }
 
 impl Link {
-    /// Returns the delay that the app states.
+    /// Returns the delay stated by the app.
     pub fn stated_ns(&self) -> u64 {
         let hops = self.heard.hops.iter();
         hops.map(|(_, hop)| hop.delay_ns).max().unwrap_or(0)
     }
 }
 
-/// Returns the messages that the sources of a recording have heard.
+/// Returns the messages heard by the sources of a recording.
 pub(super) fn heard(recording: &Recording<'_>, dags: &[CommittedDag]) -> Vec<Heard> {
     let header = recording.header();
     let of_channel = |(place, channel): (u16, &Channel)| {
@@ -95,7 +96,7 @@ pub(super) fn heard(recording: &Recording<'_>, dags: &[CommittedDag]) -> Vec<Hea
         let is_of = |entry: &Entry<'_>| (entry.what, entry.place) == (EntryKind::Value, place);
         let hop = |entry: Entry<'_>| {
             let hop = hop(&channel.schema, &mut Decoder::new(entry.value));
-            // The sender's own value has a hop, too, which nobody has heard.
+            // The sender's own value has a hop, too, but nobody has received that one.
             Some((entry.job, hop.filter(|hop| hop.received_ns > 0)?))
         };
         Some(Heard {
@@ -110,7 +111,7 @@ pub(super) fn heard(recording: &Recording<'_>, dags: &[CommittedDag]) -> Vec<Hea
     heard.filter(|heard| !heard.hops.is_empty()).collect()
 }
 
-/// Returns the hop of a value, if it has one.
+/// Returns the hop of a value, if there is any.
 fn hop(schema: &Schema, input: &mut Decoder<'_>) -> Option<Hop> {
     match schema {
         Schema::Option(inner) => bool::decode(input).ok()?.then(|| hop(inner, input))?,

@@ -1,7 +1,7 @@
 //! The record of a boot, read: its commits, and the events and times of its runs.
 //!
-//! It comes as a file, or as lines of a serial log with the file's bytes. Every view of a run
-//! (shown, judged, drawn or computed) is derived from it.
+//! A record comes as a file, or as lines of a serial log containing the file's bytes. Every view of
+//! a run (shown, judged, drawn or computed) is derived from the record.
 
 mod hops;
 
@@ -25,24 +25,25 @@ use text::MOST_CORES;
 
 use crate::protocol::{MachineLine, Transcript, read_line};
 
-// The longest time for which an instance may wait for a core that the rules owe it: a decision takes
-// effect only after an interrupt, and where a run's time is real, the host may do something else
-// meanwhile. In mode `deterministic` that cannot happen, so such a record is judged more strictly.
+// The tolerances: each is the longest time for which an instance may wait for a core owed to it by
+// the rules. A decision takes effect only after an interrupt, and where a run's time is real, the
+// host may do something else meanwhile. In mode `deterministic` the host cannot delay a run, so
+// such a record is judged more strictly.
 
-/// In counted time: covers time slices and the kernel's steps, which grow with the number of
-/// simultaneous events.
+/// The tolerance in counted time. It covers time slices and the kernel's steps, and these grow with
+/// the number of simultaneous events.
 pub const COUNTED_TOLERANCE_NS: u64 = 50_000;
 
-/// Where time is real.
+/// The tolerance in real time.
 pub const REAL_TOLERANCE_NS: u64 = 1_000_000;
 
-/// On Linux by SCHED_FIFO, where interrupts and a hypervisor take time, too.
+/// The tolerance on Linux by SCHED_FIFO, where interrupts and a hypervisor take time, too.
 pub const FIFO_TOLERANCE_NS: u64 = 5_000_000;
 
-/// On Linux by `sched_ext`, where all real-time programs take precedence, too.
+/// The tolerance on Linux by `sched_ext`, where all real-time programs take precedence, too.
 pub const SCHED_EXT_TOLERANCE_NS: u64 = 10_000_000;
 
-/// On Linux by ordinary threads, which every program delays.
+/// The tolerance on Linux by ordinary threads, delayed by every program.
 pub const NORMAL_TOLERANCE_NS: u64 = 100_000_000;
 
 pub use hops::{Heard, Hop, Link, Machine};
@@ -50,33 +51,33 @@ pub use hops::{Heard, Hop, Link, Machine};
 /// The record of a boot.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
-    /// The machine lines, as far as the record has them.
+    /// The machine lines, as far as the record contains them.
     pub lines: String,
     /// The commits, one after the other.
     pub commits: Vec<CommittedDags>,
-    /// The runs. The last one may have died.
+    /// The runs. The last run may have died.
     pub runs: Vec<Run>,
-    /// The times of each run that has ended, each with the index of its commit.
+    /// The times of each ended run, each with the index of its commit.
     pub times: Vec<(usize, Times)>,
-    /// The messages that sources have heard from other machines.
+    /// The messages heard by sources from other machines.
     pub heard: Vec<Heard>,
 }
 
-/// Events of a run that is being read, by cluster.
+/// Events of a run still being read, by cluster.
 #[derive(Default)]
 struct OpenRun {
     clusters: Vec<Vec<Event>>,
     /// The number of events lost so far.
     lost: u64,
-    /// The number of events that each journal has written so far.
+    /// The number of events written so far by each journal.
     taken: Vec<u64>,
 }
 
-/// Returns the bytes of the record in a log; none if it has no record.
+/// Returns the bytes of the record in a log; none for a log without a record.
 ///
 /// # Errors
 ///
-/// In words: the line of the record that is damaged.
+/// In words: the damaged line of the record.
 pub fn bytes_of_log(log: &str) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     for (number, text) in (1..).zip(log.lines()) {
@@ -120,8 +121,8 @@ fn of_base64(text: &str) -> Option<Vec<u8>> {
 }
 
 impl Record {
-    /// Reads a record, or the log that has one in its lines. Of a boot that died it has the part
-    /// that was sent until then.
+    /// Reads a record, or a log with a record in its lines. The record of a boot that died contains
+    /// the part sent until then.
     ///
     /// # Errors
     ///
@@ -145,7 +146,8 @@ impl Record {
         Self::sent(&bytes_of_log(log)?, log)
     }
 
-    /// Reads the record sent by a guest that may have died, and that printed this log.
+    /// Reads the record sent by a guest, which may have died, together with the log printed by the
+    /// guest.
     ///
     /// # Errors
     ///
@@ -153,7 +155,7 @@ impl Record {
     pub fn sent(bytes: &[u8], log: &str) -> Result<Self, String> {
         let mut whole = Cow::Borrowed(bytes);
         if bytes.is_empty() {
-            // No bytes are the record of a boot that recorded nothing.
+            // A boot that recorded nothing has no bytes.
             whole = Cow::Owned(recording::Writer::begin(Vec::new()).end());
         } else if Recording::read(bytes).is_err() {
             let mended = recording::mended(bytes);
@@ -164,11 +166,11 @@ impl Record {
         Self::of(&recording, log.into())
     }
 
-    /// Reads the chunks of a recording, and adds machine lines that are already known.
+    /// Reads the chunks of a recording, and adds known machine lines.
     ///
     /// # Errors
     ///
-    /// In words: the first thing that no run leaves.
+    /// In words: the first chunk or event impossible in a run.
     pub fn of(recording: &Recording<'_>, lines: String) -> Result<Self, String> {
         let mut record = Self {
             lines,
@@ -200,7 +202,7 @@ impl Record {
                 }
             }
         }
-        // Events without times are those of a run that died.
+        // Events without times belong to a run that died.
         if !open.taken.is_empty() {
             record.end_run(open, None)?;
         }
@@ -254,7 +256,7 @@ impl Record {
         Ok(())
     }
 
-    /// Returns the commits, after a check that their bounds are those that the analysis gives here.
+    /// Returns the commits, after a check that the analysis here gives the same bounds.
     ///
     /// # Errors
     ///
@@ -265,7 +267,7 @@ impl Record {
         Ok(&self.commits)
     }
 
-    /// Returns the machine lines that the record has.
+    /// Returns the machine lines in the record.
     pub fn transcript(&self) -> Transcript {
         Transcript::read(&self.lines)
     }
@@ -285,8 +287,7 @@ impl OpenRun {
         let gap = events.before.checked_sub(self.taken[cluster]);
         self.lost += gap.ok_or("some stand twice, or out of their order")?;
         let all = task_set.cores_of(ClusterId(events.cluster.into()), committed.told.cores);
-        // Journals that were merged before they were sent come as cluster 0, with events of all
-        // cores.
+        // Journals merged before sending come as cluster 0, with events of all cores.
         let last = match cluster {
             0 => committed.told.cores,
             _ => all.end,
@@ -309,8 +310,8 @@ impl OpenRun {
     }
 }
 
-/// Merges the events of two clusters by time; at equal times those of the first come before, as in
-/// a kernel that ends a run.
+/// Merges the events of two clusters by time. At equal times the events of the first cluster come
+/// first, as in a kernel that ends a run.
 pub(crate) fn merged(ours: Vec<Event>, theirs: Vec<Event>) -> Vec<Event> {
     let mut merged = Vec::with_capacity(ours.len() + theirs.len());
     let mut theirs = theirs.into_iter().peekable();
@@ -328,7 +329,7 @@ pub(crate) fn merged(ours: Vec<Event>, theirs: Vec<Event>) -> Vec<Event> {
 fn in_order(run: &Run) -> Result<(), CoreId> {
     let mut latest_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     for event in &run.events {
-        // These two carry the core and the time that they are about, not those of their writing.
+        // These two kinds carry the core and the time of their subject, not of their writing.
         if matches!(event.what, EventKind::Request | EventKind::Due) {
             continue;
         }
@@ -341,12 +342,12 @@ fn in_order(run: &Run) -> Result<(), CoreId> {
     Ok(())
 }
 
-/// DAGs that were committed together, and their bounds.
+/// DAGs committed together, and their bounds.
 #[derive(Clone, Debug, Default)]
 pub struct CommittedDags {
-    /// Its number within the boot, from 0.
+    /// The number within the boot, from 0.
     pub number: usize,
-    /// The commit as the record has it.
+    /// The commit, as in the record.
     pub told: Commit,
     /// The commit as specifications.
     pub specs: Vec<DagSpec>,
@@ -359,7 +360,7 @@ impl CommittedDags {
     ///
     /// # Errors
     ///
-    /// The reasons for which a commit would refuse them.
+    /// The reasons for which a commit would refuse the DAGs.
     pub fn new(number: usize, told: Commit) -> Result<Self, String> {
         let in_commit = |why: String| format!("commit {number}: {why}");
         if !(1..=MOST_CORES).contains(&told.cores) {
@@ -441,8 +442,7 @@ impl CommittedDags {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
-            // The record has these numbers only, which is all that the analysis derives from
-            // overheads.
+            // The record has only these numbers, and the analysis derives no others from overheads.
             overheads: Overheads {
                 // `None` is a charge without an end: no bound must come out here either.
                 dispatch_ns: (self.told.charge_ns)
@@ -456,7 +456,7 @@ impl CommittedDags {
         }
     }
 
-    /// Returns what the analysis answers here, after a check that the bounds are the same.
+    /// Returns the answer of the analysis here, after a check that the bounds are the same.
     ///
     /// # Errors
     ///
@@ -478,7 +478,8 @@ impl CommittedDags {
         Ok(answer)
     }
 
-    /// Returns which subtask samples the topic of which other, as positions in the model.
+    /// Returns the pairs of subtasks in which one samples the other's topic, as positions in the
+    /// model.
     pub fn samplings(&self) -> Vec<SampledEdge> {
         let dags = (0..).map(DagId).zip(&self.told.dags);
         let sampling = |(dag, &(reader, writer, topic, _))| {
@@ -505,7 +506,7 @@ impl CommittedDags {
 ///
 /// # Errors
 ///
-/// The reasons for which a commit would refuse them.
+/// The reasons for which a commit would refuse the DAGs.
 pub fn task_set(
     options: SchedulerOptions,
     clusters: CoreDivision,
@@ -592,11 +593,11 @@ fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
 /// A run: its model, and its events.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Its number within the boot, from 0.
+    /// The number within the boot, from 0.
     pub number: u64,
-    /// Its commit; of a run that joins several, that of the first machine.
+    /// The commit; for a joint run, the commit of the first machine.
     pub commit: Arc<CommittedDags>,
-    /// How it was scheduled.
+    /// The options by which the run was scheduled.
     pub options: SchedulerOptions,
     /// The tolerance for late decisions if none is given, in nanoseconds.
     pub usual_bound_ns: u64,
@@ -604,17 +605,17 @@ pub struct Run {
     pub task_set: TaskSet,
     /// The samplings of subtasks.
     pub samplings: Vec<SampledEdge>,
-    /// The machines whose runs it joins, if it does.
+    /// The machines of a joint run.
     pub machines: Vec<Machine>,
-    /// The links between these.
+    /// The links between the machines.
     pub links: Vec<Link>,
-    /// The bound that was proven of each DAG.
+    /// The bound proven for each DAG.
     pub bounds_ns: Vec<Option<u64>>,
     /// The events, in the order of the journal.
     pub events: Vec<Event>,
-    /// The number of lost events, all before these.
+    /// The number of lost events, all older than the others.
     pub lost: u64,
-    /// Whether the run has ended in order, so that no events are missing at its end.
+    /// Whether the run has ended in order, so no events are missing at its end.
     pub complete: bool,
 }
 
@@ -628,7 +629,7 @@ impl Run {
         }
     }
 
-    /// Returns the terms on which the run is judged, with a tolerance in nanoseconds.
+    /// Returns the terms for judging the run, with a tolerance in nanoseconds.
     pub const fn terms(&self, bound_ns: u64) -> JudgeOptions {
         JudgeOptions {
             is_whole: self.lost == 0,
@@ -639,12 +640,12 @@ impl Run {
     }
 }
 
-/// Returns the bound that a person has chosen, or else the usual one of the run.
+/// Returns the bound chosen by a person, or else the usual bound of the run.
 pub fn tolerance_ns(run: &Run, bound_us: Option<u64>) -> u64 {
     bound_us.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
 }
 
-/// Returns the usual bound of a boot's runs from its line of kind `boot`: the tool passes each
+/// Returns the usual bound of a boot's runs from its line of kind `boot`. The tool passes each
 /// guest its mode, and a program on Linux says whether it can preempt, and by which mechanism.
 fn usual_tolerance_ns(boot: &MachineLine) -> u64 {
     let words = boot.text_at("command_line").unwrap_or_default();
