@@ -34,7 +34,7 @@
 //! The hot path leads from the lidars' release to the completion of `ObjectCollisionEstimator`,
 //! within one DAG. The age of the lidars' data when the vehicle acts shows one hop later: through
 //! `BehaviorPlanner`'s sample to the completion of `VehicleDBWSystem`. Every value carries the
-//! number of its original lidar job ([`Origin`]), so both are measured, not estimated.
+//! number of its original lidar job ([`Origin`]), so both latencies are measured, not estimated.
 //!
 //! # Execution times
 //!
@@ -43,7 +43,7 @@
 //! between a part of its WCET and all of it. Drivers and sinks, which only pass values on, have a
 //! WCET of 100 us.
 //!
-//! The crate does not depend on the kernel: the tests run the system in virtual time.
+//! The library does not use the kernel: the tests run the system in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -11,7 +11,7 @@
 //! the objects already known. The accelerator is simulated by its own DAG. Every 500 us this DAG
 //! looks for a question, and it answers after a random time of 1 to 12 ms. So the app runs alike on
 //! every platform, and a bound covers every behaviour of the accelerator. A recording contains the
-//! answers, and a replay takes them from there. The crate does not depend on the kernel.
+//! answers, and a replay takes them from there. The library does not use the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -11,8 +11,8 @@
 //!
 //! `cruise` runs every 10 ms or, if released by packets, at most so often. Without a fresh gap the
 //! car stops. The DAG `watch` checks every 10 ms whether the wire has a link. Without a link,
-//! `watch` enters the mode `lost`, and the DAG `brake` runs in place of `cruise`. The crate does
-//! not depend on the kernel.
+//! `watch` enters the mode `lost`, and the DAG `brake` runs in place of `cruise`. The library does
+//! not use the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -5,7 +5,7 @@
 //!
 //! - [`build()`]: the DAGs as the app commits them.
 //!
-//! The crate does not depend on the kernel: the tests run the DAGs in virtual time.
+//! The library does not use the kernel: the tests run the DAGs in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -131,7 +131,7 @@ pub fn rotation([roll, pitch, yaw]: Vector) -> [Vector; 3] {
     ]
 }
 
-/// Returns the angles after turning about the body's axes for some seconds.
+/// Returns the angles after turning about the body's axes for `seconds`.
 pub fn turned([roll, pitch, yaw]: Vector, rates: Vector, seconds: f64) -> Vector {
     let ((sr, cr), (_, cp)) = (sin_cos(roll), sin_cos(pitch));
     let across = rates[1] * sr + rates[2] * cr;

@@ -54,7 +54,7 @@ const CHARGE: f64 = 130.0;
 
 /// The drone's DAGs, and the figures of the flight when the DAGs have ended.
 pub struct DroneSystem {
-    /// The DAGs, in the order of the table above.
+    /// The DAGs, in the order of the crate's table.
     pub dags: [Dag; 7],
     /// The percentage of charge below which the drone comes down.
     pub reserve: Parameter<u32>,

@@ -22,7 +22,7 @@
 //! finished its frame; `safety` enters the landing at once, when a fault has ended a DAG
 //! (`Dag::on_fault`). The *parameter* `reserve` says how many percent of the charge are too few.
 //!
-//! The crate does not depend on the kernel: the tests fly the drone in virtual time.
+//! The library does not use the kernel: the tests fly the drone in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

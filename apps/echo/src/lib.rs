@@ -6,8 +6,8 @@
 //! | `sum` | the number of packets | their bytes in total |
 //! | `tell`, the sink | the number of bytes | the packets, on the wire |
 //!
-//! The packets themselves stay in the DAG's state, so no edge copies them. The crate does not
-//! depend on the kernel.
+//! The packets themselves stay in the DAG's state, so no edge copies them. The library does not use
+//! the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -78,7 +78,7 @@ pub fn build(wire: &Wire, distance: Duration, milliseconds: u64) -> [Dag; 2] {
         batch.count = 0;
         for packet in &mut batch.packets {
             let taken = packets.look(|bytes, _, from| {
-                // The wire accepts no longer packet.
+                // The wire accepts no longer packets.
                 packet.length = bytes.len().min(LONGEST);
                 packet.bytes[..packet.length].copy_from_slice(&bytes[..packet.length]);
                 packet.from = from;

@@ -6,7 +6,7 @@
 //! deadlines. Such misses are the workload's nature, not an error. An error is a *mixed join*: a
 //! sink receiving values of different jobs. [`JoinCount`] counts mixed joins; there must be none.
 //!
-//! The crate does not depend on the kernel: the tests run the workload in virtual time.
+//! The library does not use the kernel: the tests run the workload in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

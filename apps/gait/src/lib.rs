@@ -9,7 +9,7 @@
 //! A filter ([`filter`]) computes the orientations. Its state is recorded, too, so a replay can
 //! begin with each job whose state is in the recording. The input is a recording, made by
 //! `./scripts/recording --from-csv` of `data/walking.csv`, whose licence lies in the same folder.
-//! The crate does not depend on the kernel: the tests run the app in virtual time, and compare
+//! The library does not use the kernel: the tests run the app in virtual time, and compare
 //! every value with the values of an independent implementation.
 
 #![cfg_attr(not(test), no_std)]

@@ -8,8 +8,7 @@
 //!
 //! A message names its sending job, and the time of sending: [`Hop`]. From the answers, the left
 //! machine learns the offset of the right machine's clock, and so counts messages slower than the
-//! link's delay. The app states the delay; nothing proves it. The crate does not depend on the
-//! kernel.
+//! link's delay. The app states the delay; nothing proves it. The library does not use the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! Boots into one of the two machines, and reports on the run.
+//! Boots into the left or the right machine, and reports on the run.
 
 #![no_std]
 #![no_main]

@@ -10,8 +10,7 @@
 //! | `tell`, the sink | both | messages |
 //!
 //! Without a session with the router, or half a second after the last command, the wish is to stand
-//! still: where nobody can stop the robot, the robot stops. The crate does not depend on the
-//! kernel.
+//! still: where nobody can stop the robot, the robot stops. The library does not use the kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

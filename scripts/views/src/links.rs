@@ -89,6 +89,8 @@ fn joint(records: &Records, machines: &[Machine]) -> Result<Run, String> {
         specs.extend(record.commits[0].specs.iter().map(|spec| DagSpec {
             name: format!("{}:{}", machine.name, spec.name),
             offset_ns: spec.offset_ns.saturating_add(machine.began_ns),
+            // The joint run's cores are undivided: clusters of several machines would have the same
+            // numbers.
             cluster: None,
             ..spec.clone()
         }));
@@ -140,6 +142,8 @@ fn link(records: &Records, view: &View<'_>, to: usize, heard: &Heard) -> Result<
                     let writer = there(&machines[from], (dag, SubtaskId(*sender)));
                     let reader = there(&machines[to], heard.source);
                     let mut heard = heard.clone();
+                    // A source may return a message in several jobs; only the first of them
+                    // received it.
                     let mut seen = BTreeSet::new();
                     (heard.hops).retain(|(_, hop)| has_put(writer, hop) && seen.insert(hop.job));
                     found.push(Link {
@@ -174,7 +178,7 @@ fn taken_ns(hop: &Hop) -> i128 {
     i128::from(hop.received_ns) - i128::from(hop.sent_ns)
 }
 
-/// The nanoseconds in which two clocks may drift apart by one: each crystal by 100 millionths.
+/// The nanoseconds in which two clocks may drift apart by 1 ns: each crystal by 100 millionths.
 const DRIFT: u64 = 5_000;
 
 /// Finds the offsets of the clocks from the first clock, and the begin of each run on the joint

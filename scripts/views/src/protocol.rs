@@ -47,7 +47,7 @@ pub struct MachineLine {
     pub kind: String,
     /// The whole object, `kind` included.
     pub value: Value,
-    /// The line as the guest printed the line.
+    /// The line as printed.
     pub text: String,
 }
 

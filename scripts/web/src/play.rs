@@ -1,4 +1,4 @@
-//! DAGs run in virtual time, and their record, like a boot's record by `./scripts/run --keep`.
+//! DAGs run in virtual time, with their record, as of a boot by `./scripts/run --keep`.
 
 use dag_file::{RunSettings, build};
 use fass::commit::{ConstructionPolicy, Overheads, finish_create_dags_in_order};
@@ -11,7 +11,7 @@ use virtual_time::VirtualTime;
 use crate::request::{Faults, Request};
 use crate::stamps;
 
-/// The most instances of a play: they take some ten seconds, and a gigabyte.
+/// The most instances: they take some ten seconds, and a gigabyte.
 const MOST_INSTANCES: u64 = 500_000;
 
 /// Plays the app or the file of a request; returns the record, and the warnings of the commit.
@@ -89,7 +89,7 @@ fn of_file(
     Ok((build(set, &settings), lists.collect()))
 }
 
-/// Makes the machine described by a request, and the demands of a commit on the machine.
+/// Makes the machine described by a request, and the demands of its commits.
 fn machine(request: &Request<'_>) -> Result<(VirtualTime, CommitOptions), String> {
     let cores = request.number("cores", 1..=MOST_CORES, 4)?;
     let policy = request.choice("policy", &Policy::ALL.map(|it| (it.word(), it)))?;

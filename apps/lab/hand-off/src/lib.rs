@@ -6,7 +6,7 @@
 //! one `u64` on each edge, because an app would write them so; random graphs are made at run time,
 //! without values.
 //!
-//! The crate does not depend on the kernel: the tests run the workloads in virtual time.
+//! The library does not use the kernel: the tests run the workloads in virtual time.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

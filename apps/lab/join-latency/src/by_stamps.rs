@@ -146,9 +146,9 @@ impl ExecutorCores {
         self.event.notify();
     }
 
-    /// Waits for a notice. As in ROS 2's executor, one idle worker at a time watches the clock, and
-    /// the others wait for a notice. When the watching worker leaves, for any reason, another takes
-    /// over.
+    /// Waits for a notice or the given time. As in ROS 2's executor, one idle worker at a time
+    /// watches the clock; the others wait for a notice. When the watching worker leaves, for any
+    /// reason, another takes over.
     fn wait(&self, seen: u64, until_ns: u64) {
         self.latest_seen.fetch_max(seen, Ordering::SeqCst);
         if self.has_keeper.swap(true, Ordering::SeqCst) {

@@ -17,7 +17,7 @@
 //! Neither figure says anything about joins that never happened: state the number of missing joins,
 //! too.
 //!
-//! The crate does not depend on the kernel, and figures computed from the times are exact.
+//! The library does not use the kernel, and figures computed from the times are exact.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -25,9 +25,9 @@
 //!     become the candidate. The pivot stays.
 //! 12. In both cases the earliest head is passed.
 //! 13. If that was the pivot's head, or if any later set would be worse, the candidate is emitted.
-//! 14. If a topic has no head then, the search goes on *virtually*: it assumes that a future
-//!     message comes as early as possible. The assumption may prove the candidate best. Otherwise
-//!     the search waits for the next arrival.
+//! 14. If a topic has no head then, the search goes on *virtually*: the topic's next message counts
+//!     with its earliest possible stamp. The result may prove the candidate best. Otherwise the
+//!     search waits for the next arrival.
 //! 15. Emitting takes the fronts of all rings and rewinds all cursors: passed entries can be in
 //!     later sets. The search goes on, so an arrival can emit several sets.
 //!

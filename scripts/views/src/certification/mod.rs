@@ -10,7 +10,7 @@
 //! 4. *order* (`order.rs`): no instance with a core to keep began before a more urgent instance
 //!    that was ready by the step in which the core was given;
 //! 5. *cut*: each released job of a DAG with a bound has executed to its end; on one core, where a
-//!    bound may rest on the demand of all, each released job of any DAG has;
+//!    bound may rest on the demand of all, so has each released job of any DAG;
 //! 6. *WCET*: no segment executes for longer than its WCET and its charges;
 //! 7. *lost*: nor do execution and lost time together take longer;
 //! 8. *bound*: no response is above its bound. By hand this follows from all other conditions, so a

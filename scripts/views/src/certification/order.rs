@@ -10,7 +10,7 @@
 //!
 //! Preemptible instances are not judged: if chosen wrongly, they go on for no longer than the
 //! inversion, and the inversion is measured. The law judges the order of table entries without
-//! time, too; but the start of a member of the group on the core of a due entry within its
+//! time, too; the start of a group's member on the core of a due entry is judged within the law's
 //! tolerance.
 
 use std::collections::BTreeMap;
@@ -50,7 +50,7 @@ struct KeeperStart {
     at: usize,
 }
 
-/// Describes an instance that began out of order, if any.
+/// Describes an instance that began out of order.
 pub(super) fn broken(view: &View<'_>) -> Option<String> {
     let events: Vec<Event> = view.in_the_order_of_the_log().collect();
     let mut dispatch = Dispatch::new(view);

@@ -22,9 +22,8 @@
 //! - *load*: the part of the time from the first event to the last for which a core had an
 //!   instance, in thousandths.
 //!
-//! A trace is *complete from* the first instant after the first event left; earlier events are left
-//! out.
-//! are left out.
+//! A trace is *complete from* the first instant after the first event left; earlier events are not
+//! judged.
 
 use std::collections::BTreeMap;
 
