@@ -1,4 +1,4 @@
-//! The laboratory's program. The scripts in `scripts/` call the subcommands, as with the tool.
+//! The laboratory's program. The scripts in `scripts/` call its subcommands, like the tool's.
 
 #![forbid(unsafe_code)]
 

@@ -41,9 +41,9 @@ pub enum WaitEnd {
     Ended(ExitStatus),
     /// The time limit passed, and the child was killed.
     TimedOut,
-    /// The watcher gave up, and the child was killed.
+    /// The watcher gave up and the child was killed, or the system no longer knows the child.
     GivenUp,
-    /// A person pressed ctrl-C again before the child had ended, and the child was killed.
+    /// A person pressed ctrl-C after the request to end, and the child was killed.
     Killed,
 }
 
@@ -95,7 +95,7 @@ impl Child {
     /// from `log`, to `show` as soon as the line is there. `sent` gets the number of bytes in the
     /// log. It returns how many bytes the child has sent elsewhere, which counts as progress, or
     /// `None` to give the child up. `stop`, if given, asks the child to end in order before the
-    /// kill.
+    /// kill. Such a child may outlive `limit`, as the module describes.
     ///
     /// # Errors
     ///
@@ -111,7 +111,8 @@ impl Child {
         let (mut tail, mut asking) = (FollowedFile::new(log), ChildWatch::new(limit));
         let signals = stop.as_ref().map(|_| EndSignals::catch());
         let (started, mut killed) = (self.started, WaitEnd::GivenUp);
-        // A child that can be asked to end outlives its limit; `ChildWatch` decides when it is killed.
+        // A child that can be asked to end may outlive its limit; `ChildWatch` decides when to kill
+        // the child.
         let of_wait = signals.as_ref().map_or(limit, |_| Duration::MAX);
         let waited = self.wait(of_wait, || {
             // The log may not exist yet, and a lasting error shows in `finish` below.
@@ -185,7 +186,7 @@ impl Child {
     fn kill(&mut self) {
         // The child may have ended by itself in between; then there is nothing to kill.
         let _ = self.process.kill();
-        // Reaps the process; a zombie would stay otherwise.
+        // Reaps the process, so no zombie is left.
         let _ = self.process.wait();
     }
 }
@@ -208,7 +209,8 @@ pub fn bound_to_us(program: &Path) -> Command {
     command
 }
 
-/// The longest silence allowed to a child after the request to end at its limit.
+/// The longest silence of a child that runs on beyond its limit. Output and the request to end
+/// begin the silence anew.
 const GRACE: Duration = Duration::from_secs(10);
 
 /// Why a child was asked to end.
@@ -227,7 +229,7 @@ enum Step {
     Wait,
     /// Ask the child to end.
     Ask(EndReason),
-    /// Kill the child, as a person wants.
+    /// Kill the child, since a person pressed ctrl-C after the request.
     Kill,
     /// Kill the child, since its time is over.
     TimeOut,

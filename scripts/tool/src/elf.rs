@@ -72,8 +72,8 @@ fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
 ///
 /// # Errors
 ///
-/// In words: the file is no ELF file, has no such note, or contains a table pointing outside the
-/// file.
+/// In words: the file is no 64-bit ELF file, has no such note, or contains a table pointing outside
+/// the file.
 pub fn check_bootable(file: &[u8]) -> Result<(), String> {
     let is_entry = |note: &Note| (note.owner, note.kind) == (*b"Xen\0", XEN_ELFNOTE_PHYS32_ENTRY);
     match notes(file)?.iter().any(is_entry) {
@@ -115,8 +115,8 @@ fn notes(file: &[u8]) -> Result<Vec<Note>, String> {
         }
         let mut at = number(file, segment + 8, 8)?;
         let end = at.saturating_add(number(file, segment + 32, 8)?);
-        // A note consists of the lengths of name and content, its type, and both, padded to 4
-        // bytes.
+        // A note consists of the lengths of name and content, its type, the name, and the content,
+        // the last two padded to 4 bytes.
         while at < end {
             let owner_bytes = number(file, at, 4)?;
             let content_bytes = number(file, at + 4, 4)?;

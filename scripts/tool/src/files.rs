@@ -116,7 +116,7 @@ pub(crate) fn write_named(
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
 }
 
-/// Returns the reason why a file cannot grow, if there is a reason.
+/// Returns the reason why nothing more can be written to a file; `None` if the file can grow.
 pub(crate) fn why_full(path: &Path) -> Option<String> {
     const MORE: usize = 4096;
     let length = fs::metadata(path).ok()?.len();
@@ -167,8 +167,8 @@ pub(crate) fn in_folder<R>(
 ///
 /// # Errors
 ///
-/// In words that begin with the file's name and, for bytes that are not UTF-8, with their line: as
-/// [`read`], the text is not UTF-8, or the text is too long.
+/// In words that begin with the file's name and, for bytes that are not UTF-8, with their line: the
+/// errors of [`read`]; also, that the text is not UTF-8, or too long.
 pub fn read_text(path: &Path) -> Result<String, String> {
     let refused = |line: &dyn Display, why: &dyn Display| {
         let place = shown_path(path);

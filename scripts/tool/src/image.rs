@@ -208,7 +208,7 @@ pub fn build_target(
     path.ok_or_else(|| failed("cargo built no binary of that name"))
 }
 
-/// Reports on standard error that another command builds images: cargo would wait silently.
+/// Reports on standard error if another command is building images: cargo would wait silently.
 fn say_if_cargo_waits(profile: &str) {
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
     let folder = system::workspace().join(target).join(profile);

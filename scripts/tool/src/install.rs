@@ -1,5 +1,5 @@
-//! Installs the programs needed by a command with `apt-get`, a target of Rust with `rustup`, and
-//! the Python packages needed by tests with `pip`.
+//! Installs missing programs with `apt-get`, a target of Rust with `rustup`, and the Python
+//! packages of tests with `pip`.
 //!
 //! A command that needs QEMU installs it if it is missing; commands that need GRUB, a firmware or
 //! Bochs do likewise. The tool itself downloads nothing. Without `apt-get` a message tells the
@@ -21,8 +21,8 @@ pub struct HostNeed {
     /// The parts by which the tool recognizes a present program: programs on the `PATH`, and files
     /// or folders.
     parts: &'static [&'static str],
-    /// The names of Debian's packages with these parts, with blanks between; empty if a person
-    /// installs it.
+    /// The names of Debian's packages with these parts, with blanks between; empty if a person must
+    /// install the program by hand.
     packages: &'static str,
 }
 
@@ -178,7 +178,8 @@ pub fn ensure(need: &HostNeed) -> Result<(), String> {
 ///
 /// # Errors
 ///
-/// The errors of [`ensure`]; also, that the Python on the `PATH` is not Debian's.
+/// The errors of [`ensure`]; also, that the Python on the `PATH` still has no such reader, because
+/// it is not Debian's.
 pub fn ensure_yaml() -> Result<(), String> {
     let import = || system::run(Command::new("python3").args(["-c", "import yaml"]));
     if import().is_ok() {
@@ -215,7 +216,7 @@ pub fn ensure_wasm() -> Result<(), String> {
 ///
 /// # Errors
 ///
-/// In words: there is no Python, or the packages cannot be had.
+/// In words: there is no Python, or the packages cannot be obtained.
 pub fn python() -> Result<PathBuf, String> {
     let folder = system::workspace().join("target/python");
     let python = folder.join("bin/python");

@@ -1,4 +1,4 @@
-//! The host tool: builds images, starts QEMU, and judges the runs of guests.
+//! The host tool builds images, starts QEMU, and judges the runs of guests.
 //!
 //! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is its whole output,
 //! lines for people and machine lines mixed. Its *ending* is the way QEMU's process ended; its
@@ -21,8 +21,8 @@
 //! - [`run`](mod@run) with its [`run_options`], [`new_app`](mod@new_app): the subcommands.
 //!
 //! The library guarantees that no guest runs without a limit. A run counts as good only if both the
-//! guest's verdict and QEMU's exit status say so. Besides this workspace, the library uses only the
-//! standard library, and no `unsafe`.
+//! guest's verdict and QEMU's exit status say so. Besides crates of this workspace, the library
+//! uses only the standard library, and it contains no `unsafe`.
 
 #![forbid(unsafe_code)]
 

@@ -73,7 +73,8 @@ pub fn run_for(
     let mut command = bound_to_us(program);
     command.args(words).stdin(stdin).stdout(file);
     // A live program must stay in the terminal's process group, or it could not read the terminal;
-    // there ctrl-C reaches it directly. Other programs leave the group, and we pass the request on.
+    // there ctrl-C reaches it directly. Any other program that ends in order leaves the group, and
+    // we pass the request on.
     let is_apart = stops && !is_live;
     if is_apart {
         command.process_group(0);

@@ -1,4 +1,4 @@
-//! Starts QEMU: the board, the meaning of time, and the image.
+//! Starts QEMU with a board, a meaning of time, and an image.
 //!
 //! A [`Qemu`] describes a guest and becomes a command line; [`Qemu::start`] turns it into a process
 //! ([`RunningQemu`]). The *mode* says what the guest's clock means, and the *machine* is the board
@@ -441,7 +441,7 @@ pub enum QemuEnd {
         /// How busy the host was then, in words.
         load: String,
     },
-    /// A person pressed ctrl-C again, and QEMU was killed.
+    /// A person pressed ctrl-C after the request to end, and QEMU was killed.
     Killed,
     /// KVM could not run the guest any further, and QEMU was killed.
     KvmFailed,
@@ -540,7 +540,8 @@ impl RunningQemu {
     }
 
     /// Waits for the end, for at most `limit` since the start, and passes each whole serial line to
-    /// `show` as soon as it is complete. Also returns the serial log.
+    /// `show` as soon as it is complete. A guest that can be asked to end may take longer, see
+    /// [`crate::child`]. Also returns the serial log.
     ///
     /// # Errors
     ///
@@ -561,7 +562,7 @@ impl RunningQemu {
             let record = records.and_then(|path| fs::metadata(path).ok());
             (!kvm_failed && bytes <= MOST_SERIAL_BYTES).then(|| record.map_or(0, |file| file.len()))
         };
-        // The request may fail: a guest near its end does not listen.
+        // The request may fail: a guest that has just ended no longer listens.
         let stop = self.stop.take();
         let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
         let ask: Option<&mut dyn FnMut(EndReason)> =

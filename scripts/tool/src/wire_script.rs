@@ -1,7 +1,7 @@
 //! Reads bytes with their times from a file for `run --input`.
 //!
 //! Each line is a time of the run and bytes, as text in quotation marks or as hexadecimal pairs.
-//! The bytes may be preceded by the name of their wire and, for a packet, by its sender's address:
+//! Before the bytes may come the name of their wire and, if the bytes are a packet, its sender:
 //!
 //! ```text
 //! # A radar says how far the car ahead is.
@@ -171,7 +171,7 @@ fn pair(digits: &str) -> Result<u8, String> {
     })
 }
 
-/// Returns the entries in the form for the guest.
+/// Returns the entries in the guest's form.
 pub fn for_guest(entries: &[ScriptEntry]) -> Vec<u8> {
     let nobody = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
     let mut script = Vec::new();

@@ -31,7 +31,7 @@ const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
      by more than 10 % and 40";
 
 /// Returns the margin of a figure: in per cent, and in instructions a step. A figure has grown only
-/// by more than both, since one instruction of a few is many per cent.
+/// if it exceeds both, since one instruction of a few is many per cent.
 fn margin(figure: &Figure) -> (u128, u128) {
     match &*figure.figure {
         // A single count more in each step is a change.

@@ -2,8 +2,8 @@
 //!
 //! `bench WHAT` measures one part of the project on this host, in this build, and prints a table
 //! and a JSON object for each figure. Times depend on the host and its load, so no time has a
-//! limit; counts of instructions and bytes have. The exit code is 0 if all limits hold, 1 if any
-//! does not, and 2 for a refused command line.
+//! limit; counts of instructions and bytes have limits. The exit code is 0 if all limits hold, 1 if
+//! any does not, and 2 for a refused command line.
 //!
 //! - [`bounds`]: random sets of DAGs accepted by methods of analysis;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;

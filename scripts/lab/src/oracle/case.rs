@@ -104,8 +104,8 @@ pub struct TimeScale {
 }
 
 impl Case {
-    /// Returns an instance's execution time for each segment, and after each the time until the
-    /// answer to its wait.
+    /// Returns the execution times of an instance's segments, each followed by the time until the
+    /// answer to the wait after that segment.
     pub(super) fn sample(&self, instance: Instance) -> &[u64] {
         let dag = &self.set.dags[instance.dag.index()];
         let subtask = instance.subtask.index();
@@ -363,7 +363,8 @@ fn parse_waits(line: &Line<'_>, lines: &mut Lines<'_>, dag: &mut FileDag) -> Res
     Ok(())
 }
 
-/// Refuses a case whose schedule might end, even on a single core, after the largest 64-bit time.
+/// Refuses a case whose schedule could end after the largest 64-bit time if everything ran on a
+/// single core.
 fn check_horizon(header: &Line<'_>, set: &Set) -> Result<(), Malformed> {
     let (mut last_release_ns, mut held_ns) = (0, 0);
     for FileDag { spec, subtasks, .. } in &set.dags {

@@ -56,6 +56,10 @@ fn parse_schedules(text: &str) -> Result<Vec<Case>, Malformed> {
 }
 
 /// Compares all values of a block.
+///
+/// # Errors
+///
+/// The first difference, in one line.
 pub fn check(case: &WaitingCase) -> Result<(), String> {
     match case {
         WaitingCase::Schedule(case) => schedules::check(case),

@@ -6,9 +6,9 @@
 //! Tests are counted separately: files in a folder `tests` or called `tests.rs`, and modules below
 //! `#[cfg(test)]`. `--bless` sets each budget to the present count, lower or higher. The row `all`
 //! is a ceiling on the sums, raised only by a person. Proofs have a row of their own outside the
-//! sums, with comments counted. The check [`escape`] makes sure of three properties: counted files
-//! have the default format, Rust and assembly are only in counted files, and product code is not
-//! named like a test.
+//! sums, with comments counted. The check [`escape`] makes sure that counted files have the default
+//! format, that Rust and assembly are only in counted files, and that product code is not named
+//! like a test.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

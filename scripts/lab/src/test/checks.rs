@@ -243,7 +243,7 @@ fn complain(
 /// The largest disk space taken by all tests and images, built from nothing, in MiB.
 const NEEDED_MIB: u64 = 3 << 10;
 
-/// Makes sure of enough disk space. If the free space is unknown, only prints a note.
+/// Makes sure that there is enough disk space. If the free space is unknown, only prints a note.
 ///
 /// # Errors
 ///

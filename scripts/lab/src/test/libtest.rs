@@ -36,7 +36,7 @@ const OF_PAGE: [(&str, &HostNeed); 2] = [
 const CONVERT: &str = "by_convert::";
 const PROVEN: &str = "proven::";
 
-/// A function making sure of a prerequisite.
+/// A function that makes sure of a prerequisite.
 type Ensure = fn() -> Result<(), String>;
 
 /// The modules of boot tests with needs beyond programs: a Zenoh router in Python, and the page's
@@ -118,8 +118,9 @@ fn programs(option: &str, kind: &str, plan: &TestPlan) -> Command {
     cargo(&["--config", &runner], &words, plan)
 }
 
-/// Returns the command for the tests able to boot their guests; `None` if there are no boot tests.
-/// The other tests are counted as skipped: a guest unable to boot must not pass silently.
+/// Returns the command for the tests able to boot their guests; `None` if no test is wanted or none
+/// can boot. Tests that cannot boot are counted as skipped: a guest unable to boot must not pass
+/// silently.
 fn boot(plan: &TestPlan, tests: &[String], tally: &mut Tally) -> Option<Command> {
     let obstacle = match plan.quick {
         true => Err("left out by --quick".into()),

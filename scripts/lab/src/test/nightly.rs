@@ -1,4 +1,4 @@
-//! `--miri` and `--thread-sanitizer`: tests under tools for the interplay of threads.
+//! `--miri` and `--thread-sanitizer`: tests under tools that watch how threads interact.
 //!
 //! Both tools come only with a nightly toolchain of Rust. So they run on request, and nothing
 //! depends on them. Miri executes every access by the rules of the language, and returns an
@@ -93,7 +93,7 @@ fn nightly(words: &str) -> Command {
     command
 }
 
-/// Makes sure of a nightly toolchain with a component.
+/// Makes sure that the nightly toolchain is there, with a component.
 fn ensure(component: &str) -> Result<(), String> {
     let mut listed = Command::new("rustup");
     listed.args(["component", "list", "--installed", "--toolchain=nightly"]);

@@ -3,10 +3,11 @@
 //! - A doc sentence says what an item is or does, and never begins with a question word.
 //! - No two types of a crate share a name, and no type is called by a question word or a pronoun.
 //! - Sentences with nouns need no second reading: in no room do pronouns become more frequent, and
-//!   the words of all pages stay below a ceiling, raised only by a person.
+//!   the words of all pages do not exceed a ceiling, raised only by a person.
 //!
-//! A *room* is a top folder or a first page. Types of tests and examples, and types within
-//! functions and inline modules, are exempt.
+//! A *room* is a top folder, a crate of the kernel, a first page, or all other pages of `docs/`
+//! together. Types of tests and examples, and types within functions and inline modules, are
+//! exempt.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -65,7 +65,7 @@ fn without_folder(line: &str) -> &str {
     line.strip_prefix("./").unwrap_or(line)
 }
 
-/// Gives all parts of a file the lines of the person's file.
+/// Sets the line of each part of a file to its line in the person's file.
 fn locate(file: &mut DagFile, text: &str) {
     let told = |line: &str| line.rsplit_once(LINE)?.1.parse().ok();
     let lines: Vec<usize> = text.lines().map(|line| told(line).unwrap_or(1)).collect();

@@ -3,7 +3,7 @@
 //! The kernel reads one format only, described in `docs/dag-file.md`. `scripts/convert` converts
 //! other formats to ours:
 //!
-//! - [`load()`] reads a file of any format and checks it as the commit will;
+//! - [`load()`] reads a file of any format and checks it as the guest's commit will;
 //! - [`prepare()`] prepares the input of `./scripts/run --dag FILE`: the boot module, words for the
 //!   guest, and enough memory and time.
 //!
@@ -70,8 +70,8 @@ impl Format {
     }
 }
 
-/// Reads a file in the format stated by its name, else in our own, and checks it as the commit
-/// will.
+/// Reads a file in the format stated by its name, else in our own, and checks it as the guest's
+/// commit will.
 ///
 /// # Errors
 ///
@@ -137,7 +137,8 @@ const COMPANIONS: [OptionName; 6] = [
     name::STRICT_DEADLINES,
 ];
 
-/// The default length of a run, counted in its longest period; the guest has the same default.
+/// The default length of a run, as a multiple of the longest period; the guest has the same
+/// default.
 const PERIODS: u64 = 50;
 
 /// Returns the guest's word for the kernel's worst-case overheads. The commit adds them to the

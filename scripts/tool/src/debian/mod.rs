@@ -66,7 +66,7 @@ impl Guest {
     ///
     /// # Errors
     ///
-    /// In words: a package or tool cannot be had, or the policy does not compile.
+    /// In words: a package or tool cannot be obtained, or the policy does not compile.
     pub fn new(order: &GuestOrder<'_>, log: &Path) -> Result<Guest, String> {
         install::ensure_qemu()?;
         let packages = UnpackedPackages::get()?;
@@ -167,8 +167,8 @@ impl GuestOrder<'_> {
     }
 }
 
-/// Packs a folder into a cpio archive, and adds the folders on which the script mounts. Linux
-/// unpacks the archive into memory when it starts. Every file is executable and belongs to root.
+/// Packs a folder into a cpio archive, with the folders that the script mounts on. Linux unpacks
+/// the archive into memory when it starts. Every file is executable and belongs to root.
 fn pack(folder: &Path, packages: &UnpackedPackages, archive: &Path) -> Result<(), String> {
     const LINES: &str = "set -e; mkdir proc sys dev tmp; chmod -R 755 .
         find . | \"$0\" cpio -o -H newc -R 0:0 >\"$1\"";

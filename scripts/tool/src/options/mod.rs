@@ -543,13 +543,13 @@ impl Arguments {
         (!option.default.is_empty()).then(|| OsStr::new(option.default))
     }
 
-    /// Returns the option's value or default; `None` without either. For an option that takes a
+    /// Returns the option's value or default; `None` if it has neither. For an option that takes a
     /// file, call [`path`](Self::path) instead.
     pub fn text(&self, name: OptionName) -> Option<&str> {
         self.value(name).and_then(OsStr::to_str)
     }
 
-    /// Returns the file named by an option, or its default; `None` without either.
+    /// Returns the file named by an option, or its default; `None` if it has neither.
     pub fn path(&self, name: OptionName) -> Option<&Path> {
         self.value(name).map(Path::new)
     }
@@ -564,7 +564,7 @@ impl Arguments {
         named.collect()
     }
 
-    /// Returns a number's value or default; `None` without either.
+    /// Returns the number given with an option, or its default; `None` if it has neither.
     pub fn number(&self, name: OptionName) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
     }

@@ -1,8 +1,8 @@
 //! Observed times of runs: execution times per subtask, response times per DAG, and the platform's
 //! overheads.
 //!
-//! Runs of several boots can be added up: two DAGs are equal if the hashes of their names and edges
-//! are equal.
+//! Runs of several boots can be added up: two DAGs count as the same DAG if the hashes of their
+//! names and edges are equal.
 //!
 //! The overheads are measured from the journal of a run: `sched_dag::law::Costs` defines the
 //! measurement, `sched_dag::analysis::Overheads::measured` the resulting charge.
@@ -26,7 +26,7 @@ use views::json::Object;
 use views::record::{Record, Run};
 use views::units::shown;
 
-/// The observed times of a DAG, in all its runs.
+/// The observed times of a DAG, identified by names and edges, in all its runs.
 #[derive(Clone, Debug)]
 pub struct OfDag {
     /// Its name.

@@ -14,7 +14,7 @@
 //!   option, a number (JSON has no NaN), and an array of numbers, as a whole;
 //! - an array or an option as an element, and an option of an option, become the field `value` of
 //!   an object of their own;
-//! - an infinite number is `1e999`, a number beyond the range of every JSON reader.
+//! - an infinite number is `1e999`, beyond the range of numbers in every JSON reader.
 //!
 //! A schema describes exactly the output of this module; the tests check both against each other.
 

@@ -125,7 +125,7 @@ fn attempt(options: &Arguments) -> Result<(), Refusal> {
 }
 
 /// Returns the recording with all times in run time. Functions that ask for the time or get a
-/// sample see the clock's time; this subtracts the epoch.
+/// sample see the clock's time, so the epoch is subtracted from recorded times.
 fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
     let texts = recording.chunks().filter_map(|chunk| match chunk {
         Chunk::Text(text) => Some(text),

@@ -79,7 +79,7 @@ pub(super) fn choose_memory(
     let loader = chosen(options);
     let bytes = |name| {
         let data = options.path(name).and_then(|path| path.metadata().ok());
-        // A missing file counts as empty; its read is refused later.
+        // A missing file counts as empty; reading it is refused later.
         data.map_or(0, |data| data.len())
     };
     // A replay also builds a table of its values in memory, in twice the file's size.

@@ -25,7 +25,9 @@ use crate::progress::Progress;
 use crate::system;
 use views::protocol::MachineLine;
 
-/// The columns. Apart from those about the file, the names are members of a `dag_run` line.
+/// The columns. The file gives the first two, the period and the deadline; the set's verdict and
+/// its `dag_set` line give `verdict`, `reason` and `violations`. All others are members of a
+/// `dag_run` line with the same names.
 const COLUMNS: &str = "file,set,verdict,dag,subtasks,period_ns,relative_deadline_ns,bound_ns,test,\
     not_proven,released,completed,deadline_misses,response_time_ns.min,response_time_ns.median,\
     response_time_ns.p99,response_time_ns.max,tightness_permille,violations,reason";

@@ -1,4 +1,4 @@
-//! Runs an app as a program of this computer, with the build, output and judgement of a guest:
+//! Runs an app as a program of this computer, built, started, shown and judged like a guest:
 //! `run --on linux`. With `--on debian` the program runs on Debian's Linux in QEMU. With
 //! `--on host` the app for DAG files runs in virtual time.
 

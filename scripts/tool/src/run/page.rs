@@ -5,9 +5,10 @@
 //! `over` when the run has ended and the record is complete. A complete record begins with another
 //! header than a growing record, so a page reads it anew from byte 0.
 //!
-//! A request must name this server as its host. So a page of another origin cannot read a run by a
-//! name directed to this computer; nor can such a page, by loading the record as an image, keep a
-//! run waiting at its end. Each request has a thread. The thread ends when a client sends or takes
+//! A request must name this server as its host, so a page of another origin cannot read a run by a
+//! name directed to this computer. A request for the record is also refused if the browser says
+//! that it comes from another origin: such a page cannot keep a run waiting at its end by loading
+//! the record as an image. Each request has a thread. The thread ends when a client sends or takes
 //! nothing for 2 s.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -28,13 +29,14 @@ const MOST_REQUEST_BYTES: u64 = 16 << 10;
 /// The most bytes of a record in an answer.
 const MOST_BYTES: usize = 8 << 20;
 
-/// The most requests at a time: each takes a thread and an open file, and the run needs some, too.
+/// The most requests at a time: each takes a thread and an open file, and the run itself needs open
+/// files, too.
 const MOST_REQUESTS: usize = 64;
 
-/// The greatest age of a page's latest request while the page counts as following the run.
+/// A page counts as following the run while its latest request is younger than this.
 const ASKS: Duration = Duration::from_secs(5);
 
-/// The longest wait for a following page to take the whole record.
+/// The longest wait for a page that follows the run to take the whole record.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
 /// Why a lock is not poisoned.
@@ -85,7 +87,7 @@ impl PageServer {
     }
 
     /// Serves the whole record from now on. If a page is still asking, waits until that page has
-    /// taken everything. Reports whether a page has ever asked.
+    /// taken everything, for at most [`LONGEST_WAIT`]. Reports whether a page has ever asked.
     pub(super) fn finish(&self, whole: Vec<u8>) -> bool {
         let until = Instant::now() + LONGEST_WAIT;
         let bytes = self.whole.get_or_init(|| whole).len();

@@ -192,7 +192,8 @@ pub(super) fn guest_words(options: &Arguments) -> Vec<String> {
 }
 
 /// Reports whether the tool can ask the guest to end by ctrl-C. It cannot if standard input feeds
-/// the guest's second port, since QEMU has only one standard input.
+/// the guest's second port, since QEMU has only one standard input, or if the person's own words
+/// set `console=`.
 pub(super) fn can_stop(options: &Arguments) -> bool {
     let says_otherwise = options
         .text(name::APPEND)

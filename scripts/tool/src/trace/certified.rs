@@ -41,7 +41,7 @@ fn theorems(run: &Run) -> Result<String, String> {
     named(&said, run.bounds_ns.iter().flatten().count())
 }
 
-/// Counts the bounds that hold by each theorem, in the output of check-witness about `bounds`
+/// Returns how many bounds hold by each theorem, from the output of check-witness about `bounds`
 /// bounds.
 fn named(said: &str, bounds: usize) -> Result<String, String> {
     // A refusal for only one of several clusters counts, too.

@@ -128,8 +128,8 @@ fn by_tables(tasks: &[&Task], cores: u32) -> bool {
 }
 
 /// Gives each heavy DAG the least number of cores by the multi-path bound, and partitions the light
-/// DAGs on the rest. Or lets all DAGs share all cores by deadline-monotonic priorities, with the
-/// bound that clips interference but does not look at chains.
+/// DAGs on the rest. If that fails, lets all DAGs share all cores by deadline-monotonic priorities,
+/// with the bound that clips interference but does not look at chains.
 fn by_multi_path(tasks: &[&Task], cores: u32) -> bool {
     let (heavy, light): (Vec<&Task>, Vec<&Task>) = tasks.iter().partition(|task| is_heavy(task));
     let left = heavy.iter().try_fold(cores, |left, task| {

@@ -121,7 +121,7 @@ pub(super) fn draw(
 }
 
 /// Gives a graph a deadline, and the period at which its work takes a share of a core, in parts;
-/// `None` if the longest path does not fit in.
+/// `None` if the longest path does not fit.
 fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
     let (volume, length) = (graph.volume_ns(), graph.length_ns());
     let work = u128::from(volume) * u128::from(PARTS);
@@ -132,7 +132,8 @@ fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) ->
     due(random, graph, period, deadlines)
 }
 
-/// Gives a graph a period of the grid, a deadline, and WCETs scaled to a share of a core at most.
+/// Gives a graph a period of the grid, a deadline, and WCETs scaled to take at most a share of a
+/// core.
 fn on_grid(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
     let period = random.one_of(&GRID);
     let work = u128::from(share) * u128::from(period) / u128::from(PARTS);

@@ -57,7 +57,7 @@ fn measure_all(plan: &JoinPlan) -> Result<(), String> {
         let statement = setting.statement(condition);
         let file = folder.join(format!("{}.csv", condition.file_stem()));
         let read = |text: String| figures::read(&text, &statement, condition.subtasks);
-        // A file from other circumstances, or a damaged file, reads as none.
+        // A file measured under other circumstances, or a damaged file, counts as missing.
         let samples = match fs::read_to_string(&file).ok().and_then(read) {
             Some(samples) => samples,
             None => {
