@@ -19,7 +19,7 @@ use tool::system::workspace;
 /// files.
 pub const BLESSED: &str = "TOOL_BLESSED";
 
-/// A text kept in a file.
+/// A golden: a text in a file, to be compared with a program's output.
 #[derive(Clone, Copy, Debug)]
 pub struct GoldenText<'t> {
     /// The file's path from the workspace's root.

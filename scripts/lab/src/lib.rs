@@ -24,7 +24,7 @@ pub mod test;
 
 use tool::options::{WordMenu, choices};
 
-/// The subcommands.
+/// The laboratory's subcommands.
 pub static LAB: WordMenu = WordMenu {
     invocation: "fass-lab",
     word: "SUBCOMMAND",

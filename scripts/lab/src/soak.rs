@@ -29,7 +29,7 @@ use views::findings::check;
 use views::protocol::MachineLine;
 use views::record::{COUNTED_TOLERANCE_NS, Run};
 
-/// The command-line table of `soak`.
+/// The options and the help text of `soak`.
 static SOAK: Command = Command {
     invocation: "./scripts/soak",
     about: "Runs random DAG sets on the bare machine for a long time, and checks everything.",

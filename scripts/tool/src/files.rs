@@ -51,7 +51,7 @@ pub fn shown_path(path: &Path) -> String {
     visible(&path.to_string_lossy()).to_string()
 }
 
-/// Reads an input.
+/// Reads a whole input, of at most 1 GiB.
 ///
 /// # Errors
 ///

@@ -60,7 +60,7 @@ pub use qemu::{Machine, Mode};
 
 use options::WordMenu;
 
-/// The subcommands.
+/// The tool's subcommands.
 pub static TOOL: WordMenu = WordMenu {
     invocation: "fass-tool",
     word: "SUBCOMMAND",

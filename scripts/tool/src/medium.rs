@@ -21,7 +21,7 @@ use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 use crate::qemu::Qemu;
 use crate::system;
 
-/// The table of `image`.
+/// The options and the help text of `image`.
 pub static TABLE: Command = Command {
     invocation: "./scripts/image",
     about: "Makes a file that boots an app on a PC: to be written to a stick, or to a disc.",

@@ -29,7 +29,7 @@ use crate::image::package_name;
 use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 use crate::system::{self, files_below};
 
-/// The table of `new-app`.
+/// The options and the help text of `new-app`.
 pub static NEW_APP: Command = Command {
     invocation: "./scripts/new-app",
     about: "\

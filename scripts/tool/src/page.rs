@@ -20,7 +20,7 @@ use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 use crate::system;
 use crate::trace;
 
-/// The table of `page`.
+/// The options and the help text of `page`.
 pub static PAGE: Command = Command {
     invocation: "./scripts/page",
     about: "Makes a page of one file that plays DAG files, and shows runs, in any browser.",

@@ -47,7 +47,7 @@ pub fn choose(
     }
 }
 
-/// Boots the probe under KVM.
+/// Boots `image` with the probe under KVM, to learn whether KVM works.
 ///
 /// # Errors
 ///

@@ -46,7 +46,7 @@ impl Progress {
         }
     }
 
-    /// Wipes the line away.
+    /// Removes the progress line from the terminal, if there is one.
     pub fn wipe(&self) {
         if self.on_terminal {
             let _ = write!(stderr(), "\r\x1b[K");

@@ -306,7 +306,7 @@ macro_rules! named {
             /// The names, as written on command lines.
             pub const NAMES: &[&str] = &[$($name),*];
 
-            /// Returns the choice with a name.
+            /// Returns the variant with this name; `None` if there is none.
             pub fn from_name(name: &str) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$choice),)*
@@ -314,7 +314,7 @@ macro_rules! named {
                 }
             }
 
-            /// Returns the choice's name.
+            /// Returns the variant's name.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$choice => $name,)*

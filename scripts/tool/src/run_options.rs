@@ -26,7 +26,7 @@ pub(crate) const GUEST_WORDS: &[OptionName] = &[
 /// The most subtasks side by side: a function returns at most 16 values.
 const MOST_SUBTASKS: u64 = 16;
 
-/// The table of `run`.
+/// The options and the help text of `run`.
 pub static RUN: Command = Command {
     invocation: "./scripts/run",
     about: "\

@@ -26,7 +26,7 @@ const MOST_BYTES: usize = 1024;
 /// The most bytes of a packet, limited by the room in an Ethernet frame.
 const MOST_OF_PACKET: usize = 1472;
 
-/// Bytes arriving at the same time.
+/// Bytes that arrive together on a wire, with their time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScriptEntry {
     /// The number of the entry's line.
@@ -41,7 +41,7 @@ pub struct ScriptEntry {
     pub bytes: Vec<u8>,
 }
 
-/// Reads the text of such a file.
+/// Reads the text of a file of bytes with their times.
 ///
 /// # Errors
 ///

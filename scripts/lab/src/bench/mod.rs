@@ -41,7 +41,7 @@ static BENCH: WordMenu = WordMenu {
     notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
 };
 
-/// Runs the subcommand.
+/// Runs the subcommand `bench` with the words after its name.
 pub fn bench(words: &[OsString]) -> ExitCode {
     BENCH.run(words)
 }

@@ -116,7 +116,7 @@ impl Case {
         job.and_then(|job| samples.nth(job)).unwrap_or_default()
     }
 
-    /// Verifies the DAGs.
+    /// Verifies the DAGs, and returns them as a task set.
     ///
     /// # Errors
     ///

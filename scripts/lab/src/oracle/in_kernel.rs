@@ -163,7 +163,7 @@ pub struct Settings {
     pub computes: bool,
 }
 
-/// The result of a case.
+/// The result of a case run in the kernel.
 #[derive(Clone, Debug)]
 pub struct CaseVerdict {
     /// The case's name.

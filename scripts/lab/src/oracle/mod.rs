@@ -78,7 +78,7 @@ options! {
     IN_KERNEL: OptionValue::Nothing;
 }
 
-/// Runs the subcommand.
+/// Runs the subcommand `oracle` with the words after its name.
 pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }

@@ -34,7 +34,7 @@ use tool::image::{self, package_name};
 use tool::options::{Command, OptionValue, Refusal, options};
 use tool::{elf, files, install, system};
 
-/// The command-line table of `test`.
+/// The options and the help text of `test`.
 pub static TEST: Command = Command {
     invocation: "./scripts/test",
     about: "Runs every test, on the host and in QEMU, and counts them.",

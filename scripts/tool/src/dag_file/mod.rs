@@ -26,7 +26,7 @@ use crate::files;
 use crate::options::{Arguments, OptionName};
 use crate::run_options::name;
 
-/// Settings for reading a file.
+/// Settings for reading a DAG file and checking it for a run.
 #[derive(Clone, Debug)]
 pub struct ImportSettings {
     /// The length of a time unit, for formats with plain numbers; `None` means the format's
@@ -155,7 +155,7 @@ pub(crate) fn states_overheads(words: &str) -> bool {
         .any(|word| word.starts_with("overheads_ns=") || word.starts_with("overheads="))
 }
 
-/// A file ready to boot.
+/// A DAG file ready to run, with settings for the run.
 #[derive(Debug)]
 pub struct PreparedFile {
     /// The file's name.

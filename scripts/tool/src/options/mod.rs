@@ -373,7 +373,7 @@ macro_rules! options {
 }
 pub use options;
 
-/// The kind of value of an option.
+/// The kind of value that an option takes.
 #[derive(Clone, Copy, Debug)]
 pub enum OptionValue {
     /// Nothing: the option is a flag.
@@ -569,7 +569,7 @@ impl Arguments {
         self.text(name).and_then(|value| value.parse().ok())
     }
 
-    /// Returns the numbers of a list.
+    /// Returns the numbers given with an option, or its default; empty if it has neither.
     pub fn numbers<N: FromStr>(&self, name: OptionName) -> Vec<N> {
         let words = self.text(name).into_iter().flat_map(|all| all.split(','));
         words.filter_map(|word| word.parse().ok()).collect()

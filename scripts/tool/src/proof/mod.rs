@@ -37,7 +37,7 @@ use views::json::Object;
 use views::record::{self, CommittedDags};
 use views::units::shown;
 
-/// The proof of one DAG in one commit.
+/// The row of a proof for one DAG in one commit: bound, longest response, and slack.
 #[derive(Clone, Debug)]
 pub struct ProofRow {
     /// The file with the DAG, if there are several files.
@@ -78,7 +78,7 @@ pub fn rows(commits: &[CommittedDags], observed: &[OfDag]) -> Result<Vec<ProofRo
 }
 
 impl ProofRow {
-    /// Names the file of the DAG.
+    /// Returns the row with the name of the DAG's file.
     pub fn of_file(self, name: &str) -> Self {
         Self {
             file: Some(name.into()),
@@ -130,7 +130,7 @@ impl ProofRow {
     }
 }
 
-/// Returns the table.
+/// Returns the rows as a table for people.
 pub fn table(rows: &[ProofRow]) -> String {
     let names = rows.iter().map(|row| row.name().chars().count() + 1);
     let width = names.max().unwrap_or(0).max(20);

@@ -30,7 +30,7 @@ use views::record::Record;
 /// The options for writing views of the commits and runs of a record.
 const OF_RUNS: [OptionName; 2] = [name::WITNESS, name::OBSERVE];
 
-/// The table of `recording`.
+/// The options and the help text of `recording`.
 pub static RECORDING: Command = Command {
     invocation: "./scripts/recording",
     about: "Shows a recording, and converts it from and to other formats.",

@@ -17,7 +17,7 @@ use crate::files;
 use crate::image;
 use crate::options::{Command, OptionValue, Refusal};
 
-/// The table of `boot`, for its help.
+/// The help text of `boot`.
 static BOOT: Command = Command {
     invocation: "./scripts/boot",
     about: "\

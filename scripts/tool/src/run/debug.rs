@@ -37,7 +37,7 @@ use crate::system;
 /// The longest time from QEMU's start until gdb can reach QEMU.
 const START: Duration = Duration::from_secs(30);
 
-/// The table of `debug`. Options shared with `run` have the same meaning there.
+/// The options and the help text of `debug`. Options shared with `run` have the same meaning there.
 static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
     invocation: "./scripts/debug",
     about: "Boots an app in QEMU with gdb at it, in an image that gdb shows whole.",

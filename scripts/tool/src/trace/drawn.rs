@@ -13,7 +13,7 @@ use super::{perfetto, read_files};
 use crate::files::{self, NamedFile};
 use crate::options::{Arguments, Command, OptionValue, Refusal, options};
 
-/// The table of `trace`.
+/// The options and the help text of `trace`.
 pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
     about: "Draws the traces of runs: for Perfetto's viewer, or as one picture.",

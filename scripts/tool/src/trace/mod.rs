@@ -37,7 +37,7 @@ pub fn read(log: &str) -> Result<Vec<Run>, String> {
     Record::of_log(log).map(|record| record.runs)
 }
 
-/// The table of `check-trace`.
+/// The options and the help text of `check-trace`.
 pub static CHECK_TRACE: Command = Command {
     invocation: "./scripts/check-trace",
     about: "Replays the traces of runs against the model's rules and reports each breach.",

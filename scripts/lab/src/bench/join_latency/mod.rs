@@ -93,7 +93,7 @@ fn write_whole(path: &Path, text: &str) -> Result<(), String> {
     renamed.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
-/// The command-line table of `bench join-latency`.
+/// The options and the help text of `bench join-latency`.
 static TABLE: Command = Command {
     invocation: "./scripts/bench join-latency",
     about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
