@@ -11,11 +11,10 @@
 //! sink reaches itself. An *instance* is the part of one job done by one subtask: one execution of
 //! the subtask's function.
 //!
-//! An instance is *ready* when only a core is missing for it to run. A *dispatch* gives cores to
-//! ready instances: it *starts* them, or *resumes* instances that were *preempted*. An instance
-//! *finishes* when its function has returned, and a job is *complete* when all its instances have
-//! finished. From its release until then, the job is *in flight*. `docs/glossary.md` lists the
-//! project's own words.
+//! An instance is *ready* when it lacks only a core. A *dispatch* gives cores to ready instances:
+//! it *starts* them, or *resumes* instances that were *preempted*. An instance *finishes* when its
+//! function has returned, and a job is *complete* when all its instances have finished. From its
+//! release until then, the job is *in flight*. `docs/glossary.md` lists the project's own words.
 //!
 //! # The rules
 //!
@@ -30,9 +29,9 @@
 //!   finish and readiness.
 //! - **R3, completion boundary.** All outgoing edges of an instance are released at a single
 //!   instant, when the instance finishes. Nothing that happens within a function releases an edge.
-//! - **R4, job completion.** A job finishes with its last sink. The job meets its deadlines if each
-//!   sink s finishes at or before r + D_s. A miss is noticed when the deadline has passed, not when
-//!   the job ends.
+//! - **R4, job completion.** A job finishes when its last sink does. The job meets its deadlines if
+//!   each sink s finishes at or before r + D_s. A miss is noticed when the deadline has passed, not
+//!   when the job ends.
 //! - **R5, dispatch.** With preemption, at every instant the instances with the smallest keys run,
 //!   as many as there are cores. An instance of a non-preemptive subtask, once started, keeps its
 //!   core; without preemption, every started instance does. The key under static priority is
@@ -41,9 +40,9 @@
 //!   has the same key in every comparison. No core idles while an instance is ready. At each
 //!   instant all completions come first, then all releases, then one dispatch.
 //!
-//! A core may have a list from a *table*: an order of subtasks, over a common period of their DAGs,
-//! binding for the core. All other instances share the remaining time, as R5 says. Rules T1 to T4
-//! are in `table.rs`, their scenarios in `tests/scenarios/tables.txt`.
+//! A core may have a list from a *table*: an order of subtasks over a common period of their DAGs.
+//! The core must keep to its list. All other instances share the remaining time of the cores, as R5
+//! says. Rules T1 to T4 are in `table.rs`, their scenarios in `tests/scenarios/tables.txt`.
 //!
 //! A subtask may *wait* between *segments* of its function. The instance then holds no core, and is
 //! not eligible until an answer arrives or the limit of the wait is reached. Rules W1 to W7 are in

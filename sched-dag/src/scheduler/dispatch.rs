@@ -28,9 +28,9 @@
 //! the first in line, it takes the core, and the condition still holds. Otherwise its key is larger
 //! than a key that was in line before, so it preempts nobody either, and no core is idle.
 //!
-//! [`decide`](Scheduler::decide) would give the same result, because it takes the core that became
-//! idle last first. Virtual time uses both ways, the short one where exactly one instance finishes;
-//! so its tests hold both to the same law.
+//! [`decide`](Scheduler::decide) would give the same result, because of all idle cores it takes
+//! first the one that became idle last. Virtual time uses both ways, the short one where exactly
+//! one instance finishes; so its tests hold both to the same law.
 //!
 //! A wait ends a turn by the same short way ([`Scheduler::wait_shortly`]). A wait of no time makes
 //! its own instance ready, and no other. A limit reached while a core is idle concerns that core
@@ -179,8 +179,8 @@ pub enum Unwritten {
     Nothing,
     /// The finish.
     Finish,
-    /// The finish, and the next instance becoming ready by the finish: together with the start they
-    /// form a single entry.
+    /// The finish, and the event that it made the next instance ready: together with the start,
+    /// both form a single journal entry.
     FinishAndReady,
 }
 
@@ -195,7 +195,8 @@ impl Scheduler {
     /// If no instance of the vertex has started, or it has ended before.
     #[inline(always)]
     pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, Unwritten) {
-        // Cores may report their times in another order than they read them: time never goes back.
+        // Cores may report their times in another order than that of their clock readings: time
+        // never goes back.
         self.log.now_ns = self.log.now_ns.max(now_ns);
         let ending = self.vertices.get(vertex.0);
         let is_here = ending.phase == InstancePhase::Running(core);
@@ -260,7 +261,7 @@ impl Scheduler {
         (HandOff::Idle, Unwritten::Nothing)
     }
 
-    /// Returns the decision that a core begins or continues the instance of a vertex.
+    /// Returns the hand-off by which a core begins or continues the instance of a vertex.
     #[inline(always)]
     pub(super) fn hand_off(&self, core: CoreId, (next, what): (u32, EventKind)) -> HandOff {
         let instance = self.vertices.get(next).present_instance();
@@ -314,8 +315,8 @@ impl Scheduler {
         (self.cores).run(core, key, next.is_preemptible);
     }
 
-    /// Records that a core has finished the instance of a vertex. Puts in line the instance made
-    /// ready by the finish, and all ready successors after it.
+    /// Records that a core has finished the instance of a vertex. Puts in line the first successor
+    /// made ready by the finish, and all later successors that are ready, too.
     #[inline]
     fn line_up_all(
         &mut self,

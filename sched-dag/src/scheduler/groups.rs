@@ -9,10 +9,10 @@
 //!
 //! The cores in tables come first ([`lists`](super::lists)). Then, group by group, idle cores take
 //! the first instance in the group's line. If no core is idle, the least urgent instance on the
-//! group's cores gives way to the first in line, unless it is an entry, keeps its core or has the
-//! smaller key. So each core is still named in a single exchange: a group takes no core from an
-//! entry, nor from another group. The cluster's line belongs to the only group, and comes last.
-//! Afterwards a group with a non-empty line has no idle core.
+//! group's cores gives way to the first in line, unless the running instance is an entry, keeps its
+//! core or has the smaller key. So each core is still named in a single exchange: a group takes no
+//! core from an entry, nor from another group. The cluster's line belongs to the only group, and
+//! comes last. Afterwards a group with a non-empty line has no idle core.
 //!
 //! # The short ways
 //!
@@ -214,7 +214,7 @@ impl ReadyLines {
         Some(key)
     }
 
-    /// Takes out the next instance for a core without an instance and without a list.
+    /// Takes out the next instance for a core that has no instance, and no entry to execute.
     #[inline]
     pub(super) fn pop_for(&mut self, core: CoreId) -> Option<DispatchKey> {
         if self.has_any_apart()
@@ -266,7 +266,8 @@ impl ReadyLines {
     }
 
     /// Reports whether the `count` > 0 instances that entered lines last may concern a core other
-    /// than this one, which has finished an instance that `kept` it.
+    /// than this one. `kept` tells whether the instance just finished here was one that keeps its
+    /// core.
     #[inline]
     pub(super) fn concern_others(
         &mut self,

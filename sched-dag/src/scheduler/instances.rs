@@ -83,8 +83,9 @@ impl Scheduler {
         }
     }
 
-    /// Cancels the ready instances of a DAG, not yet started, in the job with a sequence number (in
-    /// all jobs if `u64::MAX`), and all instances that would become ready as a consequence.
+    /// Cancels the instances of a DAG that wait, or are ready and have not started, in the job with
+    /// a sequence number (in all jobs if that is `u64::MAX`), and all instances that would become
+    /// ready as a consequence.
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
         self.cancel_waits(dag, sequence);
@@ -118,8 +119,8 @@ impl Scheduler {
     pub(super) fn end_instance(&mut self, vertex: u32) {
         self.end_one(vertex);
         if !self.ending.is_empty() {
-            // The vertex's next instance may be among the cancelled, and would then hide how late
-            // this one was.
+            // The vertex's next instance may be among the cancelled, and would then hide that this
+            // one was late.
             if self.log.now_ns >= self.quiet_until_ns {
                 self.judge_ended(vertex);
             }
@@ -140,7 +141,8 @@ impl Scheduler {
         }
     }
 
-    /// Tells the successors of the instance's end, and ends its job with the job's last instance.
+    /// Ends a vertex's present instance: tells its successors, and ends the job after the job's
+    /// last instance.
     #[inline(always)]
     fn end_one(&mut self, number: u32) {
         let Self {
@@ -155,13 +157,13 @@ impl Scheduler {
         let ended = vertices.end_instance(number);
         let (dag, sequence) = (ended.dag, ended.progress);
         let jobs = &mut dags[dag.index()].jobs;
-        // Read before `job_mut` borrows the jobs: in a younger job in flight, the vertex may
-        // already be awaited.
+        // Read before `job_mut` borrows the jobs: whether a younger job is in flight, in which the
+        // vertex may already be awaited.
         let overlaps = sequence + 1 < jobs.next;
         let job = jobs.job_mut(sequence);
         let is_cut = job.cut.is_some();
         let successors = VertexTable::successors(&ended);
-        // Only sinks count: every other instance ends before some sink of its job.
+        // Only instances without successors count: every other instance ends before one of these.
         job.unfinished -= u32::from(successors.is_empty());
         let is_last = job.unfinished == 0;
         for place in successors {
@@ -258,7 +260,7 @@ impl Scheduler {
     }
 }
 
-/// Puts a vertex's next instance, ready and part of the given job, in line.
+/// Puts a vertex's next instance, which is ready and belongs to the given job, in line.
 #[inline(always)]
 pub(super) fn line_up(
     number: u32,
@@ -283,6 +285,6 @@ pub(super) fn make_ready<'j>(
 ) {
     vertex.phase = InstancePhase::Ready;
     ready.insert(vertex, ready.key(number, vertex, job));
-    // No driver hears of this event: the short way leaves writing it to the driver.
+    // Never a notice for the driver: on the short way the driver itself records this event.
     log.on_this(EventKind::Ready, log.now_ns, vertex.present_instance());
 }

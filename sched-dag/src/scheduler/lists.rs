@@ -14,9 +14,9 @@
 //!
 //! # Begun for a moment
 //!
-//! An entry may start while the entry following it may start on top of it at the same instant. The
-//! first entry has then begun in its place and is still ready: the start comes with the core. Until
-//! then a cut of the job cancels the entry's instance.
+//! Two consecutive entries may both be able to start at the same instant, the second on top of the
+//! first. The first entry has then begun in its place, but its instance is still ready: the
+//! instance starts when it gets the core. Until then a cut of its job cancels it.
 //!
 //! # Laps without work
 //!
@@ -25,9 +25,9 @@
 //!
 //! # Links
 //!
-//! Most hops lead from an entry to the next entry on the list, where each is the only successor or
-//! predecessor of the other. Then neither a counter nor the order decides anything: the core goes
-//! on.
+//! Most hops lead from an entry to the next entry on the list, where the second is the only
+//! successor of the first, and the first the only predecessor of the second. Then neither a counter
+//! nor the order decides anything: the core goes on.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -294,8 +294,8 @@ impl ListEntry {
 }
 
 impl Scheduler {
-    /// Ends an instance of one slot on a core, and begins the next entry there, if both are linked.
-    /// Returns the entry's vertex and its instance.
+    /// Ends an instance of a DAG with one slot on a core, and begins the next entry there, if both
+    /// are linked. Returns the entry's vertex and its instance.
     #[inline(always)]
     pub(super) fn hop_in_list(&mut self, core: CoreId, vertex: u32) -> Option<(u32, Instance)> {
         let (list, next) = self.ready.lists.linked(core)?;
@@ -336,7 +336,7 @@ impl Scheduler {
                     // A member back in line may be for another core (T4).
                     self.fresh += 1;
                 }
-                // The core was idle: no other line may take it for idle any more.
+                // The core was idle: out of the idle stack with it, so that no line takes it.
                 _ => _ = self.cores.take_idle_of(&[core]),
             }
             let decision = self.give_to_entry(core, entry);

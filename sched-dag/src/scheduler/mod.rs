@@ -88,7 +88,7 @@ pub struct Scheduler {
     options: SchedulerOptions,
     dags: Box<[DagState]>,
     vertices: VertexTable,
-    /// The ready instances waiting for a core.
+    /// The instances in line for a core: ready, or preempted.
     ready: ReadyLines,
     /// The number of instances that have become ready since the last dispatch, and [`OWED`] if
     /// since then a core has become idle that the next instance in line may need.
@@ -210,8 +210,8 @@ impl Scheduler {
         Moment::new(self, now_ns)
     }
 
-    /// Has events of these kinds kept as [notices](EventLog::has_notices), and returns the number
-    /// of notices there is room for.
+    /// Keeps events of these kinds as [notices](EventLog::has_notices) from now on, and returns the
+    /// number of notices there is room for.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
         // At one instant a DAG's end may skip and cancel all jobs of the DAG, and a change of mode
         // the waiting jobs of each other DAG; a step also reports skips.
@@ -234,9 +234,10 @@ impl Scheduler {
         (&self.decisions, &mut self.log)
     }
 
-    /// Returns the time of the next instant, if nothing completes before: the next release, or the
-    /// first nanosecond after a deadline. An ended DAG has neither. `None`: only completions are to
-    /// come, or nothing.
+    /// Returns the time of the next instant, if nothing completes before: the next release, the
+    /// first nanosecond after a deadline, the limit of a wait, or the next report of skips. An
+    /// ended DAG has no release and no deadline to come. `None`: only completions are to come, or
+    /// nothing.
     #[inline]
     pub fn next_event_ns(&self) -> Option<u64> {
         self.timers.peek().map(|(event_ns, _)| event_ns)
@@ -286,8 +287,9 @@ impl Scheduler {
         self.dags[dag.index()].jobs.is_closed()
     }
 
-    /// Reports whether a DAG was ended by [`Moment::fail`] or [a
-    /// request](crate::lifecycle::Request::End). Instances started before may still run.
+    /// Reports whether a DAG was ended, by a fault ([`Moment::fail`], [`Moment::fail_replaceable`])
+    /// or [a request](crate::lifecycle::Request::End), or belongs to another cluster. Instances
+    /// started before may still run.
     ///
     /// # Panics
     ///

@@ -71,7 +71,7 @@
 //!   have left its data in any state. A new scheduler may.
 //!
 //! Not here: whether a fault did harm beyond its instance, and the fate of the instance's stack and
-//! values. The driver decides both.
+//! values. Both are up to the driver.
 //!
 //! # Faults that cost a job: the DAG goes on with the next job
 //!
@@ -136,17 +136,18 @@ pub const SKIPS_EVERY_NS: u64 = 100_000;
 /// ```
 ///
 /// 1. A pause, any number of times: [`Request::Pause`](crate::lifecycle::Request::Pause), or a
-///    request for a mode, if the DAG is only in others.
+///    request for a mode, if the DAG is only in other modes.
 /// 2. The end of the pause: [`Request::Resume`](crate::lifecycle::Request::Resume), or a mode is
 ///    entered with the DAG in it.
 /// 3. A closing: [`Request::Close`](crate::lifecycle::Request::Close), also as part of a shutdown
 ///    of the run.
 /// 4. An end: [`Request::End`](crate::lifecycle::Request::End), or a fault the DAG does not survive
 ///    ([`Moment::fail`](super::Moment::fail),
-///    [`Moment::fail_replaceable`](super::Moment::fail_replaceable)).
+///    [`Moment::fail_replaceable`](super::Moment::fail_replaceable)). In the scheduler of one
+///    cluster, the DAGs of other clusters are `Ended` from the beginning.
 ///
 /// A closed DAG is never paused or resumed, and no phase follows `Ended`. A survived fault changes
-/// no phase. Being over is not a phase: see [`DagSnapshot::is_over`].
+/// no phase. Being over is not a phase: see [`Scheduler::is_over`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum DagPhase {
     /// Releases its jobs.
@@ -160,7 +161,7 @@ pub enum DagPhase {
     Ended,
 }
 
-/// A short question or wish of a person to a scheduler.
+/// A person's question to a scheduler, or wish. It takes the scheduler little time.
 #[derive(Debug)]
 pub enum SchedulerQuery<'a> {
     /// The state of a DAG.
@@ -219,7 +220,7 @@ impl Scheduler {
         self.dags[dag.index()].jobs.phase
     }
 
-    /// Answers a question.
+    /// Answers a person's question, or fulfils the wish. Returns the number asked for, otherwise 0.
     pub fn show(&mut self, query: SchedulerQuery<'_>) -> u64 {
         let journal = &mut self.log.journal;
         match query {

@@ -28,7 +28,7 @@ use crate::policy::Preemption;
 use crate::table::Table;
 use crate::task_set::TaskSet;
 
-/// The phase of a subtask's next instance.
+/// The phase of a subtask's present instance, or of its next one.
 ///
 /// ```text
 ///         +-------------- 2 ---------------+
@@ -108,8 +108,8 @@ impl LineId {
 pub(super) enum EndKind {
     /// Any work: no shortcut.
     Any,
-    /// The end concerns the successors only: the vertex has some, and its job is not cut and the
-    /// only job in flight.
+    /// The end concerns the successors only: the vertex has some, and its job is the only one in
+    /// flight and not cut.
     PassesOn,
     /// Likewise, for a vertex in a table.
     PassesOnInTable,
@@ -128,8 +128,8 @@ pub(super) struct Vertex {
     pub(super) rank: u32,
     pub(super) dag: DagId,
     pub(super) subtask: SubtaskId,
-    /// Whether a started instance may lose its core. A member of a group loses its core also to a
-    /// more urgent member.
+    /// Whether a started instance may lose its core: to an entry of the core's list, and, as a
+    /// member of a group, also to a more urgent member.
     pub(super) is_preemptible: bool,
     pub(super) ends: EndKind,
     pub(super) line: LineId,
@@ -140,7 +140,7 @@ pub(super) struct Vertex {
     /// The first counter of a vertex with several slots, and the mask of the slots.
     counters: u32,
     slot_mask: u32,
-    /// The range of its successors: begin and end.
+    /// The range of the vertex's successors: begin and end.
     successors: [u32; 2],
 }
 
@@ -283,16 +283,16 @@ impl VertexTable {
     }
 
     /// Ends the instance of a vertex that [passes on in a table](EndKind::PassesOnInTable), and
-    /// starts on the same core the successor `next`, which waits for this vertex alone. Returns the
-    /// started instance, or `None` if the two vertices are the same or do not exist.
+    /// starts the successor `next`, which waits for this vertex alone, on the same core. Returns
+    /// the started instance, or `None` if the two vertices are the same or do not exist.
     #[inline(always)]
     pub(super) fn hand_over(&mut self, vertex: u32, next: u32, core: CoreId) -> Option<Instance> {
         let pair = [vertex as usize, next as usize];
         let [own, next] = self.vertices.get_disjoint_mut(pair).ok()?;
         own.phase = InstancePhase::Absent;
         own.progress += 1;
-        // The ended vertex's counter was reset when its entry began; the successor's counter would
-        // be counted down and reset.
+        // Both counters have their initial values already: the ended vertex's was reset when its
+        // entry began, and the successor's would be counted down to 0 and reset.
         (next.phase, next.job) = (InstancePhase::Running(core), own.job);
         Some(next.present_instance())
     }
@@ -348,7 +348,8 @@ impl VertexTable {
         (*counter == 0 && vertex.progress == sequence).then_some(vertex)
     }
 
-    /// Returns a vertex if no predecessor is missing for its next instance, whose job is released.
+    /// Returns a vertex if its next instance waits for no predecessor. The job of that instance is
+    /// released.
     #[inline]
     pub(super) fn next_is_ready(&mut self, vertex: u32) -> Option<&mut Vertex> {
         let vertex = &mut self.vertices[vertex as usize];
@@ -369,7 +370,7 @@ impl Vertex {
         what
     }
 
-    /// Returns the vertex's part of a job.
+    /// Returns the vertex's instance in a job.
     #[inline]
     pub(super) const fn instance(&self, job: &Job) -> Instance {
         Instance::new(self.dag, job.number, self.subtask)

@@ -1,4 +1,5 @@
-//! Waits: started instances that hold no core and are not eligible until an answer or a limit.
+//! Waits: started instances that hold no core and are not eligible until an answer or a limit
+//! comes.
 //!
 //! A subtask may wait between segments of its function: for a time, for a device, for bytes. Each
 //! wait has a *limit*, so the wait ends even if a device never answers. The scenarios of the rules,
@@ -8,7 +9,7 @@
 //!   and holds no core. Waits do not queue: each instance has a timer and a limit of its own.
 //! - **W2, the end.** A wait ends with its answer, and at its limit at the latest; an answer at the
 //!   instant of the limit still counts. At that instant the instance is eligible again, with the
-//!   old key, on any core of the cluster.
+//!   old key, on any core allowed to execute the DAG.
 //! - **W3, not a finish.** A wait releases no edge, completes no job, and the subtask's next
 //!   instance stays behind the waiting instance (R2 to R4).
 //! - **W4, one instant.** At one instant the ending segments come first, then the ending waits,
@@ -19,7 +20,7 @@
 //!   cut, or where the instance would begin to wait.
 //! - **W7, late answers.** An answer names a wait; any other wait ignores the answer.
 //!
-//! The begin of a wait costs the DAG's timers one step of a heap, and so does its end.
+//! The beginning of a wait costs one heap operation of the timers, and so does the end.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -182,9 +183,9 @@ impl Scheduler {
     }
 
     /// Ends the wait with the earliest limit, if the limit has come by `now_ns`, and gives the
-    /// instance an idle core. Returns `None` if more is to be decided at this instant, even if the
-    /// wait has been ended already: then the driver takes the step the usual way. No request may be
-    /// pending.
+    /// instance an idle core. Returns `None` if no such limit has come, or if more is to be decided
+    /// at this instant; the wait may have been ended even then. After `None`, the driver takes the
+    /// step the usual way. No request may be pending.
     #[inline]
     pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
         let (limit_ns, timer) = self.timers.peek()?;
@@ -230,7 +231,8 @@ impl Scheduler {
         }
     }
 
-    /// Ends the wait whose limit has come. `timer` is a number behind the timers of the DAGs.
+    /// Ends the wait whose limit has come. `timer` is the wait's number, behind the timers of the
+    /// DAGs.
     #[cold]
     #[inline]
     pub(super) fn time_out(&mut self, timer: usize) {

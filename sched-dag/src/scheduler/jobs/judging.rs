@@ -107,7 +107,7 @@ impl JobTable {
         Some(deadline_ns + 1)
     }
 
-    /// Returns the job to judge first, or the first judgement of job `only`, if given.
+    /// Returns the judgement due first: of any job, or of job `only` if given.
     #[inline(never)]
     fn first_unjudged(&self, dag: &Dag, only: Option<u64>) -> Option<UnjudgedJob> {
         let of_deadlines = self.deadlines.iter().enumerate();

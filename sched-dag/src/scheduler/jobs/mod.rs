@@ -6,8 +6,8 @@
 //! because each instance waits for the instance of the job before.
 //!
 //! The release of job k is *blocked* while job k - J, or an older job, is in flight, where J is the
-//! most jobs that may be in flight. Both jobs would use the same slot of every edge, the job's
-//! number modulo J. Without skipped jobs, blocked means that J jobs are in flight.
+//! largest number of jobs allowed in flight. Both jobs would use the same slot of every edge, the
+//! job's number modulo J. Without skipped jobs, blocked means that J jobs are in flight.
 //!
 //! A periodic DAG's jobs are due on the grid. A sporadic DAG's next job is due once a signal has
 //! come, at the earliest one minimum inter-arrival time after the job before (the module `signals`
@@ -103,7 +103,7 @@ impl JobTable {
             ..Job::default()
         });
         let subtasks = dag.topological_order().iter();
-        // The job ends with the last subtask without successor, be it a sink or not.
+        // A sink may have successors, because of a shared state: the job ends after these.
         let ends = subtasks.filter(|&&subtask| dag.successors(subtask).is_empty());
         let numbers = policy.adds_release().then(|| policy.numbers(dag));
         Self {
@@ -145,7 +145,7 @@ impl JobTable {
     }
 
     /// Reports whether no job is in flight, waiting, or ahead: the DAG is closed or ended, or has
-    /// released its limit of jobs, or is sporadic without a limit and has no signal.
+    /// come to its limit of jobs, or is sporadic without a limit and has no signal.
     #[inline]
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
         // A sporadic DAG without a limit keeps no run going, unless a signal is pending.
@@ -163,7 +163,7 @@ impl JobTable {
         self.next_due - self.waiting().min(1)
     }
 
-    /// Makes the next job of a sporadic DAG due at `now_ns`, or as soon after as the minimum
+    /// Makes the next job of a sporadic DAG due at `now_ns`, or as soon afterwards as the minimum
     /// inter-arrival time allows, and returns that time. Returns `None` if the signal is dropped:
     /// an earlier signal is still kept, or no job is left.
     #[inline]
@@ -173,7 +173,7 @@ impl JobTable {
             return None;
         }
         let earliest_ns = match self.next_due {
-            // The first job has no predecessor to keep its distance from.
+            // Before the first job there is no other job to keep a distance from.
             0 => dag.offset_ns(),
             _ => self.last_due_ns.checked_add(dag.period_ns())?,
         };
@@ -286,7 +286,7 @@ impl JobTable {
     fn put_in_flight(&mut self, number: u64, release_ns: u64, missed: bool) -> u64 {
         let sequence = self.next;
         self.next += 1;
-        // The job is complete when this many sinks have ended (R4).
+        // The job is complete when this many instances without successors have ended (R4).
         let (unfinished, number_ns) = (self.ends, self.number_ns);
         let job = self.job_mut(sequence);
         *job = Job {
