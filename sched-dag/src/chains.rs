@@ -68,8 +68,8 @@
 //! A subtask of DAG i-1 sends a message when the subtask is complete, and a subtask of DAG i, on
 //! another machine, *receives* the message: this edge is a *link* instead of a sampling. The app
 //! *states* the link's delay N, from the writing of a message to its arrival; nothing proves N. A
-//! bound containing N is valid only for outputs whose messages all took at most N. For a link,
-//! replace T(i-1) + R(i-1) in the first bound above by
+//! bound containing N is valid only for outputs that go back over no message that took longer. For
+//! a link, replace T(i-1) + R(i-1) in the first bound above by
 //!
 //! - R(i-1) + N, if DAG i is sporadic, each message raises its signal, nothing else does, each job
 //!   takes all messages arrived so far, and T(i-1) by the slower clock is not less than T(i);
@@ -88,8 +88,8 @@
 //! The first message, k', came at a, so a <= d(k'). As releases of DAG i-1 are at least T(i-1)
 //! apart, d(k) >= d(k') + q T(i-1) >= a + q T(i). So T(i-1) has to be longer by the drift of the
 //! clocks; otherwise each job would be put off a bit more. A dropped signal (S2) leaves its message
-//! to a job of an earlier message that has not started: then the release is at d(k) at the latest
-//! all the more. ∎
+//! to a job of an earlier message that has not started: all the more is that job released at d(k)
+//! at the latest. ∎
 //!
 //! After a message delayed by more than N, jobs released T(i) after the previous job may be late,
 //! too. Since messages may be lost, nothing bounds data age and reaction time over a link.
@@ -112,7 +112,7 @@
 //! # Samples
 //!
 //! An instance samples when it starts, and a value becomes visible when its writer's instance is
-//! complete. The journal has an event for both, in the order of their occurrence under the
+//! complete. The journal has an event for each, in the order of their occurrence under the
 //! scheduler's lock. So the sampled value is the value of the writer's last finish before the
 //! start. On a machine, the function is called a few instructions after the start was written; if a
 //! writer finishes in between, its value counts as too late. In a replay, samples are the recorded
@@ -204,8 +204,8 @@ impl Chain {
     ///
     /// # Errors
     ///
-    /// The first DAG without a bound of its own in `responses_ns` (in the order of the DAGs), or
-    /// the first sporadic DAG other than the last.
+    /// The first DAG of the chain that has no bound of its own in `responses_ns` (in the order of
+    /// the DAGs), or that is sporadic and not the last.
     pub fn output_age_bound_ns(
         &self,
         task_set: &TaskSet,
@@ -254,7 +254,7 @@ impl Chain {
     ///
     /// # Errors
     ///
-    /// The first DAG without a bound of its own, or the first sporadic DAG.
+    /// The first DAG of the chain that has no bound of its own, or that is sporadic.
     pub fn reaction_bound_ns(
         &self,
         task_set: &TaskSet,
@@ -550,7 +550,7 @@ impl PausedJobs {
         Self(skipped)
     }
 
-    /// Reports whether a later job of the DAG was skipped for a pause by an instant.
+    /// Reports whether a later job of the DAG had been skipped for a pause by the instant `by_ns`.
     fn has_come(&self, dag: DagId, job: u64, by_ns: u64) -> bool {
         let mut later = self.0.range((dag, job + 1)..=(dag, u64::MAX));
         later.next().is_some_and(|(_, &time_ns)| time_ns <= by_ns)

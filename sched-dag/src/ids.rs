@@ -1,4 +1,4 @@
-//! Ids by index: DAGs, subtasks, instances and cores.
+//! Ids of DAGs, subtasks, instances and cores, by index.
 //!
 //! Every id is an index into a table with a size fixed at commit, so a lookup is one bounds-checked
 //! access. Ids follow the order of registration.

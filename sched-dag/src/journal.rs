@@ -10,9 +10,10 @@
 //!
 //! # Order
 //!
-//! Events are in the order in which the scheduler learnt of them: among the events of one instant,
-//! one job and one core, each event comes after all its causes. Their times need not ascend: on a
-//! machine a function returns before the scheduler hears of it, and another core may come between.
+//! Events are in the order in which the scheduler learnt of them: among the events of one instance,
+//! of one job and of one core, each event comes after all its causes. Their times need not ascend:
+//! on a machine a function returns before the scheduler hears of it, and another core may come
+//! between.
 
 use core::fmt;
 use core::str::FromStr;
@@ -186,7 +187,7 @@ events! {
     Finish = "finish", Core;
     /// The instance was ended by a fault.
     Ended = "ended", Core;
-    /// A signal came and makes a sporadic DAG's job due.
+    /// A signal came, which makes a sporadic DAG's job due.
     Signalled = "signalled", Job;
     /// A signal came while another was kept for the job, or no job was left.
     Dropped = "dropped", Job;

@@ -7,7 +7,7 @@
 use alloc::vec::Vec;
 use core::cmp::Ordering;
 
-/// Sorts positions by a comparison; equal positions stay in their order.
+/// Sorts positions by a comparison; positions that compare equal stay in their order.
 pub(crate) fn sort(positions: &mut [usize], compare: &mut dyn FnMut(usize, usize) -> Ordering) {
     let mut sorted = positions.to_vec();
     // The length of the runs already in order.

@@ -58,9 +58,9 @@ pub enum OverrunPolicy {
     /// The oldest job in flight that is not aborted yet is aborted, and the release waits until it
     /// is not blocked.
     ///
-    /// An aborted job starts no further instance. Started instances go on, and when none of them is
-    /// left, the job is out of flight. If all jobs in flight are aborted already, the oldest
-    /// waiting release is skipped.
+    /// An aborted job starts no further instance. Started instances go on, and when no instance of
+    /// the job is left, the job is out of flight. If all jobs in flight are aborted already, the
+    /// oldest waiting release is skipped.
     Abort,
 }
 

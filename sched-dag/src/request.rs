@@ -20,10 +20,10 @@ pub enum Request {
     Enter(ModeId, ModeEntry),
     /// The run ends: no DAG releases a further job.
     ShutDown,
-    /// The run begins. Not for functions: a driver makes the request, before any other.
+    /// The run begins. Not for functions: a driver makes the request, before any other request.
     Begin,
-    /// Waiting requests may take effect. A driver makes the request in each step until they have,
-    /// before any other.
+    /// Waiting requests may take effect. A driver makes the request in each step until they have
+    /// taken effect, before any other request.
     GoOn,
     /// A wait has its answer.
     Answer(WaitId),

@@ -58,7 +58,7 @@ impl DagSpec {
     ///
     /// A job that meets its deadline is in flight for at most D, so at most ceil(D / T) of them are
     /// at any time; with one more a late job can end while the next is released. Where subtasks
-    /// share a state, jobs take turns, so the number is 1.
+    /// share a state, jobs take turns: without a stated number, only one is in flight.
     pub fn most_in_flight(&self) -> u64 {
         let jobs = self.jobs.unwrap_or(u64::MAX);
         if let Some(given) = self.in_flight {
@@ -164,7 +164,7 @@ pub struct SubtaskSpec {
     /// The execution time after which an instance is ended as faulty, in nanoseconds; `None`: the
     /// driver's choice. Enforced by the driver, not by the scheduler.
     pub budget_ns: Option<u64>,
-    /// The stack of the subtask, in bytes, within [`STACK_BYTES`]; `None`: the driver's choice.
+    /// The stack the subtask needs, in bytes, within [`STACK_BYTES`]; `None`: the driver's choice.
     pub stack_bytes: Option<u64>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,

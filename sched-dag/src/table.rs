@@ -7,7 +7,7 @@
 //!
 //! The scenarios of the rules, in `tests/scenarios/tables.txt`, bear their numbers:
 //!
-//! - **T1, in place.** An entry starts on its core only, when all entries before it on the list
+//! - **T1, in place.** An entry starts only on its core, when all entries before it on the list
 //!   have started or been passed, and when the innermost begun entry there has a smaller depth;
 //!   then as soon as the entry is ready (R2). Anything else running on the core gives way at once.
 //! - **T2, voids.** An entry is void if its job does not exist, was skipped, or was cut before the

@@ -63,8 +63,8 @@ impl TaskSet {
         run.late_entry()
     }
 
-    /// Times tables anew, by WCETs plus the analysis's charge for each instance, unless a table's
-    /// times differ from the times by plain WCETs.
+    /// Computes the times of tables anew, by WCETs plus the analysis's charge for each instance,
+    /// unless a table's times differ from the times by plain WCETs.
     pub fn charge_tables(&mut self, settings: &AnalysisSettings) {
         let wcet_ns = |dag, subtask| self.dag(dag).subtask(subtask).locking_wcet_ns();
         let charged = |table: &Table| {

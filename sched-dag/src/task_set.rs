@@ -272,8 +272,8 @@ impl Dag {
         self.on_fault
     }
 
-    /// Returns the longest time between the nominal releases of two jobs of a periodic DAG with
-    /// only lost jobs in between, while the DAG is not paused. Jobs are lost by survived faults.
+    /// Returns the longest time between the nominal releases of two consecutive jobs of a periodic
+    /// DAG, not counting jobs lost to survived faults, while the DAG is not paused.
     pub fn renewal_ns(&self) -> u64 {
         let lost_in_a_row = match self.on_fault {
             OnFault::EndDag => 0,
@@ -421,7 +421,7 @@ impl Subtask {
         self.locking_wcet_ns()?.checked_add(charge_ns)
     }
 
-    /// Returns the subtask's stack, in bytes, if the app stated it.
+    /// Returns the stack the subtask needs, in bytes, if the app stated it.
     pub const fn stack_bytes(&self) -> Option<u64> {
         self.stack_bytes
     }
@@ -431,8 +431,9 @@ impl Subtask {
         self.wcet_source
     }
 
-    /// Returns the longest allowed execution of an instance, in nanoseconds: the budget, otherwise
-    /// `wcets` WCETs. `u64::MAX` means no limit, also if `wcets` is 0.
+    /// Returns the longest allowed execution of an instance, in nanoseconds: the budget; without a
+    /// budget, `wcets` times the WCET. `u64::MAX` means no limit: there is no budget, and no WCET
+    /// or `wcets` is 0.
     pub fn most_execution_ns(&self, wcets: u64) -> u64 {
         let wcet_ns = self.wcet_ns.filter(|_| wcets > 0);
         let limit_ns = wcet_ns.map(|wcet_ns| wcet_ns.saturating_mul(wcets));

@@ -41,7 +41,7 @@ macro_rules! worded {
         }
 
         impl $Table {
-            /// Every code of a variant's own.
+            /// The codes of all variants with a code of their own.
             pub const CODES: &'static [&'static str] = &[$($($code,)?)+];
 
             /// The text of every variant, with braces for the variable parts.

@@ -12,7 +12,7 @@
 //! # Guarantees
 //!
 //! - The cost of a fault, the effect of requests and the choice of the next instance are decided
-//!   here, alike for all platforms.
+//!   here, for all platforms alike.
 //! - The journal is in the order of the decisions. A [start](PlatformPort::start) is recorded
 //!   before the function begins.
 //! - After [`Engine::of_clusters`] nothing is allocated here, and every step is bounded except for
@@ -50,7 +50,7 @@ pub struct Engine<B: SubtaskBody, P> {
     pub task_set: Arc<TaskSet>,
     /// Requests of the run on their way to the scheduler.
     pub requests: PendingRequests,
-    /// The bodies whose functions were ended by faults for good.
+    /// The bodies whose functions a fault has ended for good.
     pub lost: Vec<B>,
     /// By vertex, the function to take over after a fault.
     alternates: Box<[Option<B::Alternate>]>,
@@ -104,8 +104,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             alternates: (0..vertices).map(|_| None).collect(),
             after_fault: after_fault.to_vec(),
             notices: Vec::with_capacity(room),
-            // At the end of a step there are no more instances in flight, and each is cancelled at
-            // most once. A late step cancels the instances of several jobs, job by job.
+            // At the end of a step at most `instances` instances are in flight, and each is
+            // cancelled at most once. A late step cancels the instances of several jobs, job by
+            // job.
             undiscarded: Vec::with_capacity(instances + room),
             scheduler,
             task_set,
@@ -342,8 +343,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         woken.is_some()
     }
 
-    /// Takes note that a turn has ended of an instance no longer on any core; it ran last on
-    /// `core`. The turn ended at the first time; the second time is the instant.
+    /// Takes note of the end of a turn whose instance no core has any more; `core` ran it last. The
+    /// turn ended at the first of the two times; the second is the instant.
     pub fn complete_parked(
         &mut self,
         (core, vertex): (CoreId, Vertex),
@@ -445,8 +446,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         cost
     }
 
-    /// Finds the next work of a core without an instance, at an instant. A returned start is
-    /// already recorded; a resumption is [recorded](Self::note) by the caller, who knows the time.
+    /// Finds the next work of a core without an instance, at an instant. The engine has recorded
+    /// the start of [`NextWork::Start`], and the resumption of [`NextWork::Proceed`]. The caller,
+    /// who knows the time, [records](Self::note) that of [`NextWork::Continue`].
     #[inline]
     pub fn next(
         &mut self,
@@ -663,12 +665,12 @@ impl Alternate for () {
 /// The part of a platform called by the engine during a step.
 ///
 /// A step returns everything else: the platform's code taking the step holds the lock around the
-/// engine, and wakes and suspends cores by its own means, mostly after the lock.
+/// engine, and wakes and suspends cores by its own means, mostly after releasing the lock.
 pub trait PlatformPort<B> {
     /// The kinds of events the platform itself acts on.
     const HEARS: &'static [EventKind] = &[];
 
-    /// Whether a core gives up its instance some time after the request.
+    /// Whether a core gives up its instance only some time after the request.
     const SUSPENDS_LATER: bool = true;
 
     /// Whether a wait may be answered at the instant at which it begins: then the wait does not end
@@ -683,15 +685,15 @@ pub trait PlatformPort<B> {
         time_ns
     }
 
-    /// Called when a core begins with a body as soon as the engine's lock is free. Returns the
+    /// Called for a core that begins with a body as soon as the engine's lock is free. Returns the
     /// start on the run's time: the step's instant, or a later reading of the clock.
     fn start(&mut self, core: CoreId, body: &mut B, instant_ns: u64) -> u64;
 
-    /// Called when the instance of a body gives its core up and begins a wait, which ends a turn.
+    /// Called when the instance of a body gives its core up and begins a wait: its turn has ended.
     fn wait(&mut self, _core: CoreId, _body: &mut B, _ended_ns: u64) {}
 
-    /// Called when a core goes on with a body after its wait, like [`start`](Self::start). Returns
-    /// the time.
+    /// Called for a core that goes on with a body after a wait, like [`start`](Self::start).
+    /// Returns the time.
     fn proceed(&mut self, core: CoreId, body: &mut B, instant_ns: u64) -> u64 {
         self.start(core, body, instant_ns)
     }

@@ -22,8 +22,8 @@
 //! Where clusters have no instant in common, requests cross them as [`Mailboxes`].
 //!
 //! A driver has [`PendingRequests`], which keeps requests from a completion to the scheduler's
-//! step, and the plan's [`Lifecycle`], which serves all requests but signals. The lifecycle is
-//! behind a trait, so an image without such requests contains no code for them.
+//! step, and the plan's [`Lifecycle`], which serves the requests of functions except signals. The
+//! lifecycle is behind a trait, so an image without such requests contains no code for them.
 
 mod mailboxes;
 mod modes;
@@ -48,14 +48,15 @@ pub enum LifecycleChange {
     Resume(DagId),
     /// A DAG is closed (C1 to C5).
     Close(DagId),
-    /// If the DAG has a job in flight, the following changes wait: in the next step the driver asks
-    /// for [`Request::GoOn`].
+    /// If the DAG has a job in flight, the changes after this one do not take effect: in the next
+    /// step the driver asks for [`Request::GoOn`].
     Await(DagId),
     /// A mode is entered, and nothing waits for a mode any more.
     Enter(ModeId),
 }
 
-/// Serves all requests except signals.
+/// Serves pauses, resumptions, changes of mode and the end of the run: all requests of functions
+/// except signals.
 pub trait Lifecycle: fmt::Debug + Send {
     /// Turns a request into changes. There is [`room`](Self::room) for the changes.
     fn serve(&mut self, request: Request, changes: &mut Vec<LifecycleChange>);
@@ -135,7 +136,7 @@ impl PendingRequests {
     ) {
         letters.take_all(cluster, |request| {
             // The lifecycle has to know of a person's pause, for example; a signal concerns the
-            // scheduler alone. Each letter finds the DAG as the letters before have left the DAG.
+            // scheduler alone. Each letter finds the DAG as the letters before have left it.
             if self.lifecycle.is_some() && request.is_of_lifecycle() {
                 self.keep(request);
                 self.serve(moment);

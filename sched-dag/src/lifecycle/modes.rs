@@ -1,4 +1,4 @@
-//! Modes: sets of DAGs, of which a single set runs.
+//! Modes: sets of DAGs, run one set at a time.
 //!
 //! A *mode* is a set of DAGs that run together, such as the DAGs of a flight, or of a landing. A
 //! DAG that belongs to some mode is *on* in its modes and off, meaning paused, in the others. A DAG

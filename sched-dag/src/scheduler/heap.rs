@@ -25,7 +25,7 @@ pub(super) struct IndexedHeap<K> {
 }
 
 impl<K: Copy> Clone for IndexedHeap<K> {
-    /// Takes the same room: a cloned `Vec` has capacity only for its elements.
+    /// Allocates the same room: a cloned `Vec` has capacity only for its elements.
     fn clone(&self) -> Self {
         let mut entries = Vec::with_capacity(self.positions.len());
         entries.extend_from_slice(&self.entries);

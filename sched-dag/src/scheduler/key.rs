@@ -17,9 +17,9 @@
 //!
 //! Two jobs of one DAG have different releases, because the DAG has a period. A slot belongs to one
 //! DAG, and slots are counted DAG by DAG. So, if all subtasks of each DAG have the same number,
-//! (sum, slot, vertex) is the order of (sum, DAG, job, subtask). Otherwise two jobs of a DAG may
-//! have the same sum: the older job by the larger number. So in that case the larger number has the
-//! smaller rank.
+//! (sum, slot, vertex) is the order of (sum, DAG, job, subtask). Otherwise instances of two jobs of
+//! a DAG may have the same sum: that of the older job then has the larger number. So in that case
+//! the larger number has the smaller rank.
 
 use super::vertices::Vertex;
 

@@ -14,8 +14,8 @@ pub struct Moment<'s> {
     told_ns: u64,
 }
 
-/// The end of a *turn*: the execution of an instance from its start, or the end of a wait, to its
-/// finish, or the next wait.
+/// The end of a *turn*. A turn is the execution of an instance from its start, or the end of a
+/// wait, to its finish, or the next wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TurnEnd {
     /// The instance.
@@ -63,8 +63,8 @@ impl<'s> Moment<'s> {
     /// If the instance has not started or has ended before.
     #[inline]
     pub fn complete(&mut self, instance: Instance) {
-        // With the driver's own time: another core may have reported a later time since, but this
-        // instance finished at this one.
+        // At the driver's own time: the instance finished then, even if another core has reported a
+        // later time since.
         self.scheduler
             .log
             .on_this(EventKind::Finish, self.told_ns, instance);
@@ -98,7 +98,7 @@ impl<'s> Moment<'s> {
     /// `phase` states the rules). A further instance of an ended DAG may fail, too. As with
     /// [`complete`](Self::complete), the instance may already be preempted in the scheduler's eyes.
     /// Drivers should report known completions of the same instant first: an instance that finished
-    /// together with the fault counts.
+    /// together with the fault counts as finished.
     ///
     /// # Panics
     ///

@@ -72,7 +72,8 @@ impl Scheduler {
             // Waiting jobs are judged only when announced. Otherwise an end that makes room for
             // this job could find the job late before any event has mentioned it.
             jobs.announce();
-            // Only a late driver can find an unknown passed deadline here.
+            // Only if the driver is late can a deadline have passed here without having been
+            // noticed.
             if jobs.first_deadline_ns(release_ns) < self.log.now_ns {
                 self.judge(dag, None);
             }

@@ -17,9 +17,9 @@
 //!   sporadic DAG without limit is over whenever nothing of it is in flight and no signal is kept:
 //!   it keeps no run going.
 //!
-//! For the analysis a sporadic DAG is a DAG with period T. All its tests hold for every pattern of
-//! releases at least T apart: the papers behind the tests use the sporadic model. A response time
-//! counts from r(k), not from the signal, which may have come up to T before.
+//! For the analysis a sporadic DAG is a DAG with period T. All tests of the analysis hold for every
+//! pattern of releases at least T apart: the papers behind the tests use the sporadic model. A
+//! response time counts from r(k), not from the signal, which may have come up to T before.
 
 use super::Scheduler;
 use crate::ids::DagId;
@@ -34,7 +34,8 @@ impl Scheduler {
             "a signal to dag {}, which is periodic; signal sporadic DAGs only",
             dag.0
         );
-        // A late driver: a job due before this signal no longer keeps an earlier signal.
+        // If the driver is late, a job due before this signal comes first, so that the job's own
+        // signal is no longer kept.
         if self.dags[dag.index()].jobs.is_overdue(self.log.now_ns) {
             self.serve(dag);
         }

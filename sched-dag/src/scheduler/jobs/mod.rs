@@ -103,7 +103,7 @@ impl JobTable {
             ..Job::default()
         });
         let subtasks = dag.topological_order().iter();
-        // A sink may have successors, because of a shared state: the job ends after these.
+        // A sink with successors, because of a shared state, does not count: it ends before these.
         let ends = subtasks.filter(|&&subtask| dag.successors(subtask).is_empty());
         let numbers = policy.adds_release().then(|| policy.numbers(dag));
         Self {
