@@ -65,11 +65,11 @@
 //!
 //! # Links: chains that cross machines
 //!
-//! A subtask of DAG i-1 sends a message when the subtask is complete, and a subtask of DAG i, on
-//! another machine, *receives* the message: this edge is a *link* instead of a sampling. The app
-//! *states* the link's delay N, from the writing of a message to its arrival; nothing proves N. A
-//! bound containing N is valid only for outputs that go back over no message that took longer. For
-//! a link, replace T(i-1) + R(i-1) in the first bound above by
+//! A subtask of DAG i-1 sends a message when it is complete, and a subtask of DAG i, on another
+//! machine, *receives* the message: this edge is a *link* instead of a sampling. The app *states*
+//! the link's delay N, from the writing of a message to its arrival; nothing proves N. A bound
+//! containing N is valid only for outputs that go back over no message that took longer. For a
+//! link, replace T(i-1) + R(i-1) in the first bound above by
 //!
 //! - R(i-1) + N, if DAG i is sporadic, each message raises its signal, nothing else does, each job
 //!   takes all messages arrived so far, and T(i-1) by the slower clock is not less than T(i);

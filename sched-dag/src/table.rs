@@ -12,8 +12,8 @@
 //!   then as soon as the entry is ready (R2). Anything else running on the core gives way at once.
 //! - **T2, voids.** An entry is void if its job does not exist, was skipped, or was cut before the
 //!   entry started. A void entry is passed where it might start.
-//! - **T3, nested.** An entry that finishes leaves its core to the next entry, if the next entry
-//!   may start by T1, otherwise to the innermost entry begun and not finished.
+//! - **T3, nested.** An entry that finishes leaves its core to the next entry, if that may start by
+//!   T1, otherwise to the innermost entry begun and not finished.
 //! - **T4, members.** An instance of a DAG without a table executes only on a core of its DAG's
 //!   *group*: the cores of the DAG's affinity, or all cores of the cluster if no affinity is
 //!   stated. The group's cores without a begun and unfinished entry execute the group's instances

@@ -136,7 +136,7 @@ impl<'t> TableRun<'t> {
     }
 
     /// Delays starts until they settle. Returns an entry that does not start in its lap, if there
-    /// is one, and prefers an entry waiting for others to an entry behind it.
+    /// is one: rather one waiting for others than one behind it on the list.
     fn late_entry(&mut self) -> Option<(u32, TableEntry)> {
         let mut begun = vec![Vec::new(); self.table.lists.len()];
         let mut passes = 0..=self.table.entries().count();

@@ -485,8 +485,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
     }
 
-    /// Takes a core's instance away, if the core has one, and returns the core waiting for the
-    /// instance.
+    /// Takes a core's instance away, if there is one, and returns the core waiting for it.
     pub fn suspend(&mut self, core: CoreId, now_ns: u64, parked: P) -> Option<CoreId> {
         let vertex = self.placement.detach(core.index())?;
         self.note(EventKind::Suspend, core, vertex, now_ns);

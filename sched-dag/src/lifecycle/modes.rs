@@ -71,7 +71,7 @@ impl ModeTable {
 
     /// Returns the DAGs that are in some mode.
     pub(super) fn dags(&self) -> impl Iterator<Item = DagId> {
-        // Each DAG of a mode is in the first mode, or leaves when the first mode is entered.
+        // Each DAG of a mode is in the first one, or leaves when that is entered.
         let first = self.modes.first().into_iter();
         first.flat_map(|mode| mode.joining.iter().chain(&mode.leaving).copied())
     }

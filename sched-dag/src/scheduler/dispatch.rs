@@ -114,7 +114,7 @@ impl Scheduler {
             && ready < running
             && let Some(key) = self.ready.pop()
         {
-            // Suspend stands before Start in the list: a driver frees the core before it fills it.
+            // Suspend comes before Start in the list: a driver frees the core before filling it.
             self.preempt(core, running);
             let decision = self.give(core, key);
             self.decisions.push(decision);
@@ -186,9 +186,9 @@ pub enum Unwritten {
 
 impl Scheduler {
     /// Takes note that the instance last given to `core` has finished at `now_ns`, and gives the
-    /// core the first instance in line if nothing else is to be decided. A time earlier than a
-    /// previous time counts as the previous time. Also returns the events left for the caller to
-    /// record, before the start.
+    /// core the first instance in line if nothing else is to be decided. A time before the latest
+    /// instant counts as that instant. Also returns the events left for the caller to record,
+    /// before the start.
     ///
     /// # Panics
     ///

@@ -193,11 +193,11 @@ impl ListTable {
         self.end(core, vertex);
     }
 
-    /// Returns the list of a core, and the vertex of the next entry, if the next entry is linked to
-    /// the ending innermost entry.
+    /// Returns the list of a core, and the vertex of the next entry, if that entry is linked to the
+    /// innermost, which is ending.
     ///
-    /// The depths prove that the innermost entry is the entry before: otherwise the innermost entry
-    /// would have been in the way of the entry before.
+    /// The depths prove that the innermost entry is the entry before: any other would have been in
+    /// the way of the entry before.
     #[inline(always)]
     fn linked(&mut self, core: CoreId) -> Option<(&mut ListState, u32)> {
         let list = self.lists.get_mut(core.index())?;

@@ -31,7 +31,7 @@
 //!
 //! The scheduler does not know execution times: a subtask that never returns keeps its core (or,
 //! preempted, its place in line). The scheduler does not measure, but trusts the driver's times; a
-//! time earlier than a previous time counts as the previous time.
+//! time before the latest instant counts as that instant.
 
 mod bits;
 mod dispatch;
@@ -202,8 +202,7 @@ impl Scheduler {
         }
     }
 
-    /// Begins the instant `now_ns`. A time earlier than a previous time counts as the previous
-    /// time.
+    /// Begins the instant `now_ns`. A time before the latest instant counts as that instant.
     #[inline]
     pub fn at(&mut self, now_ns: u64) -> Moment<'_> {
         self.log.now_ns = self.log.now_ns.max(now_ns);

@@ -82,8 +82,8 @@
 //!
 //! - **D1, which faults.** A fault in job k is survived if the DAG says so and is not ended, the
 //!   driver has another function for the subtask, fewer than A faults were survived before, and the
-//!   N-th survived fault before this fault was in job k - W or earlier, or does not exist. (N
-//!   faults in a window of W jobs, A in all.) Any other fault ends the DAG (E1 to E8).
+//!   N-th survived fault before this one was in job k - W or earlier, or does not exist. (N faults
+//!   in a window of W jobs, A in all.) Any other fault ends the DAG (E1 to E8).
 //! - **D2, the instance.** The failing instance ends as in E1. The subtask's next instance may
 //!   start at that instant.
 //! - **D3, its job.** Unless it is cut already, the job is cut: ready instances are cancelled at

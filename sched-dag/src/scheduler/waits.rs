@@ -118,8 +118,8 @@ impl Scheduler {
     /// Begins the wait of the instance `core` was given last, whose turn has ended at `now_ns`, and
     /// gives the core the first instance in line. Returns `None`, with nothing changed, if more is
     /// to be decided at this instant (the module `dispatch` explains the conditions): then the
-    /// driver ends the turn, and the instant, the usual way. A time earlier than a previous time
-    /// counts as the previous time.
+    /// driver ends the turn, and the instant, the usual way. A time before the latest instant
+    /// counts as that instant.
     ///
     /// If the wait is of no time and the instance is the first in line, the core goes on with the
     /// instance, and neither the wait nor its end is recorded. No answer may come at this instant.

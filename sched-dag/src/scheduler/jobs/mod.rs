@@ -159,7 +159,7 @@ impl JobTable {
     /// Returns the job that a signal is for, or for which a signal is kept.
     #[inline]
     pub(super) fn signal_job(&self) -> u64 {
-        // A waiting sporadic job is the job before `next_due`, and stands for the kept signal.
+        // A waiting sporadic job is the job before `next_due`, and represents the kept signal.
         self.next_due - self.waiting().min(1)
     }
 
