@@ -27,7 +27,7 @@ pub trait DagKey {
     ///
     /// # Panics
     ///
-    /// If there is no such DAG, a mistake of the caller.
+    /// If there is no such DAG, which is a mistake of the caller.
     fn find_in(&self, task_set: &TaskSet) -> DagId;
 }
 
@@ -39,7 +39,7 @@ pub trait SubtaskKey {
     ///
     /// # Panics
     ///
-    /// If there is no such subtask, a mistake of the caller.
+    /// If there is no such subtask, which is a mistake of the caller.
     fn find_in(&self, dag: &Dag) -> SubtaskId;
 }
 

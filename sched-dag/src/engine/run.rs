@@ -283,8 +283,8 @@ impl Run {
     }
 
     /// Returns every breach of the model's rules R1 to R4, of the order of each instance's events,
-    /// and of one instance at a time on each core. Durations are never breaches, because the
-    /// machine decides them.
+    /// and of the limit of one instance at a time on each core. Durations are never breaches,
+    /// because the machine decides them.
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         self.judge(&mut |_| ()).into_iter()
     }

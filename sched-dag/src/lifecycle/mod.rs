@@ -1,8 +1,8 @@
 //! Requests of functions to the run as a whole, and how the run carries them out.
 //!
 //! Besides passing values, a function may ask for other effects: that a sporadic DAG gets a signal,
-//! that a DAG pauses or resumes, that another set of DAGs runs (M1 to M7, in `modes`), or that the run
-//! ends. Like every effect of a function, a *request* takes effect with the completion of its
+//! that a DAG pauses or resumes, that another set of DAGs runs (M1 to M7, in `modes`), or that the
+//! run ends. Like every effect of a function, a *request* takes effect with the completion of its
 //! instance (R3), never before. The scenarios of the rules, in `tests/scenarios/lifecycle.txt`,
 //! bear their numbers:
 //!
@@ -64,7 +64,7 @@ pub trait Lifecycle: fmt::Debug + Send {
     /// Leaves a DAG alone from now on (L6).
     fn leave_alone(&mut self, dag: DagId);
 
-    /// Returns the DAGs that are in some mode.
+    /// Returns the DAGs of all modes.
     fn dags_of_modes(&self) -> Vec<DagId>;
 
     /// Returns the lifecycle of one cluster, before the run. The part serves requests about the

@@ -1,13 +1,13 @@
 //! Modes: sets of DAGs, run one set at a time.
 //!
 //! A *mode* is a set of DAGs that run together, such as the DAGs of a flight, or of a landing. A
-//! DAG that belongs to some mode is *on* in its modes and off, meaning paused, in the others. A DAG
-//! without a mode runs in all. The scenarios of the rules, in `tests/scenarios/modes.txt`, bear
-//! their numbers (M7 has its test in `tests/it/modes.rs`):
+//! DAG of some mode is *on* in its modes and off, meaning paused, in the others. A DAG without a
+//! mode runs in all. The scenarios of the rules, in `tests/scenarios/modes.txt`, bear their numbers
+//! (M7 has its test in `tests/it/modes.rs`):
 //!
 //! - **M1, what is on.** A run begins in mode 0. When a mode is entered, its DAGs are resumed, and
-//!   all DAGs that are only in other modes are paused (P1 to P5). DAGs that are on in both the old
-//!   and the new mode notice nothing.
+//!   all DAGs only in other modes are paused (P1 to P5). DAGs that are on in both the old and the
+//!   new mode notice nothing.
 //! - **M2, at once.** The mode is entered at the instant of the request. Jobs in flight of leaving
 //!   DAGs go on to their ends, next to the jobs of joining DAGs.
 //! - **M3, when idle.** The leaving DAGs are paused at the request. The mode is entered at the
@@ -23,8 +23,8 @@
 //! - **M7, replays.** A DAG with recorded inputs is neither paused nor resumed, and no mode waits
 //!   for the DAG (L6).
 //!
-//! A change of mode costs a pause or a resumption of each DAG that is in some mode, in one step of
-//! the scheduler. While a change waits, each step looks at the leaving DAGs.
+//! A change of mode costs a pause or a resumption of each DAG of some mode, in a single step of the
+//! scheduler. While a change waits, each step looks at the leaving DAGs.
 
 use alloc::vec::Vec;
 
@@ -69,7 +69,7 @@ impl ModeTable {
         self.modes.len()
     }
 
-    /// Returns the DAGs that are in some mode.
+    /// Returns the DAGs of all modes.
     pub(super) fn dags(&self) -> impl Iterator<Item = DagId> {
         // Each DAG of a mode is in the first one, or leaves when that is entered.
         let first = self.modes.first().into_iter();
