@@ -9,8 +9,8 @@ use crate::List;
 /// The most ranges kept.
 pub const MAX_REGIONS: usize = 128;
 
-/// The end of memory usable by the kernel: from 512 GiB on, it maps memory at addresses other than
-/// the physical ones.
+/// The end of memory usable by the kernel: from 512 GiB on, a virtual address no longer equals the
+/// physical address behind it.
 pub const MEMORY_END: u64 = 1 << 39;
 
 /// A range of physical memory of a single kind.

@@ -1,9 +1,9 @@
 //! Information of a Multiboot2 loader: a list of tags, as given by GRUB under BIOS and UEFI.
 //!
 //! The layout is that of the Multiboot2 specification 2.0, 3.6. The loader's list lies in memory
-//! that counts as free, so everything needed is copied here. Only of the ACPI root pointer, a copy
-//! of which lies in a tag, the place alone is kept. Unknown tags are passed over. Of a truncated
-//! list, the tags before the cut count.
+//! that counts as free, so everything needed is copied here. A tag may hold a copy of the ACPI root
+//! pointer: of that copy only the place is kept. Unknown tags are passed over. Of a truncated list,
+//! the tags before the cut count.
 
 use crate::physical::PhysicalMemory;
 use crate::{BootInfo, Framebuffer};

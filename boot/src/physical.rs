@@ -38,7 +38,7 @@ impl LowMemory {
     ///
     /// 1. The boot page table is in use for as long as the value, a copy of it, or a slice obtained
     ///    from it is.
-    /// 2. Nothing writes to the memory read in the meantime.
+    /// 2. Meanwhile nothing writes to the memory read through the value.
     pub const unsafe fn new() -> Self {
         Self(())
     }

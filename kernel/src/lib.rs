@@ -32,8 +32,9 @@
 //! 3. **After commit nothing allocates**: all memory needed from a job's release to its completion
 //!    exists already.
 //! 4. **A core without work halts**, and is woken by a core with work for it.
-//! 5. **`unsafe` is confined** to the executive's `machine`, `memory` and `devices`, and to `entry`
-//!    and `start`. Each block names the invariant it relies on. A driver has a single such step.
+//! 5. **`unsafe` is confined** to the executive's `machine`, `memory`, `devices` and loans of
+//!    `run`, and to `entry` and `start`. Each block names the invariant it relies on. A driver has
+//!    a single such step.
 //! 6. **Apps are not trusted**: their statements are verified at commit, and nothing here lets an
 //!    app change a core's interrupts:
 //!

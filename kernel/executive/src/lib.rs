@@ -47,10 +47,15 @@
 //!  ...::playing    still to arrive on a wire
 //! ```
 //!
+//! Finer than the drawing: a commit whose record goes to the console takes BUFFER inside EDGE. EDGE
+//! is also taken by an instance reading a recorded clock, and by a contained fault. WAITING is
+//! taken by every contained fault, the end of a panicking instance included. An instance may call a
+//! commit, which takes `Kernel::terms`, EDGE and `execution[0]` before it is refused.
+//!
 //! Each lock is a [`SpinLock`](machine::spinlock::SpinLock), whose guard masks interrupts on its
 //! core: a handler never waits for the code it has interrupted. A kernel panic, a non-maskable
-//! interrupt and a machine check only try a lock. Letters between clusters, and the fields of a
-//! [`Core`](machine::this_core::Core), are atomics. An app's own lock
+//! interrupt and a machine check only try a lock. Letters between clusters, and the changing fields
+//! of a [`Core`](machine::this_core::Core), are atomics. An app's own lock
 //! ([`section`](machine::section)) leaves interrupts enabled; inside a section the app may print or
 //! allocate, but no lock of the table is held around a section.
 

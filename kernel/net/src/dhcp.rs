@@ -53,8 +53,7 @@ pub struct Client {
     state: State,
     /// The time at which the next message is due.
     due_ns: u64,
-    /// The time from the next message to the one after it, if nobody answers. It doubles up to 64
-    /// s.
+    /// The time from the next message to the one after it, if nobody answers; doubles up to 64 s.
     patience_ns: u64,
 }
 

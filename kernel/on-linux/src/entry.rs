@@ -20,7 +20,7 @@
 //! - `replay=FILE`: the run replays this recording.
 //! - `from=DAG/JOB`: the replay begins with that job, or with the last job before it whose states
 //!   are all recorded. Default: all jobs.
-//! - `limit_ms=N`: Linux ends the program when a thread has run at a real-time level for so long
+//! - `limit_ms=N`: Linux ends the program when a thread has run at a real-time level for N ms
 //!   without waiting; 0: never. Default: 0.
 //!
 //! In addition, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean

@@ -10,7 +10,7 @@
 //! Once the cores are idle, two more DAGs are released close to a DAG whose jobs all end in an
 //! exception, in each job at a different moment. These faults are not reported.
 //!
-//! The more instances become ready at once, the longer is the step. An app with more of them is
+//! The more instances become ready at once, the longer the step takes. An app with more of them is
 //! charged by their number (`Overheads::ready_ns`).
 
 use alloc::format;

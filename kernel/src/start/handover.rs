@@ -1,8 +1,8 @@
 //! The way from the handover by `boot` to the app's function, and the machine's end.
 //!
 //! Prints the `boot` line, a description of the machine, and warns of hardware that harms real
-//! time. Under a hypervisor, which hides the processor's statements about itself, the line alone
-//! reports them.
+//! time. Under a hypervisor, which hides the processor's statements about itself, a missing
+//! statement is no reason to warn, and shows in the line alone.
 
 use alloc::borrow::Cow;
 use alloc::format;

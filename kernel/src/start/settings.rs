@@ -13,8 +13,8 @@
 //!   Default: 0.
 //! - `events=off|on`: without `keep`, sends commits, events and times after each run. Default:
 //!   `off`.
-//! - `latest=N`: without both, and with a debug port, keeps the inputs of each DAG's last N jobs,
-//!   64 at most, and sends them after a fault; 0: keeps none. Default: 16.
+//! - `latest=N`: without `keep` and `events`, and with a debug port, keeps the inputs of each DAG's
+//!   last N jobs, 64 at most, and sends them after a fault; 0: keeps none. Default: 16.
 //! - `replay=N`: the next N bytes of the loader's module are a recording to be replayed. Default:
 //!   0.
 //! - `from=DAG/JOB`: the replay begins with that job, or with the last job before it whose states
@@ -33,8 +33,8 @@
 //!   kernel (`on`); `echo` also sends back typed bytes. Default: `off`.
 //! - `status=N`: the seconds between two status lines of a run; 0: none. Default: 0.
 //! - `mode=...`: the host's name for the meaning of time. `deterministic`: timers settle and
-//!   computing cores take turns, see `machine::counted_time` and `turns`. `threads`: no bound is
-//!   judged.
+//!   computing cores take time slices, see `machine::counted_time` and `machine::time_slice`.
+//!   `threads`: no bound is judged.
 //! - `probe=off|on`: whether the image runs no app and only tests its machine, see `probe`.
 //!   Default: `off`.
 //! - `end=halt|off|reset`: the machine's action after the verdict, if no host ends it; takes effect

@@ -11,7 +11,7 @@ use super::registers::Registers;
 const FUNCTION: u64 = 4096;
 const BUS: u64 = 256 * FUNCTION;
 
-/// The start of the space by the firmware's tables; 0 if there is none.
+/// The start of the space according to the firmware's tables; 0 if there is none.
 static PLACE: AtomicU64 = AtomicU64::new(0);
 
 static ECAM: SetOnce<Ecam> = SetOnce::new();
@@ -68,7 +68,7 @@ pub fn configuration() -> Result<&'static Ecam, EcamError> {
 pub struct Ecam(Registers);
 
 impl Ecam {
-    /// Maps the space starting at an address with bus 0; `None` if the place belongs to something
+    /// Maps the space whose bus 0 starts at an address; `None` if the place belongs to something
     /// else.
     pub fn new(start: u64) -> Option<Self> {
         let end = start.checked_add(BUSES as u64 * BUS)?;

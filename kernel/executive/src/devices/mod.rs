@@ -6,7 +6,7 @@
 //! The image of an app without a driver contains none of this code.
 //!
 //! The compiler cannot judge one step: letting a device reach memory, as the device writes wherever
-//! told. [`enable_reach`](pci::Function::enable_reach) is therefore the only unsafe call of a
+//! it is told. [`enable_reach`](pci::Function::enable_reach) is therefore the only unsafe call of a
 //! driver.
 
 pub mod dma;

@@ -28,7 +28,7 @@ impl core::fmt::Display for Place {
 /// The most buses searched.
 pub const BUSES: usize = 8;
 
-/// The most capabilities: 192 bytes, by 4 bytes each.
+/// The most capabilities that fit into the 192 bytes reserved for them, with 4 bytes each.
 const CAPABILITIES: usize = 48;
 
 /// The largest range of registers to be mapped, in bytes.
@@ -63,7 +63,7 @@ pub enum PciError {
     Taken(u8),
     /// The function may reach memory: it has a driver, or the firmware has left it so.
     Driven,
-    /// The function sends no messages by MSI-X or MSI, or not so many.
+    /// The function sends no messages, neither by MSI-X nor by MSI, or not so many.
     NoMessages,
     /// The function's table of messages is outside its range, or too short.
     MalformedTable,
@@ -204,9 +204,9 @@ impl<'c> Function<'c> {
     ///
     /// # Safety
     ///
-    /// The device writes wherever told. The driver therefore tells the device only addresses of
-    /// [`DmaMemory`](super::dma::DmaMemory), and of memory owned by the driver and left alone until
-    /// the device has finished, each with a length within that memory.
+    /// The device writes wherever it is told. The driver therefore tells the device only addresses
+    /// of [`DmaMemory`](super::dma::DmaMemory), and of memory owned by the driver and left alone
+    /// until the device has finished, each with a length within that memory.
     pub unsafe fn enable_reach(&self) {
         self.command(command::MEMORY | command::MASTER | command::NO_LINE);
     }
@@ -292,7 +292,7 @@ impl<'c> Function<'c> {
         }
         let data = if is_wide { at + 12 } else { at + 8 };
         self.write(data, self.read(data) & !0xffff | u32::from(message.data));
-        // On, with one message of the possible ones.
+        // On, with a single message out of those the function could send.
         self.write(at, control & !(7 << 20) | 1 << 16);
         Ok(None)
     }

@@ -2,8 +2,8 @@
 //!
 //! A *stamp* is the latest reading of any core's counter. A core that sees a stamp, then reads its
 //! own counter and finds a smaller value, is *behind*: no order of events could explain the
-//! difference. A counter's lead looks the same as the time a stamp takes from core to core, but
-//! then all other counters are behind.
+//! difference. A counter that is ahead cannot be recognized, because its lead looks the same as the
+//! time a stamp takes from core to core; but then all other counters are behind.
 
 use core::fmt::{self, Display};
 use core::sync::atomic::{AtomicU64, Ordering};

@@ -7,7 +7,7 @@
 //! processor knows whether upper halves are in use, and does not write unused ones.
 //!
 //! **Avx invariant**: the instructions were exchanged if and only if [`IS_ON`] is set, before any
-//! core takes interrupts, and each core learns of AVX before taking interrupts.
+//! core takes interrupts, and AVX is enabled on each core before that core takes interrupts.
 
 use core::arch::asm;
 use core::arch::x86_64::{__cpuid, __cpuid_count};
@@ -63,7 +63,8 @@ fn is_there() -> bool {
     has_xsaveopt && (halves.eax + halves.ebx) as usize == VECTOR_BYTES
 }
 
-/// Enables AVX on the calling processor, if AVX is on. The processor takes no interrupts yet.
+/// Enables AVX on the calling processor, if the kernel has turned AVX on. The processor takes no
+/// interrupts yet.
 pub(super) fn enable() {
     if !is_on() {
         return;

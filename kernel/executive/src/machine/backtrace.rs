@@ -2,9 +2,9 @@
 //!
 //! Code is compiled without frame pointers, and images have no unwind tables, to save time and
 //! room. The stack is therefore read word by word: any code address right after a call instruction
-//! counts as a return address. Some of these words are left over from calls already finished, for
-//! functions do not write to all of their frame. Each call therefore comes with its callee, if the
-//! instruction names it: the host knows where functions begin, and follows the chain.
+//! counts as a return address. Some of these words are left over from calls already finished,
+//! because functions do not write to all of their frame. Each call therefore comes with its callee,
+//! if the instruction names it: the host knows where functions begin, and follows the chain.
 
 use boot_entry::image;
 

@@ -221,8 +221,8 @@ impl KnownClock {
     ///
     /// # Safety
     ///
-    /// `platform` repeats the machine's tables, and its registers are mapped uncached and writable
-    /// at their addresses.
+    /// `platform` holds what the machine's tables say, and its registers are mapped uncached and
+    /// writable at their addresses.
     pub unsafe fn all(platform: &Platform) -> [Option<Self>; 4] {
         const TCG: [u8; 12] = *b"TCGTCGTCGTCG";
         const KVM: [u8; 12] = *b"KVMKVMKVM\0\0\0";

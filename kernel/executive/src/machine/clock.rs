@@ -3,8 +3,9 @@
 //! The boot measures the rates of the counter and of the local APIC's timer
 //! ([`calibration`](super::calibration)).
 //!
-//! Starting cores compare their counters ([`agreement`](super::agreement)). Assumed, not checked:
-//! the counters' rate is constant, as on every processor with an invariant counter and under QEMU.
+//! The cores compare their counters as they start ([`agreement`](super::agreement)). Assumed, not
+//! checked: the counters' rate is constant, as on every processor with an invariant counter and
+//! under QEMU.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 

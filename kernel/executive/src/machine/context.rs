@@ -124,7 +124,7 @@ pub struct Context {
     suspended_at_ns: AtomicU64,
     suspended_ns: AtomicU64,
     /// When the execution of the context's instance reaches its budget, in nanoseconds on the
-    /// clock, if not suspended until then.
+    /// clock, if not suspended again before.
     budget_end_ns: AtomicU64,
     /// Whether the context's instance has been found at fault.
     is_at_fault: AtomicBool,
@@ -139,7 +139,8 @@ pub(super) struct SectionNote {
     pub(super) lock: AtomicPtr<LockWords>,
     /// The core where the context waits, counted from 1; 0 if the context does not wait.
     pub(super) waits_on: AtomicU32,
-    /// When a preemption was first postponed, in nanoseconds on the clock; 0 if never.
+    /// When the present section first postponed a preemption, in nanoseconds on the clock; 0 if it
+    /// has postponed none.
     pub(super) put_off_ns: AtomicU64,
 }
 

@@ -1,14 +1,14 @@
 //! Counted time under QEMU, made repeatable to the nanosecond.
 //!
 //! With `-icount shift=0,sleep=off` an instruction takes a nanosecond, and when all cores halt QEMU
-//! advances the clock to the next timer's end. A different QEMU thread makes that jump than
-//! executes instructions: the main loop (`main_loop_wait` calls `icount_start_warp_timer`), which
-//! is also awake for no reason after each timer that has fired. The main loop accepts the halt of
-//! the last core as soon as `hlt` has set its flag, but the instructions up to and including `hlt`
-//! are counted only at the end of the core's turn (`icount_process_data`). If the main loop looks
-//! in between, it jumps to the timer's end, and those few instructions are added on top: the
-//! interrupt comes some 9 ns late. The order of the two depends on the host, some 1 halt in 100,000
-//! goes the other way, and everything afterwards is shifted.
+//! advances the clock to the next timer's end. QEMU makes that jump in its main loop
+//! (`main_loop_wait` calls `icount_start_warp_timer`), and executes instructions in another thread.
+//! The main loop is also awake for no reason after each timer that has fired. The main loop accepts
+//! the halt of the last core as soon as `hlt` has set its flag, but the instructions up to and
+//! including `hlt` are counted only at the end of the core's turn (`icount_process_data`). If the
+//! main loop looks in between, it jumps to the timer's end, and those few instructions are added on
+//! top: the interrupt comes some 9 ns late. The order of the two depends on the host, some 1 halt
+//! in 100,000 goes the other way, and everything afterwards is shifted.
 //!
 //! Interrupts late by less than [`GRACE_NS`] can be made equally late: a timer's interrupt, before
 //! any other action or look, waits until exactly that long after its time ([`settle`]). As a loop
@@ -22,17 +22,17 @@
 //! the halted cores behind the last core (`rr_cpu_thread_fn`), QEMU continues right there, and
 //! other cores than usual have that mark left when the timer's core gets its turn. The mark matters
 //! if another timer ends in the next few microseconds: QEMU then looks for due timers before a
-//! marked core's turn, but within an unmarked core's turn, which has no instruction left for the
-//! timer and is lost (`icount_prepare_for_run`). The order of turns would thus depend on the host.
-//! A core whose timer has fired therefore passes its turn once, by a `pause`; at its next turn QEMU
-//! has passed all cores, and no mark is left ([`settle`]).
+//! marked core's turn, but within an unmarked core's turn, which then has no instruction left for
+//! the core and is lost (`icount_prepare_for_run`). The order of turns would thus depend on the
+//! host. A core whose timer has fired therefore passes its turn once, by a `pause`; at its next
+//! turn QEMU has passed all cores, and no mark is left ([`settle`]).
 //!
 //! All of this is off unless [`enable`] is called, and useless where an instruction does not take a
 //! nanosecond. Where a timer's interrupt waits for its turn because other cores compute, not all
 //! cores had halted, and the clock has not jumped: nothing is done then. One effect remains: of two
 //! cores whose timers end at the same time, or within some 100 ns, the first is the core QEMU
 //! continues with, and that is the host's choice in the rare cases above. Several cores should
-//! therefore not wait for one time.
+//! therefore not wait for the same time.
 
 use core::arch::asm;
 use core::sync::atomic::{AtomicBool, Ordering};

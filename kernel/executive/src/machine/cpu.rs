@@ -86,7 +86,7 @@ pub fn halt_forever() -> ! {
     }
 }
 
-/// Tells the processor about a waiting loop.
+/// Tells the processor that the caller waits in a loop.
 ///
 /// Under QEMU's instruction counting this also passes the turn to the next processor, so a waiting
 /// loop without the call would starve the others.

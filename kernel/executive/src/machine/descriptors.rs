@@ -141,7 +141,8 @@ pub(crate) fn load_interrupts(stubs: u64) {
     unsafe { asm!("lidt [{}]", in(reg) &pointer) };
 }
 
-/// Builds an interrupt gate to `address`, with interrupts still disabled (Intel SDM 3, 6.14.1).
+/// Builds an interrupt gate to `address`: the code there starts with interrupts disabled (Intel SDM
+/// 3, 6.14.1).
 const fn gate(address: u64, vector: usize) -> [u64; 2] {
     let stack = match vector {
         2 => InterruptStack::NonMaskable,

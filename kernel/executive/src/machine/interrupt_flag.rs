@@ -62,7 +62,7 @@ pub fn restore(were_enabled: bool) {
 }
 
 /// Enables interrupts and halts until one has been handled; leaves them enabled. If cores stay
-/// awake, may return at once, as from an interrupt without effect.
+/// awake, the function may return at once, as after an interrupt without effect.
 ///
 /// To be called with interrupts disabled: no interrupt already checked for by the caller can then
 /// leave the processor halted with work to do.

@@ -1,7 +1,7 @@
 //! Measures how long interrupts stay disabled at a stretch.
 //!
 //! While interrupts are disabled, no decision of the scheduler can take effect on that core; every
-//! latency therefore includes up to the longest such section. Measured on request
+//! latency therefore includes up to the longest such section. The kernel measures on request only
 //! (`measure=interrupts`): the two readings of the clock cost more than many of the measured
 //! sections.
 //!

@@ -60,9 +60,10 @@ impl CoreMeter {
 /// ```
 ///
 /// 1. `time_slice::come`: an interrupt handler has chosen a new worker for the core.
-/// 2. `time_slice::join`, called by `time_slice::enter` before a function begins.
-/// 3. `time_slice::join`: as 2, where no interrupt came before, or to continue a suspended
-///    instance.
+/// 2. `time_slice::join`: the new worker is about to call a function (`time_slice::enter`), or to
+///    continue a suspended instance.
+/// 3. `time_slice::join`: as 2, by a worker that no interrupt has chosen; or an interrupt continues
+///    a suspended instance; or the instance goes on after a halt or a watch of the clock.
 /// 4. `time_slice::wait`, the first slice, once no core has the slice and none is urgent: a short
 ///    slice if other cores are fresh, too.
 /// 5. `time_slice::pass`, at the end of an interrupt after the slice's alarm has fired.
@@ -70,15 +71,15 @@ impl CoreMeter {
 /// 7. `time_slice::leave` as the instance halts, watches the clock or is preempted;
 ///    `time_slice::rest` as the core has nothing to compute.
 ///
-/// A core keeps its part from one instance to the next, also after a fault. No part returns to
-/// Fresh but through None. If a core takes over the slice of a silent core, both parts are Computes
-/// for a while.
+/// A core keeps its part from one instance to the next, also after a fault. A part returns to Fresh
+/// only through None. If a core takes over the slice of a silent core (4, 6), both parts are
+/// Computes for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum TimeSlicePart {
     /// The core takes no part.
     None,
-    /// The core has got an instance in an interrupt, and is about to start the instance.
+    /// An interrupt has given the core an instance, which the core is about to start.
     Comes,
     /// The core waits for its first slice.
     Fresh,

@@ -13,9 +13,9 @@
 //! - A core without the slice waits, in the interrupt's handler or before calling a function: the
 //!   core executes a `pause` at every visit. An interrupt does not wait: the core handles the
 //!   interrupt at once, and resumes waiting.
-//! - A core with a new instance to compute is *fresh*, and goes before cores that have already had
-//!   a slice. If other cores are fresh, too, the first slice is a short one ([`FIRST_SLICE_NS`]):
-//!   short functions need not wait for long functions.
+//! - A core that has just got something to compute, after computing nothing, is *fresh*, and goes
+//!   before cores that have already had a slice. If other cores are fresh, too, the first slice is
+//!   a short one ([`FIRST_SLICE_NS`]): short functions need not wait for long functions.
 //! - No slice begins while any core handles an interrupt or wakes others.
 //! - A core with the slice that takes no interrupts keeps the slice for some milliseconds only.
 //!
@@ -60,13 +60,13 @@ static IS_ENABLED: AtomicBool = AtomicBool::new(false);
 /// No core.
 const NONE: u32 = u32::MAX;
 
-/// The core with the slice.
+/// The core with the slice, or [`NONE`].
 static SLICE_HOLDER: AtomicU32 = AtomicU32::new(NONE);
 
-/// The core with the next slice, if still waiting and no core is fresh.
+/// The core to get the next slice, if it still waits then and no core is fresh; or [`NONE`].
 static NEXT: AtomicU32 = AtomicU32::new(NONE);
 
-/// The number of cores fresh, or about to be.
+/// The number of cores that are fresh, or about to be.
 static FRESH: AtomicU32 = AtomicU32::new(0);
 
 /// The number of cores handling an interrupt, or waking others.
@@ -99,8 +99,8 @@ pub fn end_urgent() {
     }
 }
 
-/// Notes in an interrupt that this core continues with an instance afterwards. Until then no slice
-/// of another core begins, so the instance need not wait for such a slice.
+/// Notes in an interrupt that this core continues with an instance afterwards. Until then no core
+/// that has already had a slice begins another one, which the instance would have to wait for.
 #[inline]
 pub fn come(core: &Core) {
     if is_enabled() && core.part() == TimeSlicePart::None {
@@ -150,7 +150,7 @@ fn keep_giving_way(core: &Core) {
     }
 }
 
-/// Gives all other cores a visit, during work for people that may have interrupts disabled.
+/// Gives all other cores a visit. Called during work for people, possibly with interrupts disabled.
 pub fn look_up() {
     if is_enabled() {
         cpu::relax();

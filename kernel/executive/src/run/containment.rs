@@ -94,7 +94,7 @@ static WAITING: SpinLock<NoteQueue> = SpinLock::new(NoteQueue {
     left_out: 0,
 });
 
-/// Whether any note waits: makes the usual question cheap.
+/// Whether any note waits, so that a look at an empty queue is cheap.
 static HAS_WAITING: AtomicBool = AtomicBool::new(false);
 
 /// Ends the panicking instance, if a subtask panics; otherwise returns.
@@ -136,7 +136,7 @@ fn keep_panic(
     interrupt_flag::enable();
 }
 
-/// Ends this core's instance, found at fault before and now asking for its own end.
+/// Ends this core's instance at its own request, if it was found at fault before.
 pub fn end_at_fault(interrupted: &mut Interrupted) {
     let core = this_core::get();
     if core.context().is_at_fault()

@@ -2,10 +2,10 @@
 //!
 //! A preempted instance keeps its context, stack included. At any time a core runs one context and
 //! keeps at most one spare, and each subtask has at most one suspended instance: twice the number
-//! of cores plus the number of subtasks is therefore enough. A commit creates so many contexts;
-//! nothing creates more later. When a fault ends a core's instance, the core takes another context
-//! for a moment, then gives the first back. Contexts are never freed; the next commit uses them
-//! again.
+//! of cores plus the number of subtasks is therefore enough. A commit creates that many contexts,
+//! and a run creates none. When a fault ends a core's instance, the core has two contexts for a
+//! moment: it takes another one, then gives the first back. Contexts are never freed; the next
+//! commit uses them again.
 //!
 //! All stacks have the largest size stated in the first commit, since any context may run any
 //! subtask. The cores' first contexts have room to grow to that size.

@@ -18,24 +18,26 @@
 //! 1. A core begins with its first context, or an interrupt handler exchanges contexts and restarts
 //!    a free context ([`contexts::new_worker`](super::contexts::new_worker)); [`work`] looks for an
 //!    instance.
-//! 2. `find_work` or `complete` returned [`CoreWork::Run`]: an instance starts, or proceeds after a
-//!    wait. A waiting instance has no context.
+//! 2. [`execution::find_work`] or [`execution::complete`] returned [`CoreWork::Run`]: an instance
+//!    starts, or proceeds after a wait. A waiting instance has no context. With time slices, the
+//!    context may wait for its slice first, with interrupts enabled.
 //! 3. The subtask's function returned, and [`execution::complete`] looks for the next work.
 //! 4. The scheduler has no work for the core ([`CoreWork::Rest`]); never on core 0 during a run,
 //!    whose parked background continues instead (8).
 //! 5. `Core::wake` is set, by another core's `wake_up` or by the core's own interrupt.
 //! 6. An interrupt on the core preempts the instance (`ClusterRun::follow`), unless a section of an
 //!    app's lock postpones the preemption.
-//! 7. A core of the cluster continues the context: in an interrupt (`follow`), or as another worker
-//!    returns [`CoreWork::Continue`].
+//! 7. A core of the cluster continues the context: in an interrupt (`follow`), or after the core's
+//!    own worker has found [`CoreWork::Continue`] (8).
 //! 8. The scheduler has a suspended context or the background for the core
-//!    ([`CoreWork::Continue`]). The worker's context becomes the core's spare, or returns to the
-//!    stock.
-//! 9. A contained fault ends the instance ([`containment`](super::containment)).
+//!    ([`CoreWork::Continue`]). The worker's context becomes the core's spare, and an earlier spare
+//!    returns to the stock: in the drawing, spare contexts are part of the stock.
+//! 9. A contained fault ends the instance ([`containment`](super::containment)), and the core
+//!    continues with another context (1).
 //!
-//! Impossible: looking to suspended, as interrupts are disabled; resting to suspended, as an
-//! interrupt only wakes a resting worker; and leaving the states by an error: a fault outside any
-//! instance ends the run.
+//! Impossible: looking to suspended, because a looking core has no instance to suspend; resting to
+//! suspended, because an interrupt only wakes a resting worker; and leaving the states by an error:
+//! a fault outside any instance ends the run.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -92,8 +94,8 @@ pub fn watch_when_idle() {
 
 static WATCHES: AtomicBool = AtomicBool::new(false);
 
-/// Sends waiting text, and halts between bytes, until this core shall look for work. Interrupts are
-/// disabled before and after.
+/// Sends waiting text, or else halts, until this core is to look for work. Interrupts are disabled
+/// before and after.
 fn rest(core: &Core) {
     // A time-keeping core must hear of earlier events and of letters by an interrupt: no watching.
     if WATCHES.load(Ordering::Relaxed) && !execution::keeps_time(core) {

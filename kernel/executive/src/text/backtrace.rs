@@ -5,7 +5,7 @@ use core::fmt;
 use crate::machine::backtrace::{self, CallSite};
 use front::json::JsonObject;
 
-/// The most calls of a line, so that the line stays together (`console`).
+/// The most calls in a line, so that the line stays together (`console`).
 const MOST: usize = 24;
 
 /// A copy of the calls on a stack, kept for when the stack holds others.

@@ -1,16 +1,16 @@
 //! Text on the serial line, without disturbing measurements.
 //!
-//! The printing context makes the text outside every lock (`TextPieces`), and copies it in pieces
-//! into a bounded buffer (`OutputRing`); the lock is held for the copy of one piece. Outside a run the
-//! text is sent at once. During a run the text stays in the buffer until an idle core sends it,
+//! The printing context formats the text outside every lock (`TextPieces`), and copies it in pieces
+//! into a bounded buffer (`OutputRing`); the lock is held for the copy of one piece. Outside a run
+//! the text is sent at once. During a run the text stays in the buffer until an idle core sends it,
 //! byte by byte, so that no subtask ever waits for a serial port; excess text is dropped and
 //! counted, never silently. A part of the buffer is reserved for the kernel's own machine lines, so
 //! that an app flooding the port cannot hide a fault.
 //!
 //! Text and machine lines are distinct: only [`front::json`] can print a line beginning with `{`.
 //!
-//! With `console=on` on the command line a person can talk to the kernel during a run;
-//! the shell of `front` does this.
+//! With `console=on` on the command line a person can talk to the kernel during a run, through the
+//! shell of `front`.
 //!
 //! # The last words of a dying kernel, straight to the port
 //!

@@ -12,7 +12,7 @@
 //! Under overload the background may never run again, just when a person most wants to see the run,
 //! and to stop it. So if the background has not run for [`STARVED_NS`], core 0's heartbeat takes
 //! over the slices. It also reports a fault, but only in a run without bounds, because the report
-//! might delay the run beyond a bound. The heartbeat also notices an instance that keeps its core
+//! might delay a job beyond its bound. The heartbeat also notices an instance that keeps its core
 //! for long ([`stall`]).
 //!
 //! # Bytes from the serial port outside a conversation

@@ -82,8 +82,8 @@ impl SeenInstance {
         is_named: false,
     };
 
-    /// Looks at the instance `running` on the core. If the instance has to be named, returns it and
-    /// its time on the core, which then exceeds the result of `least_ns`.
+    /// Looks at the instance `running` on the core. If the instance has to be named, returns the
+    /// instance and its time on the core, which is then no less than the result of `least_ns`.
     fn look(
         &mut self,
         now_ns: u64,

@@ -37,7 +37,7 @@
 //!   large enough. A request can hence fail although a free block less than 1/32 larger than the
 //!   request is left over.
 //!
-//! # No guarantees
+//! # Not guaranteed
 //!
 //! - The allocator does not lock: `&mut self` is the caller's proof of exclusion.
 //! - The allocator does not clear memory, neither when handing memory out nor on return.

@@ -175,8 +175,8 @@ impl ClusterRun {
         Some(self.engine.scheduler.instance_of(vertex))
     }
 
-    /// Makes the interrupted core leave its instance if another is wanted. Returns the seat of the
-    /// core waiting for the suspended instance, if any.
+    /// Makes the interrupted core leave its instance, or its background, if the core is no longer
+    /// to run it. Returns the seat of the core waiting for the suspended instance, if any.
     pub(super) fn follow(&mut self, interrupted: &mut Interrupted, now_ns: u64) -> Option<CoreId> {
         let core = this_core::get();
         let here = seat(core).index();

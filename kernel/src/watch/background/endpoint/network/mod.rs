@@ -9,7 +9,7 @@
 //!
 //! An interrupt takes [`Law::most`] frames. Then the card is masked: the next interrupt comes
 //! [`Law::distance_ns`] later, by an alarm of the same core, and takes as many. Meanwhile the card
-//! drops frames without a buffer, at no cost. So any storm costs that core at most one such
+//! drops the frames it has no buffer for, at no cost. So any storm costs that core at most one such
 //! interrupt in each distance, and bounds are charged for exactly this.
 //!
 //! # Locks
@@ -63,8 +63,8 @@ impl Law {
     ///
     /// The charge is that of the longest interrupt in instructions, each a nanosecond: with its
     /// entry and exit, the release of a DAG, the alarm, and the packet sent by a heartbeat. Packets
-    /// sent by a core behind a completion are charged as a part of the dispatch. Not charged is the
-    /// time cores wait for each other when they need the card at once.
+    /// sent by a core behind a completion are charged as a part of the dispatch. The time that
+    /// cores wait for each other, when they need the card at once, is not charged.
     fn charged(options: &CommandLine<'static>, distance_us: u64) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
         // No longer than a heartbeat, because the heartbeat sends as well.

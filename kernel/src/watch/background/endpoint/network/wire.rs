@@ -28,7 +28,7 @@ pub(super) enum Sent {
     Waits,
 }
 
-/// Passes a packet with room for its headers to `send`. Reports whether it is done with.
+/// Passes a packet with room for its headers to `send`. Reports whether the packet is done with.
 pub(super) fn with_headers(packet: &mut Buffer, send: impl FnOnce(&mut Buffer) -> Sent) -> bool {
     let payload = packet.range();
     packet.set_range(payload.start - HEADERS..payload.end);
