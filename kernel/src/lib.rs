@@ -42,7 +42,7 @@
 //! kernel::set_heartbeat(core::time::Duration::from_nanos(1));
 //! ```
 //!
-//! # Rooms, from top to bottom
+//! # Modules, from top to bottom
 //!
 //! `entry` and `start` bring an image up, `app` offers the kernel's services to apps. `watch`
 //! observes a run, [`devices`] is for drivers, [`report`] describes a finished run, and [`options`]

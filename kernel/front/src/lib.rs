@@ -3,7 +3,7 @@
 //! Lines, command-line options, reports and verdicts are the same on the bare machine and on Linux,
 //! because the code for them exists here, once. An app names `kernel`, never this crate.
 //!
-//! # Rooms, from top to bottom
+//! # Modules, from top to bottom
 //!
 //! `shell` talks with a person during a run, `app` is the app's view of the machine and judges
 //! runs, `report` describes a finished run, `options` reads the command line, `text` makes lines.

@@ -2,8 +2,8 @@
 //! waited for, outside their DAGs.
 //!
 //! The front defines the machine as seen by an app. The app is not trusted: all its statements are
-//! verified before they reach the room `run`. Text, reports and figures for an app are made below,
-//! in `report` and `text`.
+//! verified before they reach the executive's module `run`. Text, reports and figures for an app
+//! are made below, in `report` and `text`.
 
 pub(crate) mod bare_machine;
 mod calibration;

@@ -2,7 +2,7 @@
 //!
 //! `background` is the work of core 0 for people during a run: progress, status, the console, and
 //! reports of instances that keep others waiting. `panic` ends a broken kernel. No job may need a
-//! watcher to end: the room `run` works without watchers, and does not name them.
+//! watcher to end: the executive's module `run` works without watchers, and does not name them.
 
 pub(crate) mod background;
 pub(crate) mod panic;

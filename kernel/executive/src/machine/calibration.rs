@@ -190,7 +190,7 @@ impl<'c> TickCounter<'c> {
 /// A clock that counts up to a number of bits, and then from 0 again.
 #[derive(Clone, Copy, Debug)]
 pub struct KnownClock {
-    /// Its name in the `boot` line and in the word `clock=`.
+    /// Its name in the `boot` line and in the option `clock=`.
     pub name: &'static str,
     /// The time between two counts, in femtoseconds.
     tick_fs: u64,

@@ -10,7 +10,7 @@ use crate::machine::timer::{self, Alarm};
 /// virtual machine with virtual time would stop forever.
 const FIRST_NS: u64 = 1_000_000_000;
 
-/// The same time for core 1, which thereby notices a core 0 without interrupts.
+/// The same time for core 1, whose heartbeat notices a core 0 that takes no interrupts.
 pub const SECOND_NS: u64 = 2_000_000_000;
 
 /// Gives every core a heartbeat each `period_ns`; if 0, gives cores 0 and 1 their ordinary

@@ -2,8 +2,8 @@
 //!
 //! # The verdict on faults, and on response times beyond their proven bounds
 //!
-//! An app fails if it ignores a fault in any of its DAGs, and the verdict says so. An app made for
-//! faults calls `Machine::accept_faults` and judges them itself.
+//! An app fails if it ignores a fault that has ended any of its DAGs, and the verdict says so. An
+//! app made for faults calls `Machine::accept_faults` and judges them itself.
 //!
 //! A bound holds as long as no instance takes longer than its WCET, and the machine no longer than
 //! the overheads stated at commit. A job with a longer response time therefore proves a stated time
