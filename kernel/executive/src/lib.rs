@@ -22,23 +22,25 @@
 //! ```text
 //!  SLICED --+--> execution[0] --> execution[1] --> ... ---+--> EDGE
 //!  WATCH ---+    (several at once: only `divided::rest`)  +--> STOCK
-//!  SLICED --> EDGE           SLICED, WATCH, ProtocolPlace::protocol --> BUFFER
+//!  SLICED --> EDGE     SLICED, WATCH, EDGE, ProtocolPlace::protocol --> BUFFER
 //!  Network::receiver --> ProtocolPlace::protocol --> Network::sender
 //!  (any lock) --> HEAP       (all other locks: no lock inside but HEAP)
 //!
 //!  lock            data                       taken in a thread by      taken in a handler by
 //!  execution[i]    scheduler, journal, bodies find_work, complete,      timer, wake-up, device,
-//!                  and contexts of cluster i  answer, background        contained fault
-//!  STOCK           free contexts              commit, end of `work`     `follow`, contained fault
+//!                  and contexts of cluster i  answer, commit,           contained fault
+//!                                             main, background
+//!  STOCK           free contexts              main, end of `work`       `follow`, contained fault
 //!  EDGE            recorded, replayed values  commit, replayed source,  scheduler's step,
+//!                                             reading of the clock,     contained fault,
 //!                                             completion, background    core 0's heartbeat
 //!  BUFFER          text for the port          print, idle core          core 0's heartbeat
-//!  WAITING         notes of faults            panic, background         exception, spent budget,
+//!  WAITING         notes of faults            panic, background         contained fault,
 //!                                                                       core 0's heartbeat
 //!  HEAP            allocator                  allocation, free          (handlers do not allocate)
 //!  MEMORY          frames, page table         boot, commit, drivers     -
-//!  RECORD, USED,   file of the boot, stack    main, background          -
-//!  Kernel::terms   figures, terms of commits
+//!  RECORD, USED    file of the boot; stacks   main, background          -
+//!  Kernel::terms   terms of commits           main, commit              -
 //!  CLEARING        DAG being dropped          main, after a run         core 0's heartbeat (tries)
 //!  SLICED, WATCH   status, console; progress  core 0's background       core 0's heartbeat (tries)
 //!  Network::...,   card, neighbours; a        background                card, bell, heartbeat
@@ -47,10 +49,8 @@
 //!  ...::playing    still to arrive on a wire
 //! ```
 //!
-//! Finer than the drawing: a commit whose record goes to the console takes BUFFER inside EDGE. EDGE
-//! is also taken by an instance reading a recorded clock, and by a contained fault. WAITING is
-//! taken by every contained fault, the end of a panicking instance included. An instance may call a
-//! commit, which takes `Kernel::terms`, EDGE and `execution[0]` before it is refused.
+//! EDGE is held around BUFFER only at a commit whose record goes to the console. An instance may
+//! call a commit, which takes `Kernel::terms`, EDGE and `execution[0]` before it is refused.
 //!
 //! Each lock is a [`SpinLock`](machine::spinlock::SpinLock), whose guard masks interrupts on its
 //! core: a handler never waits for the code it has interrupted. A kernel panic, a non-maskable
