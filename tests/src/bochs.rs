@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use tool::child::{Child, WaitEnd, bound_to_us};
 use tool::install;
-use tool::medium::StickImage;
+use tool::medium::BootStick;
 use tool::outcome::judge_lines;
 use tool::system::{find_program, host_load, new_log};
 use views::protocol::Transcript;
@@ -41,7 +41,7 @@ pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u6
         install::ensure(&install::BOCHS)?;
         let program = find_program("bochs").ok_or("there is no program `bochs`")?;
         let words = format!("{words} end=off");
-        let iso = StickImage::new(&built(package)?, &words, None)?;
+        let iso = BootStick::new(&built(package)?, &words, None)?;
         if !command.is_empty() {
             put_before(command, iso.path())?;
         }

@@ -315,7 +315,7 @@ impl Guest {
         let outcome = self.boot();
         let verdict = outcome.transcript.verdict().map(|verdict| verdict.status);
         let exit = &outcome.ending;
-        if *exit != tool::qemu::QemuEnd::Guest(status) || verdict != Ok(status) {
+        if *exit != tool::qemu::RunEnd::Guest(status) || verdict != Ok(status) {
             let tail = outcome.tail();
             panic!("wanted the end {status:?}, got: {exit}; verdict {verdict:?}\n{tail}");
         }

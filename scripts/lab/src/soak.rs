@@ -19,7 +19,7 @@ use std::time::Duration;
 use sched_dag::DagId;
 use sched_dag::journal::EventKind;
 
-use tool::options::{Arguments, Command, OptionValue, options};
+use tool::options::{Command, CommandLine, ValueKind, options};
 use tool::outcome::{self, Outcome};
 use tool::progress::{Progress, SILENCE};
 use tool::qemu::{MOST_CORES, Mode, Qemu};
@@ -63,30 +63,30 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 
 options! {
     /// 16 s of guest time instead of 14 minutes; the host takes longer.
-    SHORT: OptionValue::Nothing;
+    SHORT: ValueKind::Nothing;
     /// Processors of the guest.
-    CORES: OptionValue::Number(1, MOST_CORES), or "4";
+    CORES: ValueKind::Number(1, MOST_CORES), or "4";
     /// Jobs of random sets to simulate on the host first, which takes minutes for 10^8.
-    JOBS: OptionValue::Number(1, 1_000_000_000_000);
+    JOBS: ValueKind::Number(1, 1_000_000_000_000);
     /// Frames with wrong bytes to hear, instead of rounds.
-    FRAMES: OptionValue::Number(1, 1_000_000_000_000);
+    FRAMES: ValueKind::Number(1, 1_000_000_000_000);
     /// Messages with wrong bytes to hear, instead of rounds.
-    MESSAGES: OptionValue::Number(1, 1_000_000_000_000);
+    MESSAGES: ValueKind::Number(1, 1_000_000_000_000);
     /// The first round.
-    FIRST: OptionValue::Number(0, 1_000_000), or "0";
+    FIRST: ValueKind::Number(0, 1_000_000), or "0";
     /// How many rounds, that is sets of DAGs; 84, with --short 16.
-    ROUNDS: OptionValue::Number(1, 1_000_000);
+    ROUNDS: ValueKind::Number(1, 1_000_000);
     /// Guest time in which each of the two runs of a round releases jobs; 5000, with --short 500.
-    ROUND_MS: OptionValue::Number(1, 10_000);
+    ROUND_MS: ValueKind::Number(1, 10_000);
     /// Seed of all that is random.
-    SEED: OptionValue::Number(0, u64::MAX), or "1";
+    SEED: ValueKind::Number(0, u64::MAX), or "1";
     /// The meaning of time; see ./scripts/run --help.
-    MODE: OptionValue::OneOf(Mode::NAMES), or "deterministic";
+    MODE: ValueKind::OneOf(Mode::NAMES), or "deterministic";
     /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
     /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).
-    BOUND_US: OptionValue::Number(0, 1_000_000_000);
+    BOUND_US: ValueKind::Number(0, 1_000_000_000);
     /// Guests that run at once; as many as the host has processors, and one where time is real.
-    SIDE_BY_SIDE: OptionValue::Number(1, 64);
+    SIDE_BY_SIDE: ValueKind::Number(1, 64);
 }
 
 /// Runs the subcommand with the words after its name.
@@ -165,7 +165,7 @@ fn hold([package, target, test]: [&str; 3], numbers: &[(&str, u64)]) -> Result<b
 }
 
 /// Makes the plan from the options.
-fn plan(options: &Arguments) -> SoakPlan {
+fn plan(options: &CommandLine) -> SoakPlan {
     let plan = match options.is_given(name::SHORT) {
         true => SoakPlan::SHORT,
         false => SoakPlan::LONG,

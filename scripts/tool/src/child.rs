@@ -48,11 +48,11 @@ pub enum WaitEnd {
 }
 
 /// How a followed child ended, and its output.
-pub struct ChildEnd {
+pub struct ChildResult {
     /// Why the wait ended.
     pub waited: WaitEnd,
     /// The reason for asking the child to end early, if anybody asked.
-    pub asked: Option<EndReason>,
+    pub asked: Option<StopReason>,
     /// The whole output; invalid UTF-8 is replaced.
     pub text: String,
 }
@@ -105,9 +105,9 @@ impl Child {
         limit: Duration,
         log: &Path,
         show: &mut dyn FnMut(&str),
-        mut stop: Option<&mut dyn FnMut(EndReason)>,
+        mut stop: Option<&mut dyn FnMut(StopReason)>,
         mut sent: impl FnMut(u64) -> Option<u64>,
-    ) -> Result<ChildEnd, String> {
+    ) -> Result<ChildResult, String> {
         let (mut tail, mut asking) = (FollowedFile::new(log), ChildWatch::new(limit));
         let signals = stop.as_ref().map(|_| EndSignals::catch());
         let (started, mut killed) = (self.started, WaitEnd::GivenUp);
@@ -131,7 +131,7 @@ impl Child {
             ) {
                 Step::Wait => return true,
                 Step::Ask(why) => {
-                    if why == EndReason::ByPerson {
+                    if why == StopReason::ByPerson {
                         eprintln!("ending in order; ctrl-C again ends it at once");
                     }
                     ask(why);
@@ -143,7 +143,7 @@ impl Child {
             false
         });
         let text = tail.finish(show);
-        Ok(ChildEnd {
+        Ok(ChildResult {
             // `wait` knows only that the watcher gave up; `killed` says why it did.
             waited: if waited == WaitEnd::GivenUp {
                 killed
@@ -215,7 +215,7 @@ const GRACE: Duration = Duration::from_secs(10);
 
 /// Why a child was asked to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EndReason {
+pub enum StopReason {
     /// A person pressed ctrl-C, or this program was asked to end.
     ByPerson,
     /// The child took longer than this limit.
@@ -228,7 +228,7 @@ enum Step {
     /// Look again.
     Wait,
     /// Ask the child to end.
-    Ask(EndReason),
+    Ask(StopReason),
     /// Kill the child, since a person pressed ctrl-C after the request.
     Kill,
     /// Kill the child, since its time is over.
@@ -240,7 +240,7 @@ enum Step {
 struct ChildWatch {
     limit: Duration,
     /// The reason, and the number of signals at that time.
-    why: Option<(EndReason, u32)>,
+    why: Option<(StopReason, u32)>,
     is_asked: bool,
     printed_bytes: u64,
     quiet_since: Duration,
@@ -256,7 +256,7 @@ impl ChildWatch {
     }
 
     /// Returns the reason for asking the child to end, if anybody asked.
-    fn why(&self) -> Option<EndReason> {
+    fn why(&self) -> Option<StopReason> {
         self.why.map(|(why, _)| why)
     }
 
@@ -270,8 +270,8 @@ impl ChildWatch {
         match self.why {
             // Only signals after the request count: several signals at the first look are one wish.
             Some((_, before)) if signals > before => return Step::Kill,
-            None if signals > 0 => self.why = Some((EndReason::ByPerson, signals)),
-            None if is_over => self.why = Some((EndReason::ByLimit(self.limit), signals)),
+            None if signals > 0 => self.why = Some((StopReason::ByPerson, signals)),
+            None if is_over => self.why = Some((StopReason::ByLimit(self.limit), signals)),
             _ => {}
         }
         match self.why {
@@ -365,8 +365,8 @@ mod tests {
     #[test]
     fn the_first_signal_or_the_limit_asks_and_the_second_or_silence_kills() {
         let (person, limit) = (
-            Step::Ask(EndReason::ByPerson),
-            Step::Ask(EndReason::ByLimit(LIMIT)),
+            Step::Ask(StopReason::ByPerson),
+            Step::Ask(StopReason::ByLimit(LIMIT)),
         );
         // Looks: seconds, signals, bytes. Of the steps, those that do not wait.
         for (looks, expected) in [

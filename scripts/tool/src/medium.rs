@@ -3,7 +3,7 @@
 //! A medium is an ISO, for a stick or a disc. It contains the loaded part of the app's image,
 //! optionally a file to leave in memory, GRUB for BIOS and for UEFI, and commands for GRUB to boot
 //! the image with its words. `grub-mkrescue` makes the ISO, with the few modules of GRUB needed for
-//! the boot. A [`StickImage`] is a stick for a single boot: a temporary file shown by QEMU as a
+//! the boot. A [`BootStick`] is a stick for a single boot: a temporary file shown by QEMU as a
 //! stick. Everything is checked before anything is built.
 //!
 //! Exit codes: 0 the file is there, 1 the file could not be made, 2 a refused command line.
@@ -17,7 +17,7 @@ use crate::elf;
 use crate::files::{self, TemporaryFile};
 use crate::image;
 use crate::install;
-use crate::options::{Arguments, Command, OptionValue, Refusal, options};
+use crate::options::{Command, CommandLine, Refusal, ValueKind, options};
 use crate::qemu::Qemu;
 use crate::system;
 
@@ -26,7 +26,7 @@ pub static TABLE: Command = Command {
     invocation: "./scripts/image",
     about: "Makes a file that boots an app on a PC: to be written to a stick, or to a disc.",
     positional: Some((
-        OptionValue::Text("WORD..."),
+        ValueKind::Text("WORD..."),
         "Words for the app and the kernel, such as `jobs=20`.",
     )),
     options: OPTIONS,
@@ -43,13 +43,13 @@ exit codes: 0 the file is there; 1 it could not be made; 2 a refused command lin
 
 options! {
     /// The app: a package under apps/.
-    APP: OptionValue::Text("NAME"), or "fork-join";
+    APP: ValueKind::Text("NAME"), or "fork-join";
     /// The ISO to be made.
-    ISO: OptionValue::File("FILE");
+    ISO: ValueKind::File("FILE");
     /// A file that the app finds in memory, as dag-file does its DAGs.
-    MODULE: OptionValue::File("MODULE");
+    MODULE: ValueKind::File("MODULE");
     /// Take this image; build nothing.
-    IMAGE: OptionValue::File("IMAGE");
+    IMAGE: ValueKind::File("IMAGE");
 }
 
 /// Runs the subcommand with the words after its name.
@@ -62,7 +62,7 @@ pub fn image(words: &[OsString]) -> ExitCode {
 }
 
 /// Checks everything a command line can get wrong, and returns the words for the guest.
-fn check(options: &Arguments) -> Result<String, String> {
+fn check(options: &CommandLine) -> Result<String, String> {
     let outputs = options.named(&[name::ISO]);
     if outputs.is_empty() {
         return Err("which file? give --iso FILE".into());
@@ -93,12 +93,12 @@ fn check(options: &Arguments) -> Result<String, String> {
 }
 
 /// Makes the ISO, and returns a line describing the file.
-fn make(options: &Arguments, words: &str) -> Result<String, String> {
+fn make(options: &CommandLine, words: &str) -> Result<String, String> {
     let image = match options.path(name::IMAGE) {
         Some(path) => path.into(),
         None => image::build(options.text(name::APP).unwrap_or_default())?,
     };
-    let made = StickImage::new(&image, words, options.path(name::MODULE))?;
+    let made = BootStick::new(&image, words, options.path(name::MODULE))?;
     let path = options.path(name::ISO).unwrap_or(Path::new(""));
     let place = files::shown_path(path);
     let bytes = fs::copy(made.path(), path)
@@ -111,21 +111,21 @@ fn make(options: &Arguments, words: &str) -> Result<String, String> {
 }
 
 /// The content of a stick, in a file removed when this value is dropped.
-pub struct StickImage(TemporaryFile);
+pub struct BootStick(TemporaryFile);
 
-impl StickImage {
+impl BootStick {
     /// Makes a medium from which GRUB boots `image` with `words`, leaving `module` in memory.
     ///
     /// # Errors
     ///
     /// In words: a file cannot be read, the image is no ELF file, the words are refused, a tool is
     /// missing, `grub-mkrescue` failed, or there is no room.
-    pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<StickImage, String> {
+    pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<BootStick, String> {
         let loaded = elf::loaded(files::read_at(image)?);
         let loaded = loaded.map_err(|why| format!("`{}`: {why}", files::shown_path(image)))?;
         let module = module.map(files::read_at).transpose()?;
         let log = system::new_log("stick")?;
-        let medium = StickImage(TemporaryFile(Some(log.with_extension("iso"))));
+        let medium = BootStick(TemporaryFile(Some(log.with_extension("iso"))));
         write_iso(medium.path(), &loaded, words, module.as_deref())?;
         Ok(medium)
     }

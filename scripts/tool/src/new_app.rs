@@ -26,7 +26,7 @@ use text::quoted;
 
 use crate::files;
 use crate::image::package_name;
-use crate::options::{Arguments, Command, OptionValue, Refusal, options};
+use crate::options::{Command, CommandLine, Refusal, ValueKind, options};
 use crate::system::{self, files_below};
 
 /// The options and the help text of `new-app`.
@@ -37,7 +37,7 @@ Makes an app of your own, in a repository of its own or under apps/: a library w
 functions and their DAG, a program that boots it, and a test that runs it on the host in
 virtual time.",
     positional: Some((
-        OptionValue::Text("NAME"),
+        ValueKind::Text("NAME"),
         "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
     )),
     options: OPTIONS,
@@ -53,10 +53,10 @@ command line
 
 options! {
     /// Make the app in this new folder, which is the root of a repository.
-    OUT: OptionValue::File("DIR");
+    OUT: ValueKind::File("DIR");
     /// --out: take the crates from this git repository, not from the folder of these commands.
     /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
-    GIT: OptionValue::Text("URL");
+    GIT: ValueKind::Text("URL");
 }
 
 /// The template's name, as a package and as a crate.
@@ -100,7 +100,7 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
 }
 
 /// Makes the app, and returns the next steps for the person.
-fn make(options: &Arguments) -> Result<String, Refusal> {
+fn make(options: &CommandLine) -> Result<String, Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     let Some(name) = options.positional() else {
         return usage("which name? give one, such as `./scripts/new-app brake-assist`");

@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
 use std::time::Duration;
 
-use crate::child::EndReason;
+use crate::child::StopReason;
 use crate::files;
-use crate::medium::StickImage;
+use crate::medium::BootStick;
 use crate::places;
-use crate::qemu::{Qemu, QemuEnd};
+use crate::qemu::{Qemu, RunEnd};
 use crate::system;
 use views::protocol::{MachineLine, Status, Transcript, Verdict};
 use views::record::Record;
@@ -26,7 +26,7 @@ const SHOWN_LINES: usize = 30;
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// How QEMU ended.
-    pub ending: QemuEnd,
+    pub ending: RunEnd,
     /// The whole serial log; invalid UTF-8 is replaced.
     pub serial: String,
     /// The parsed log.
@@ -38,7 +38,7 @@ pub struct Outcome {
     /// The path of the booted image.
     pub image: PathBuf,
     /// The reason for asking the guest to end early, if anybody asked.
-    pub asked: Option<EndReason>,
+    pub asked: Option<StopReason>,
     /// The wall time from start to end.
     pub elapsed: Duration,
     /// QEMU's own error output; mostly empty.
@@ -79,10 +79,10 @@ pub fn boot_with_input(
     let medium = needs_stick.then(|| {
         qemu.check_words()?;
         let module = qemu.module.as_deref();
-        StickImage::new(image, &qemu.guest_words, module)
+        BootStick::new(image, &qemu.guest_words, module)
     });
     let medium = medium.transpose()?;
-    let loaded = medium.as_ref().map_or(image, StickImage::path);
+    let loaded = medium.as_ref().map_or(image, BootStick::path);
     let mut running = qemu.start(loaded, log)?;
     talk(running.child.input());
     let (ending, serial) = running.follow(limit, &mut show)?;
@@ -137,7 +137,7 @@ impl Outcome {
     }
 
     /// Makes the outcome of a guest that nobody asked to end, without complaints of QEMU's.
-    pub fn of(ending: QemuEnd, serial: String, log: &Path, image: &Path) -> Outcome {
+    pub fn of(ending: RunEnd, serial: String, log: &Path, image: &Path) -> Outcome {
         Outcome {
             ending,
             transcript: Transcript::read(&serial),
@@ -159,9 +159,8 @@ impl Outcome {
     pub fn judge(&self) -> Result<(), Verdict> {
         // The kernel prints a verdict before it writes to the exit port. So a status from that port
         // without a verdict comes from the app.
-        let is_odd =
-            matches!(self.ending, QemuEnd::Status(status) if status > 1 && status % 2 == 1);
-        if (is_odd || matches!(self.ending, QemuEnd::Guest(_)))
+        let is_odd = matches!(self.ending, RunEnd::Status(status) if status > 1 && status % 2 == 1);
+        if (is_odd || matches!(self.ending, RunEnd::Guest(_)))
             && self.transcript.of_kind("verdict").next().is_none()
         {
             let why = files::why_full(&self.log).map_or_else(
@@ -176,13 +175,13 @@ impl Outcome {
             );
             return Err(failure(format!("{}, but {why}", self.ending)));
         }
-        let QemuEnd::Guest(by_exit) = self.ending else {
+        let RunEnd::Guest(by_exit) = self.ending else {
             // QEMU handles such signals itself and ends with the status of a shutdown.
             let mut reason = match self.ending {
                 _ if self.complaints.contains("terminating on signal") => {
-                    QemuEnd::Signal.to_string()
+                    RunEnd::Signal.to_string()
                 }
-                QemuEnd::Status(0) if self.serial.is_empty() => "it ended without an exit status, \
+                RunEnd::Status(0) if self.serial.is_empty() => "it ended without an exit status, \
                     and nothing was printed: a triple fault before the first line, or a program \
                     that is not QEMU"
                     .into(),
@@ -205,7 +204,7 @@ impl Outcome {
         // Last: a fault in the log says more than the limit does.
         judge_lines(&self.transcript)?;
         match self.asked {
-            Some(EndReason::ByLimit(limit)) => Err(failure(format!(
+            Some(StopReason::ByLimit(limit)) => Err(failure(format!(
                 "no end within {} s, so it was ended in order; {}",
                 limit.as_secs_f64(),
                 system::host_load()
@@ -252,16 +251,16 @@ mod tests {
     const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"success\",\"reason\":\"\"}\n";
     const USAGE: &str = "{\"kind\":\"verdict\",\"status\":\"usage\",\"reason\":\"`x=1`: no\"}\n";
 
-    fn outcome(ending: QemuEnd, serial: &str) -> Outcome {
+    fn outcome(ending: RunEnd, serial: &str) -> Outcome {
         let (log, image) = (Path::new("the.log"), Path::new("the image"));
         Outcome::of(ending, serial.into(), log, image)
     }
 
     #[test]
     fn a_run_is_good_only_if_both_witnesses_say_so_and_nothing_is_damaged() {
-        let success = || QemuEnd::Guest(Status::Success);
+        let success = || RunEnd::Guest(Status::Success);
         assert_eq!(outcome(success(), VERDICT).judge(), Ok(()));
-        let timed_out = QemuEnd::TimedOut {
+        let timed_out = RunEnd::TimedOut {
             limit: Duration::from_millis(1500),
             load: "the load".into(),
         };
@@ -273,19 +272,19 @@ mod tests {
         for (ending, serial, parts) in [
             (success(), "", ["the guest ended in success", no_verdict]),
             (
-                QemuEnd::Status(5),
+                RunEnd::Status(5),
                 "x\n",
                 ["ended with status 5", no_verdict],
             ),
-            (QemuEnd::Status(1), "", ["QEMU ended with status 1", ""]),
+            (RunEnd::Status(1), "", ["QEMU ended with status 1", ""]),
             (success(), USAGE, [other, ""]),
             (
                 timed_out,
                 VERDICT,
                 ["no end within 1.5 s, QEMU was", "; the load"],
             ),
-            (QemuEnd::Status(0), VERDICT, ["triple fault", ""]),
-            (QemuEnd::Status(0), "", ["a program that is not QEMU", ""]),
+            (RunEnd::Status(0), VERDICT, ["triple fault", ""]),
+            (RunEnd::Status(0), "", ["a program that is not QEMU", ""]),
             (success(), &damaged, [damage, ""]),
             (
                 success(),
@@ -298,7 +297,7 @@ mod tests {
         }
         let ended = Outcome {
             complaints: "terminating on signal 15 from pid 7".into(),
-            ..outcome(QemuEnd::Status(0), VERDICT)
+            ..outcome(RunEnd::Status(0), VERDICT)
         };
         let reason = ended.judge().unwrap_err().reason;
         assert!(reason.starts_with("a signal ended QEMU; QEMU says: terminating"));
@@ -306,7 +305,7 @@ mod tests {
 
     #[test]
     fn a_refused_command_line_is_told_from_a_failure() {
-        let usage = QemuEnd::Guest(Status::Usage);
+        let usage = RunEnd::Guest(Status::Usage);
         let (status, reason) = (Status::Usage, "`x=1`: no".into());
         let refused = Verdict { status, reason };
         assert_eq!(outcome(usage, USAGE).judge(), Err(refused));
@@ -315,10 +314,10 @@ mod tests {
     #[test]
     fn the_tail_shows_the_last_lines_and_the_place_of_all() {
         let long: String = (1..=40).map(|n| format!("line {n}\n")).collect();
-        let tail = outcome(QemuEnd::Signal, &long).tail();
+        let tail = outcome(RunEnd::Signal, &long).tail();
         assert!(tail.starts_with("the last 30 of 40 serial lines of the.log:\n  | line 11\n"));
         assert!(tail.ends_with("  | line 40\n"));
-        let tail = outcome(QemuEnd::Signal, "").tail();
+        let tail = outcome(RunEnd::Signal, "").tail();
         assert_eq!(tail, "the guest printed nothing; its log is the.log\n");
     }
 }

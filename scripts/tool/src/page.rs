@@ -16,7 +16,7 @@ use views::json::Object;
 use crate::files::{self, NamedFile};
 use crate::image::{self, PAGE_PROFILE};
 use crate::install;
-use crate::options::{Arguments, Command, OptionValue, Refusal, options};
+use crate::options::{Command, CommandLine, Refusal, ValueKind, options};
 use crate::system;
 use crate::trace;
 
@@ -25,7 +25,7 @@ pub static PAGE: Command = Command {
     invocation: "./scripts/page",
     about: "Makes a page of one file that plays DAG files, and shows runs, in any browser.",
     positional: Some((
-        OptionValue::File("FILE..."),
+        ValueKind::File("FILE..."),
         "DAG files to begin with; or records of runs, by ./scripts/run --keep or --trace, to show.",
     )),
     options: OPTIONS,
@@ -34,7 +34,7 @@ pub static PAGE: Command = Command {
 
 options! {
     /// Write to this file.
-    OUT 'o': OptionValue::File("FILE"), or "page.html";
+    OUT 'o': ValueKind::File("FILE"), or "page.html";
 }
 
 /// Runs the subcommand with the words after its name.
@@ -51,17 +51,17 @@ pub fn page(words: &[OsString]) -> ExitCode {
 
 /// Files in a page, as elements of two JavaScript lists, each followed by a comma.
 #[derive(Default)]
-pub(crate) struct PageFiles {
+pub(crate) struct PageContent {
     examples: String,
     records: String,
 }
 
 /// Reads the files named by the options.
-fn read(options: &Arguments) -> Result<PageFiles, String> {
+fn read(options: &CommandLine) -> Result<PageContent, String> {
     let inputs = options.files().map(|path| NamedFile { option: "", path });
     files::check_once(options.files())?;
     files::check(&inputs.collect::<Vec<_>>(), &options.named(&[name::OUT]))?;
-    let mut content = PageFiles::default();
+    let mut content = PageContent::default();
     for path in options.files() {
         let place = files::shown_path(path);
         if path.extension().is_some_and(|ending| ending == "dag") {
@@ -85,7 +85,7 @@ fn read(options: &Arguments) -> Result<PageFiles, String> {
 /// # Errors
 ///
 /// In words: the sources are missing, or the engine cannot be built.
-pub(crate) fn html(content: &PageFiles, is_live: bool) -> Result<String, String> {
+pub(crate) fn html(content: &PageContent, is_live: bool) -> Result<String, String> {
     let web = system::workspace().join("scripts/web");
     if !web.is_dir() {
         let why = "are not there; clone the project, and call its ./scripts/page";
@@ -103,7 +103,7 @@ pub(crate) fn html(content: &PageFiles, is_live: bool) -> Result<String, String>
 }
 
 /// Puts all parts into the page's single file.
-fn assembled(engine: &str, content: &PageFiles, is_live: bool) -> Result<String, String> {
+fn assembled(engine: &str, content: &PageContent, is_live: bool) -> Result<String, String> {
     let read = |name: &str| files::read_text(&system::workspace().join(name));
     let source = |name: &str| read(&format!("scripts/web/{name}"));
     let page = source("page.html")?;
@@ -111,7 +111,7 @@ fn assembled(engine: &str, content: &PageFiles, is_live: bool) -> Result<String,
     let listed = listed.and_then(|(before, rest)| Some((before, rest.split_once(" -->")?)));
     let (before, (scripts, after)) = listed.ok_or("page.html lists no scripts")?;
     let scripts: Vec<String> = scripts.split(' ').map(source).collect::<Result<_, _>>()?;
-    let PageFiles { examples, records } = content;
+    let PageContent { examples, records } = content;
     let mut all = examples.clone();
     for line in source("examples.txt")?.lines() {
         let (path, words) = line.split_once(' ').unwrap_or((line, ""));
@@ -152,7 +152,7 @@ mod tests {
         let (name, text) = (format!("{words}.dag"), format!("# {words}\n"));
         let examples = example(Path::new(&name), &text, "cores=4 policy=edf");
         let records = Object::new().text("name", words).into_text();
-        let html = assembled("Zm9v", &PageFiles { examples, records }, false).unwrap();
+        let html = assembled("Zm9v", &PageContent { examples, records }, false).unwrap();
         let (page, script) = html.split_once("<script ").unwrap();
         assert!(!page.contains("/*STYLE*/") && page.contains("</style>"));
         let (script, after) = script.split_once("</script").unwrap();

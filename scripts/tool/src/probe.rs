@@ -12,7 +12,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::outcome::boot;
-use crate::qemu::{Loader, Mode, Qemu, QemuEnd};
+use crate::qemu::{Loader, Mode, Qemu, RunEnd};
 use crate::system;
 
 /// The time limit of the probe, ten times the need of a working KVM.
@@ -83,7 +83,7 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
         return Ok(());
     };
     // The guest itself has found a fault, and its words say more than QEMU's.
-    if matches!(outcome.ending, QemuEnd::Guest(_)) {
+    if matches!(outcome.ending, RunEnd::Guest(_)) {
         return Err(fault.reason);
     }
     // The first complaint is the cause, and the others follow from it.

@@ -12,9 +12,9 @@ use std::time::Duration;
 
 use end_signals::EndSignals;
 
-use crate::child::{Child, EndReason, WaitEnd, bound_to_us};
+use crate::child::{Child, StopReason, WaitEnd, bound_to_us};
 use crate::outcome::Outcome;
-use crate::qemu::QemuEnd;
+use crate::qemu::RunEnd;
 use crate::system;
 use views::protocol::{Status, Transcript};
 
@@ -85,22 +85,22 @@ pub fn run_for(
     let mut ask = |why| {
         // In our process group ctrl-C has reached the program already; a second signal would end it
         // at once.
-        if is_apart || why != EndReason::ByPerson {
+        if is_apart || why != StopReason::ByPerson {
             EndSignals::send(process);
         }
     };
     // Without `stop` the limit kills the program at once, and ctrl-C is not caught.
-    let stop: Option<&mut dyn FnMut(EndReason)> = if stops { Some(&mut ask) } else { None };
+    let stop: Option<&mut dyn FnMut(StopReason)> = if stops { Some(&mut ask) } else { None };
     let followed = child.follow(limit, log, show, stop, |_| Some(0))?;
     let mut outcome = Outcome {
         asked: followed.asked,
         elapsed: child.elapsed(),
-        ..Outcome::of(QemuEnd::Killed, followed.text, log, program)
+        ..Outcome::of(RunEnd::Killed, followed.text, log, program)
     };
     outcome.ending = match followed.waited {
         WaitEnd::Ended(status) => ending_of(status, code(&status), &outcome.transcript),
-        WaitEnd::Killed => QemuEnd::Killed,
-        WaitEnd::TimedOut | WaitEnd::GivenUp => QemuEnd::Program(format!(
+        WaitEnd::Killed => RunEnd::Killed,
+        WaitEnd::TimedOut | WaitEnd::GivenUp => RunEnd::Program(format!(
             "no end within {} s, the program was killed; {}; `--timeout SECONDS` gives it longer",
             limit.as_secs(),
             system::host_load()
@@ -109,14 +109,14 @@ pub fn run_for(
     Ok(outcome)
 }
 
-fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> QemuEnd {
+fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> RunEnd {
     let has_verdict = transcript.of_kind("verdict").next().is_some();
     // An exit code counts only with a verdict: a program may end with 0 without having run the app.
     match code.filter(|_| has_verdict) {
-        Some(0) => QemuEnd::Guest(Status::Success),
-        Some(1) => QemuEnd::Guest(Status::Failure),
-        Some(2) => QemuEnd::Guest(Status::Usage),
-        _ => QemuEnd::Program(format!(
+        Some(0) => RunEnd::Guest(Status::Success),
+        Some(1) => RunEnd::Guest(Status::Failure),
+        Some(2) => RunEnd::Guest(Status::Usage),
+        _ => RunEnd::Program(format!(
             "the program gave no verdict and ended with {status}"
         )),
     }
@@ -134,11 +134,11 @@ mod tests {
             let status = ExitStatus::from_raw(wait_status);
             ending_of(status, status.code(), &Transcript::read(text))
         };
-        assert_eq!(of(0, verdict), QemuEnd::Guest(Status::Success));
-        assert_eq!(of(2 << 8, verdict), QemuEnd::Guest(Status::Usage));
+        assert_eq!(of(0, verdict), RunEnd::Guest(Status::Success));
+        assert_eq!(of(2 << 8, verdict), RunEnd::Guest(Status::Usage));
         for wait_status in [0, 9, 101 << 8] {
-            assert!(matches!(of(wait_status, ""), QemuEnd::Program(_)));
+            assert!(matches!(of(wait_status, ""), RunEnd::Program(_)));
         }
-        assert!(matches!(of(9, verdict), QemuEnd::Program(_)));
+        assert!(matches!(of(9, verdict), RunEnd::Program(_)));
     }
 }

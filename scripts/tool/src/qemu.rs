@@ -7,10 +7,10 @@
 //! no display, no network), so two runs in [`Mode::Deterministic`] give the same bytes.
 //!
 //! Serial output goes to a file, because a file loses nothing, whereas a slow pipe drops bytes. The
-//! guest ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`QemuEnd`].
+//! guest ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`RunEnd`].
 //! Input to the serial port comes from us through a pipe.
 //!
-//! A [`QemuEnd`] is the end of the process, seen from outside. A guest writes a byte `v` to port
+//! A [`RunEnd`] is the end of the process, seen from outside. A guest writes a byte `v` to port
 //! 0xf4, and QEMU's `isa-debug-exit` ends the process with status `(v << 1) | 1`: 33 for success,
 //! 35 for failure, 37 for a refused command line. No other status is a guest's own word.
 //!
@@ -30,7 +30,7 @@ use std::time::Duration;
 
 use boot::MOST_COMMAND_LINE_BYTES;
 
-use crate::child::{Child, EndReason, WaitEnd};
+use crate::child::{Child, StopReason, WaitEnd};
 use crate::files::TemporaryFile;
 use crate::system;
 use views::protocol::Status;
@@ -427,7 +427,7 @@ const KVM_FAILURES: [&str; 4] = [
 
 /// How a QEMU process ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum QemuEnd {
+pub enum RunEnd {
     /// The guest ended QEMU with one of the agreed statuses.
     Guest(Status),
     /// QEMU ended with another status; 0 is a reset or a shutdown.
@@ -451,28 +451,28 @@ pub enum QemuEnd {
     Program(String),
 }
 
-impl fmt::Display for QemuEnd {
+impl fmt::Display for RunEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            QemuEnd::Guest(Status::Success) => f.write_str("the guest ended in success"),
-            QemuEnd::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
-            QemuEnd::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
-            QemuEnd::Program(words) => f.write_str(words),
-            QemuEnd::Status(0) => f.write_str(
+            RunEnd::Guest(Status::Success) => f.write_str("the guest ended in success"),
+            RunEnd::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
+            RunEnd::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
+            RunEnd::Program(words) => f.write_str(words),
+            RunEnd::Status(0) => f.write_str(
                 "the machine was reset or shut down without an exit status (a triple fault?)",
             ),
-            QemuEnd::Status(status) => write!(f, "QEMU ended with status {status}"),
-            QemuEnd::Signal => f.write_str("a signal ended QEMU"),
-            QemuEnd::TimedOut { limit, load } => write!(
+            RunEnd::Status(status) => write!(f, "QEMU ended with status {status}"),
+            RunEnd::Signal => f.write_str("a signal ended QEMU"),
+            RunEnd::TimedOut { limit, load } => write!(
                 f,
                 "no end within {} s, QEMU was killed; {load}",
                 limit.as_secs_f64()
             ),
-            QemuEnd::Killed => f.write_str("ctrl-C was pressed again, and QEMU was killed"),
-            QemuEnd::KvmFailed => {
+            RunEnd::Killed => f.write_str("ctrl-C was pressed again, and QEMU was killed"),
+            RunEnd::KvmFailed => {
                 f.write_str("KVM could not run the guest any further, QEMU was killed")
             }
-            QemuEnd::TooMuchOutput => write!(
+            RunEnd::TooMuchOutput => write!(
                 f,
                 "more than {} MiB of serial output, QEMU was killed",
                 MOST_SERIAL_BYTES >> 20
@@ -494,7 +494,7 @@ pub struct RunningQemu {
     /// The serial port for asking the guest to end, if the guest listens.
     stop: Option<File>,
     /// The reason for asking the guest to end, if anybody asked.
-    pub(crate) asked: Option<EndReason>,
+    pub(crate) asked: Option<StopReason>,
 }
 
 impl RunningQemu {
@@ -550,7 +550,7 @@ impl RunningQemu {
         &mut self,
         limit: Duration,
         show: &mut dyn FnMut(&str),
-    ) -> Result<(QemuEnd, String), String> {
+    ) -> Result<(RunEnd, String), String> {
         let complaints = self.complaints.path();
         let mut kvm_failed = false;
         let records = self.records.as_deref();
@@ -565,19 +565,19 @@ impl RunningQemu {
         // The request may fail: a guest that has just ended no longer listens.
         let stop = self.stop.take();
         let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
-        let ask: Option<&mut dyn FnMut(EndReason)> =
+        let ask: Option<&mut dyn FnMut(StopReason)> =
             if stop.is_some() { Some(&mut ask) } else { None };
         let followed = (self.child).follow(limit, &self.serial, show, ask, sent)?;
         self.asked = followed.asked;
         let ending = match followed.waited {
             WaitEnd::Ended(status) => ending_of(status),
-            WaitEnd::TimedOut => QemuEnd::TimedOut {
+            WaitEnd::TimedOut => RunEnd::TimedOut {
                 limit,
                 load: system::host_load(),
             },
-            WaitEnd::Killed => QemuEnd::Killed,
-            WaitEnd::GivenUp if kvm_failed => QemuEnd::KvmFailed,
-            WaitEnd::GivenUp => QemuEnd::TooMuchOutput,
+            WaitEnd::Killed => RunEnd::Killed,
+            WaitEnd::GivenUp if kvm_failed => RunEnd::KvmFailed,
+            WaitEnd::GivenUp => RunEnd::TooMuchOutput,
         };
         Ok((ending, followed.text))
     }
@@ -590,13 +590,13 @@ impl RunningQemu {
     }
 }
 
-fn ending_of(status: ExitStatus) -> QemuEnd {
+fn ending_of(status: ExitStatus) -> RunEnd {
     match status.code() {
-        Some(33) => QemuEnd::Guest(Status::Success),
-        Some(35) => QemuEnd::Guest(Status::Failure),
-        Some(37) => QemuEnd::Guest(Status::Usage),
-        Some(code) => QemuEnd::Status(code),
-        None => QemuEnd::Signal,
+        Some(33) => RunEnd::Guest(Status::Success),
+        Some(35) => RunEnd::Guest(Status::Failure),
+        Some(37) => RunEnd::Guest(Status::Usage),
+        Some(code) => RunEnd::Status(code),
+        None => RunEnd::Signal,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use sched_dag::Policy;
 
-use crate::options::{Command, OptionName, OptionValue, options};
+use crate::options::{Command, OptionName, ValueKind, options};
 use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
 
 /// The options that become words `name=value` on the guest's command line, if they are given. They
@@ -41,107 +41,107 @@ exit codes: 0 all is well; 1 a failure; 2 a refused command line; 130 ended by c
 
 options! {
     /// The app: a package under apps/.
-    APP in "what": OptionValue::Text("NAME"), or "fork-join";
+    APP in "what": ValueKind::Text("NAME"), or "fork-join";
     /// A file of DAGs (docs/dag-file.md), or a folder.
-    DAG: OptionValue::File("FILE");
+    DAG: ValueKind::File("FILE");
     /// Boot this image, or program; build nothing.
-    IMAGE: OptionValue::File("FILE");
+    IMAGE: ValueKind::File("FILE");
     /// Jobs that a DAG releases; 0: no end.
-    JOBS: OptionValue::Number(0, 1_000_000);
+    JOBS: ValueKind::Number(0, 1_000_000);
     /// Seed of the app's random draws; 1.
-    SEED: OptionValue::Number(0, u64::MAX);
+    SEED: ValueKind::Number(0, u64::MAX);
     /// Parameters of the app, with commas between.
-    SET: OptionValue::Text("NAME=VALUE");
+    SET: ValueKind::Text("NAME=VALUE");
     /// Those of a file, a line for each; --set prevails.
-    PARAMS: OptionValue::File("FILE");
+    PARAMS: ValueKind::File("FILE");
     /// A file in the guest's memory, for the app.
-    MODULE: OptionValue::File("FILE");
+    MODULE: ValueKind::File("FILE");
     /// More words for the guest's command line.
-    APPEND: OptionValue::Text("WORDS");
+    APPEND: ValueKind::Text("WORDS");
     /// On.
-    ON in "where": OptionValue::OneOf(&["machine", "linux", "debian", "host"]), or "machine";
+    ON in "where": ValueKind::OneOf(&["machine", "linux", "debian", "host"]), or "machine";
     /// Processors; 4 on debian.
-    CORES: OptionValue::Number(1, MOST_CORES), or "8";
+    CORES: ValueKind::Number(1, MOST_CORES), or "8";
     /// See docs/commands.md.
-    MODE: OptionValue::OneOf(Mode::NAMES);
+    MODE: ValueKind::OneOf(Mode::NAMES);
     /// The board.
-    MACHINE: OptionValue::OneOf(Machine::NAMES), or "microvm";
+    MACHINE: ValueKind::OneOf(Machine::NAMES), or "microvm";
     /// QEMU's words for devices, with blanks between; on q35.
-    DEVICE: OptionValue::Text("WORDS");
+    DEVICE: ValueKind::Text("WORDS");
     /// QEMU's words for a network; on q35.
-    NET: OptionValue::Text("WORDS");
+    NET: ValueKind::Text("WORDS");
     /// Its card.
-    CARD: OptionValue::OneOf(&["virtio", "e1000e"]), or "virtio";
+    CARD: ValueKind::OneOf(&["virtio", "e1000e"]), or "virtio";
     /// The network's traffic, for Wireshark.
-    PCAP: OptionValue::File("FILE");
+    PCAP: ValueKind::File("FILE");
     /// The loader.
-    BOOT: OptionValue::OneOf(Loader::NAMES), or "pvh";
+    BOOT: ValueKind::OneOf(Loader::NAMES), or "pvh";
     /// The guest's MiB.
-    MEMORY: OptionValue::Number(LEAST_MEMORY_MIB, 65_536), or "32";
+    MEMORY: ValueKind::Number(LEAST_MEMORY_MIB, 65_536), or "32";
     /// Use this QEMU; install nothing.
-    QEMU: OptionValue::File("PROGRAM");
+    QEMU: ValueKind::File("PROGRAM");
     /// On Linux, by what.
-    MECHANISM: OptionValue::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
+    MECHANISM: ValueKind::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
     /// On debian: so many programs next to it.
-    BUSY: OptionValue::Number(0, 64);
+    BUSY: ValueKind::Number(0, 64);
     /// Order of instances.
-    POLICY in "rules": OptionValue::OneOf(Policy::WORDS);
+    POLICY in "rules": ValueKind::OneOf(Policy::WORDS);
     /// Whether instances may lose their cores.
-    PREEMPTION: OptionValue::OneOf(&["on", "off"]);
+    PREEMPTION: ValueKind::OneOf(&["on", "off"]);
     /// Sizes of clusters of cores: N,N,... or auto.
-    CLUSTERS: OptionValue::Text("SIZES");
+    CLUSTERS: ValueKind::Text("SIZES");
     /// Parallel ones, a run for each; 2,4,6.
-    SUBTASKS in "fork-join": OptionValue::Numbers(1, MOST_SUBTASKS);
+    SUBTASKS in "fork-join": ValueKind::Numbers(1, MOST_SUBTASKS);
     /// Milliseconds of the longest execution.
-    LONGEST: OptionValue::Number(1, 50);
+    LONGEST: ValueKind::Number(1, 50);
     /// How a simulated one has its core.
-    OCCUPY: OptionValue::OneOf(&["hold", "spin"]);
+    OCCUPY: ValueKind::OneOf(&["hold", "spin"]);
     /// The one to take of a set of task graphs.
-    GRAPH in "--dag": OptionValue::Text("NAME");
+    GRAPH in "--dag": ValueKind::Text("NAME");
     /// The unit of numbers where a format has none; 1ms.
-    UNIT: OptionValue::Text("TIME");
+    UNIT: ValueKind::Text("TIME");
     /// wcet (default), uniform:0.2..1, samples, sequence.
-    EXECUTION: OptionValue::Text("MODEL");
+    EXECUTION: ValueKind::Text("MODEL");
     /// The jobs of so many seconds.
-    SECONDS: OptionValue::Number(1, 1_000_000);
+    SECONDS: ValueKind::Number(1, 1_000_000);
     /// A deadline miss is a failure.
-    STRICT_DEADLINES: OptionValue::Nothing;
+    STRICT_DEADLINES: ValueKind::Nothing;
     /// Print the file in our format; run nothing.
-    PRINT_DAG: OptionValue::Nothing;
+    PRINT_DAG: ValueKind::Nothing;
     /// All of the run; docs/recordings.md.
-    KEEP in "files": OptionValue::File("FILE");
+    KEEP in "files": ValueKind::File("FILE");
     /// As --keep, without values; for check-trace.
-    TRACE: OptionValue::File("FILE");
+    TRACE: ValueKind::File("FILE");
     /// Serve a page that shows the run while it goes on.
-    PAGE: OptionValue::Nothing;
+    PAGE: ValueKind::Nothing;
     /// Jobs of a DAG to keep for a crash; 16.
-    LATEST: OptionValue::Number(0, 64);
+    LATEST: ValueKind::Number(0, 64);
     /// Take the sources' values from it, compare others.
-    REPLAY: OptionValue::File("FILE");
+    REPLAY: ValueKind::File("FILE");
     /// --replay: begin with this job.
-    FROM: OptionValue::Text("DAG/JOB");
+    FROM: ValueKind::Text("DAG/JOB");
     /// The serial log.
-    SERIAL: OptionValue::File("FILE");
+    SERIAL: ValueKind::File("FILE");
     /// Measure, commit, and compare; docs/proving.md.
-    PROVE in "bounds": OptionValue::Nothing;
+    PROVE in "bounds": ValueKind::Nothing;
     /// --prove: per cent more; 20.
-    MARGIN: OptionValue::Number(0, 1_000);
+    MARGIN: ValueKind::Number(0, 1_000);
     /// --prove: measure so many seeds; 1.
-    SEEDS: OptionValue::Number(1, 1_000);
+    SEEDS: ValueKind::Number(1, 1_000);
     /// Commit with WCETs of `recording --observe`.
-    WCETS: OptionValue::File("FILE");
+    WCETS: ValueKind::File("FILE");
     /// Talk to the kernel, in real time: type `help`.
-    CONSOLE in "person": OptionValue::Nothing;
+    CONSOLE in "person": ValueKind::Nothing;
     /// Bytes for the app's wire; docs/wires.md. -: stdin.
-    INPUT: OptionValue::File("FILE");
+    INPUT: ValueKind::File("FILE");
     /// Write what the app sends on its wire.
-    OUTPUT: OptionValue::File("FILE");
+    OUTPUT: ValueKind::File("FILE");
     /// Seconds until its end; 120, one a job.
-    TIMEOUT: OptionValue::Number(1, 86_400);
+    TIMEOUT: ValueKind::Number(1, 86_400);
     /// Only machine lines on standard output.
-    JSON: OptionValue::Nothing;
+    JSON: ValueKind::Nothing;
     /// Only what the guest prints.
-    QUIET 'q': OptionValue::Nothing;
+    QUIET 'q': ValueKind::Nothing;
     /// Wait for a debugger on TCP port 1234.
-    GDB: OptionValue::Nothing;
+    GDB: ValueKind::Nothing;
 }

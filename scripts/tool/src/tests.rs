@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use tool::options::{Arguments, Command};
+use tool::options::{Command, CommandLine};
 
 #[path = "../../views/src/tests.rs"]
 mod cells;
@@ -14,7 +14,7 @@ pub(crate) mod made;
 pub(crate) use cells::{altered, rows};
 
 /// Parses a command line that a table must accept.
-pub(crate) fn right(table: &Command, line: &str) -> Arguments {
+pub(crate) fn right(table: &Command, line: &str) -> CommandLine {
     let words: Vec<_> = line.split_whitespace().map(OsString::from).collect();
     table.parse(&words).expect(line)
 }

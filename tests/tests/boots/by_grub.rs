@@ -5,7 +5,7 @@ use std::time::Duration;
 use harness::Guest;
 use harness::stick::{self, boots};
 use tool::Outcome;
-use tool::qemu::{Loader, QemuEnd};
+use tool::qemu::{Loader, RunEnd};
 
 #[test]
 fn two_and_four_processors_by_a_bios_and_by_uefi() {
@@ -39,7 +39,7 @@ fn a_processor_without_64_bits_is_refused_by_grub() {
     let limits = [8, 60, 600].map(Duration::from_secs).into_iter();
     let mut outcomes = limits.map(|limit| guest.clone().limit(limit).boot());
     let outcome = outcomes.find(says).expect("GRUB says so");
-    let waited = matches!(outcome.ending, QemuEnd::TimedOut { .. });
+    let waited = matches!(outcome.ending, RunEnd::TimedOut { .. });
     assert!(waited, "{}\n{}", outcome.ending, outcome.tail());
 }
 

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use boot::screen::font::{HEIGHT, WIDTH, is_lit};
 use harness::Guest;
 use harness::file::File;
-use tool::qemu::{Loader, QemuEnd};
+use tool::qemu::{Loader, RunEnd};
 use tool::system;
 
 const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"";
@@ -105,7 +105,7 @@ fn rows_of(guest: &Guest, cores: u64, model: &str) -> (Vec<String>, String) {
     let watcher = thread::spawn(move || watch(&monitor, cores));
     let outcome = guest.boot();
     let (rows, pages) = watcher.join().expect("it does not panic");
-    assert_eq!(outcome.ending, QemuEnd::Status(0), "{}", rows.join("\n"));
+    assert_eq!(outcome.ending, RunEnd::Status(0), "{}", rows.join("\n"));
     assert_eq!(outcome.serial, "", "there is no serial port");
     (rows, pages)
 }

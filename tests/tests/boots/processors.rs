@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use harness::file::File;
 use harness::{Guest, Members, Said};
-use tool::qemu::QemuEnd;
+use tool::qemu::RunEnd;
 use tool::{Machine, Mode, Outcome};
 use views::protocol::{MachineLine, Status, Transcript};
 
@@ -62,7 +62,7 @@ fn a_machine_that_cannot_be_ended_stays_silent_after_its_verdict() {
     let mut outcomes = limits.map(|limit| endless(2).limit(limit).boot());
     let has_ended = |outcome: &Outcome| outcome.tail().contains(r#""kind":"verdict""#);
     let outcome = outcomes.find(has_ended).expect("it gives a verdict");
-    let ended = matches!(outcome.ending, QemuEnd::TimedOut { .. });
+    let ended = matches!(outcome.ending, RunEnd::TimedOut { .. });
     assert!(ended, "{}\n{}", outcome.ending, outcome.tail());
     succeeds(&outcome);
 }
@@ -91,7 +91,7 @@ fn a_processor_without_64_bits_is_refused() {
     let outcome = demo(1).model("qemu32").boot();
     let line = "this processor has no 64-bit mode, which the image needs\r\n";
     assert_eq!(outcome.serial, line, "{}", outcome.ending);
-    assert_eq!(outcome.ending, QemuEnd::Guest(Status::Failure));
+    assert_eq!(outcome.ending, RunEnd::Guest(Status::Failure));
 }
 
 /// The hardware of one core fails, by a word to QEMU's monitor, which has the way in.
@@ -122,7 +122,7 @@ fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
         // A reset ends QEMU, too: it was told not to boot again.
         for word in ["end=off", "end=reset"] {
             let outcome = endless(2).machine(machine).word(word).boot();
-            assert_eq!(outcome.ending, QemuEnd::Status(0), "{machine}, {word}");
+            assert_eq!(outcome.ending, RunEnd::Status(0), "{machine}, {word}");
             succeeds(&outcome);
         }
     }
@@ -142,7 +142,7 @@ fn a_machine_without_a_serial_port_runs() {
     );
     let mute = demo(2).altered(&[("#microvm", "microvm,isa-serial=off")], &more);
     let outcome = mute.boot();
-    assert_eq!(outcome.ending, QemuEnd::Guest(Status::Success));
+    assert_eq!(outcome.ending, RunEnd::Guest(Status::Success));
     assert_eq!(outcome.serial, "");
     let sent = fs::read_to_string(&bytes.0).expect("what was sent");
     // The port's divisor comes first.

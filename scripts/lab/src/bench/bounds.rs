@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use super::acceptance::{self, Generator, SetFile};
 use super::frame::by_plan;
 use tool::files;
-use tool::options::{Arguments, Command, OptionValue, options};
+use tool::options::{Command, CommandLine, ValueKind, options};
 use tool::progress::ProgressNote;
 
 static COMMAND: Command = Command {
@@ -19,7 +19,7 @@ static COMMAND: Command = Command {
     about: "Draws by utilization how many random sets of DAGs are accepted by lent cores and by \
             other methods.",
     positional: Some((
-        OptionValue::File("FILE..."),
+        ValueKind::File("FILE..."),
         "Count only the sets of these files, as in tests/oracle/lent.txt, with or without answers.",
     )),
     options: OPTIONS,
@@ -37,18 +37,18 @@ Exit code: 0 counted; 1 no file can be written; 2 the command line or a file is 
 
 options! {
     /// The numbers of cores.
-    CORES: OptionValue::Numbers(1, 64), or "4,8,16";
+    CORES: ValueKind::Numbers(1, 64), or "4,8,16";
     /// The kind of random sets: ours, ours with periods on a grid, Melani's graphs, or small ones of
     /// these.
-    FROM: OptionValue::OneOf(Generator::WORDS), or "ours";
+    FROM: ValueKind::OneOf(Generator::WORDS), or "ours";
     /// Random sets for each number of cores, utilization and kind of deadlines.
-    SETS: OptionValue::Number(1, 1_000_000), or "200";
+    SETS: ValueKind::Number(1, 1_000_000), or "200";
     /// Runs each set in virtual time, too: a column of those without a late DAG. Takes minutes.
-    CEILING: OptionValue::Nothing;
+    CEILING: ValueKind::Nothing;
     /// The seed of all random sets.
-    SEED: OptionValue::Number(0, u64::MAX), or "1";
+    SEED: ValueKind::Number(0, u64::MAX), or "1";
     /// The folder for acceptance.csv and acceptance.svg.
-    OUT 'o': OptionValue::File("DIR"), or "target/bounds";
+    OUT 'o': ValueKind::File("DIR"), or "target/bounds";
 }
 
 /// The plan of a measurement.
@@ -63,7 +63,7 @@ struct BoundsPlan {
 }
 
 impl BoundsPlan {
-    fn new(options: &Arguments) -> Result<Self, String> {
+    fn new(options: &CommandLine) -> Result<Self, String> {
         options.check_distinct(&[name::CORES])?;
         if options.files().len() > 0 {
             let why = "is for random sets; leave it or the files out";

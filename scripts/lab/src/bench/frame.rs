@@ -13,7 +13,7 @@ use std::process::{self, ExitCode, Stdio};
 
 use sched_dag::law::Distribution;
 
-use tool::options::{Arguments, Command, Refusal};
+use tool::options::{Command, CommandLine, Refusal};
 use tool::outcome::Outcome;
 use tool::system;
 use views::json::{Object, Value};
@@ -24,7 +24,7 @@ use views::protocol::Transcript;
 pub(super) fn by_plan<Plan>(
     table: &Command,
     words: &[OsString],
-    plan: impl Fn(&Arguments) -> Result<Plan, String>,
+    plan: impl Fn(&CommandLine) -> Result<Plan, String>,
     measure: impl Fn(&Plan) -> Result<bool, String>,
 ) -> ExitCode {
     table.carry_out(words, |options| {

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 use super::code::{self, Frames};
 use super::frame::by_plan;
-use tool::options::{Arguments, Command, OptionValue, options};
+use tool::options::{Command, CommandLine, ValueKind, options};
 use tool::progress::ProgressNote;
 use tool::{elf, files, image};
 use views::json::Object;
@@ -33,7 +33,7 @@ command line is refused.
 
 options! {
     /// The app.
-    APP: OptionValue::Text("APP"), or "fork-join";
+    APP: ValueKind::Text("APP"), or "fork-join";
 }
 
 /// The part of code from no file of ours.
@@ -41,7 +41,7 @@ const LIBRARY: &str = "the library, and what drops values";
 
 /// Measures, and prints.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    let app = |options: &Arguments| {
+    let app = |options: &CommandLine| {
         let app = options.text(name::APP).unwrap_or_default();
         image::check_app(app).map(|()| app.to_string())
     };

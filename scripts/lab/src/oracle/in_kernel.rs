@@ -35,7 +35,7 @@ use sched_dag::law::RunRecord;
 
 use super::schedules::{Case, Deviation, TimeScale, compare, compare_turns};
 use super::{Parse, equal, read};
-use tool::options::{Arguments, Command, OptionValue, Refusal, options};
+use tool::options::{Command, CommandLine, Refusal, ValueKind, options};
 use tool::outcome::{Outcome, boot};
 use tool::progress::Progress;
 use tool::qemu::{MOST_CORES, Machine, Mode, Qemu};
@@ -47,7 +47,7 @@ static IN_KERNEL: Command = Command {
     invocation: "./scripts/oracle schedules --in-kernel",
     about: "Runs reference schedules on the bare machine in QEMU and compares.",
     positional: Some((
-        OptionValue::File("FILE..."),
+        ValueKind::File("FILE..."),
         "Reference schedules, as in tests/oracle.",
     )),
     options: OPTIONS,
@@ -69,17 +69,17 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 
 options! {
     /// On the machine, not in virtual time on the host.
-    IN_KERNEL: OptionValue::Nothing;
+    IN_KERNEL: ValueKind::Nothing;
     /// Leave out the cases for more cores.
-    CORES_UP_TO: OptionValue::Number(1, MOST_CORES), or "64";
+    CORES_UP_TO: ValueKind::Number(1, MOST_CORES), or "64";
     /// The length of a unit of time in microseconds.
-    UNIT_US: OptionValue::Number(100, 10_000_000), or "10000";
+    UNIT_US: ValueKind::Number(100, 10_000_000), or "10000";
     /// Whether execution is simulated, or cores compute all the time.
-    WORK: OptionValue::OneOf(&["simulate", "compute"]), or "simulate";
+    WORK: ValueKind::OneOf(&["simulate", "compute"]), or "simulate";
     /// The meaning of time; see ./scripts/run --help.
-    MODE: OptionValue::OneOf(Mode::NAMES), or "deterministic";
+    MODE: ValueKind::OneOf(Mode::NAMES), or "deterministic";
     /// The board that QEMU imitates.
-    MACHINE: OptionValue::OneOf(Machine::NAMES), or "microvm";
+    MACHINE: ValueKind::OneOf(Machine::NAMES), or "microvm";
 }
 
 /// Runs the command with the words after the kind; `parse` reads the files.
@@ -87,7 +87,7 @@ pub(super) fn command(words: &[OsString], parse: Parse<Case>) -> ExitCode {
     IN_KERNEL.carry_out(words, |options| run_files(options, parse))
 }
 
-fn run_files(options: &Arguments, parse: Parse<Case>) -> Result<ExitCode, Refusal> {
+fn run_files(options: &CommandLine, parse: Parse<Case>) -> Result<ExitCode, Refusal> {
     let settings = settings(options);
     let mut cases = read(options.files(), parse).map_err(Refusal::Usage)?;
     let most_cores = options.number(name::CORES_UP_TO).unwrap_or(MOST_CORES);
@@ -102,7 +102,7 @@ fn run_files(options: &Arguments, parse: Parse<Case>) -> Result<ExitCode, Refusa
     Ok(ExitCode::from(u8::from(failed > 0)))
 }
 
-fn settings(options: &Arguments) -> Settings {
+fn settings(options: &CommandLine) -> Settings {
     let usual = Settings::for_unit(options.number(name::UNIT_US).unwrap_or(10_000));
     let usual = match options.text(name::WORK) {
         Some("compute") => usual.computing(),
@@ -118,13 +118,13 @@ fn settings(options: &Arguments) -> Settings {
 }
 
 /// Prints the results of the cases, and returns how many failed.
-fn report(judged: &[CaseVerdict], settings: &Settings) -> usize {
+fn report(judged: &[CaseResult], settings: &Settings) -> usize {
     for case in judged {
         if let Err(difference) = &case.outcome {
             println!("{}: {difference}", case.name);
         }
     }
-    let passed = |cases: &[CaseVerdict]| cases.iter().filter(|case| case.outcome.is_ok()).count();
+    let passed = |cases: &[CaseResult]| cases.iter().filter(|case| case.outcome.is_ok()).count();
     for group in judged.chunk_by(|a, b| a.cores == b.cores) {
         let deviations = group.iter().filter_map(|case| case.outcome.clone().ok());
         let of_all = deviations.reduce(Deviation::and).unwrap_or_default();
@@ -165,7 +165,7 @@ pub struct Settings {
 
 /// The result of a case run in the kernel.
 #[derive(Clone, Debug)]
-pub struct CaseVerdict {
+pub struct CaseResult {
     /// The case's name.
     pub name: String,
     /// The case's number of cores.
@@ -240,7 +240,7 @@ const MEMORY_MIB: u64 = 64;
 /// # Errors
 ///
 /// In words: there is no QEMU, no image, or a file cannot be written.
-pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<CaseVerdict>, String> {
+pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<CaseResult>, String> {
     install::ensure_qemu()?;
     let image = image::build("dag-file")?;
     let machine = Qemu {
@@ -298,8 +298,8 @@ fn machine_words(case: &Case) -> (u32, String) {
     (case.cores, words)
 }
 
-fn verdict(case: &Case, outcome: Result<Deviation, String>) -> CaseVerdict {
-    CaseVerdict {
+fn verdict(case: &Case, outcome: Result<Deviation, String>) -> CaseResult {
+    CaseResult {
         name: case.name.clone(),
         cores: case.cores,
         outcome,
@@ -340,7 +340,7 @@ fn boot_with(
 
 /// Judges the cases that ran. If the guest did not run all, also judges the case that ended the
 /// boot; the cases after that have not run.
-pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> Vec<CaseVerdict> {
+pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> Vec<CaseResult> {
     let mut judged = Vec::with_capacity(cases.len());
     let ending = outcome.judge().err();
     let (runs, damaged) = match trace::read(&outcome.serial) {
@@ -406,7 +406,7 @@ mod tests {
     use crate::oracle::schedules::{Deviation, parse};
     use crate::tests::made::{self, line_of, record_of};
     use crate::tests::{altered, rows};
-    use tool::qemu::QemuEnd;
+    use tool::qemu::RunEnd;
     use views::protocol::Status;
 
     const CASE: &str = "case small 1 0 1 1
@@ -450,7 +450,7 @@ O=0 | O=1 | dag 0 job 0: release: expected 0, found 1
     fn what_is_near_passes_and_the_first_difference_is_named() {
         let case = parse(CASE).expect("well formed").remove(0);
         let judged_of = |log: String| {
-            let status = QemuEnd::Guest(Status::Success);
+            let status = RunEnd::Guest(Status::Success);
             let outcome = Outcome::of(status, log, "no.log".as_ref(), "no image".as_ref());
             let judged = judge(&outcome, &[&case], &Settings::for_unit(1000));
             judged.into_iter().next().expect("a case").outcome

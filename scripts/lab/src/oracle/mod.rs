@@ -36,7 +36,7 @@ use std::process::ExitCode;
 use text::Malformed;
 
 use tool::files;
-use tool::options::{Command, OptionValue, Refusal, WordMenu, choices, options};
+use tool::options::{Command, Refusal, ValueKind, WordMenu, choices, options};
 use tool::progress::Progress;
 
 /// A reader of the cases of one kind.
@@ -75,7 +75,7 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 options! {
     /// Schedules alone, on the bare machine; with options of its own, see schedules --in-kernel
     /// --help.
-    IN_KERNEL: OptionValue::Nothing;
+    IN_KERNEL: ValueKind::Nothing;
 }
 
 /// Runs the subcommand `oracle` with the words after its name.
@@ -107,7 +107,7 @@ impl<Case> FileOracle<Case> {
         let table = Command {
             invocation: self.invocation,
             about: self.about,
-            positional: Some((OptionValue::File("FILE..."), files)),
+            positional: Some((ValueKind::File("FILE..."), files)),
             options: self.schedules.map_or(&[], |_| OPTIONS),
             notes: NOTES,
         };

@@ -31,7 +31,7 @@ use sched_dag::{
     Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskSpec, verify,
 };
 
-use tool::options::{Command, OptionValue as Value, options};
+use tool::options::{Command, ValueKind as Value, options};
 use tool::progress::Progress;
 
 static TABLE: Command = Command {

@@ -31,7 +31,7 @@ use std::thread;
 use std::time::Instant;
 
 use tool::image::{self, package_name};
-use tool::options::{Command, OptionValue, Refusal, options};
+use tool::options::{Command, Refusal, ValueKind, options};
 use tool::{elf, files, install, system};
 
 /// The options and the help text of `test`.
@@ -39,7 +39,7 @@ pub static TEST: Command = Command {
     invocation: "./scripts/test",
     about: "Runs every test, on the host and in QEMU, and counts them.",
     positional: Some((
-        OptionValue::Text("FILTER"),
+        ValueKind::Text("FILTER"),
         "Run only tests and checks whose name contains this.",
     )),
     options: OPTIONS,
@@ -57,15 +57,15 @@ a FILTER by which nothing has run
 
 options! {
     /// Only what runs on the host: no guests, no images, no lints.
-    QUICK: OptionValue::Nothing;
+    QUICK: ValueKind::Nothing;
     /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
-    BLESS: OptionValue::Nothing;
+    BLESS: ValueKind::Nothing;
     /// Only tests where threads meet, under Miri of a nightly toolchain.
-    MIRI: OptionValue::Nothing;
+    MIRI: ValueKind::Nothing;
     /// Only runs on threads of Linux, under ThreadSanitizer of a nightly toolchain.
-    THREAD_SANITIZER: OptionValue::Nothing;
+    THREAD_SANITIZER: ValueKind::Nothing;
     /// Show every test by name, not only those that fail.
-    VERBOSE 'v': OptionValue::Nothing;
+    VERBOSE 'v': ValueKind::Nothing;
 }
 
 /// The tests to run.

@@ -23,7 +23,7 @@ use sched_dag::{CommitOptions, CoreDivision, Policy};
 use text::{Malformed, shown};
 
 use crate::files;
-use crate::options::{Arguments, OptionName};
+use crate::options::{CommandLine, OptionName};
 use crate::run_options::name;
 
 /// Settings for reading a DAG file and checking it for a run.
@@ -157,7 +157,7 @@ pub(crate) fn states_overheads(words: &str) -> bool {
 
 /// A DAG file ready to run, with settings for the run.
 #[derive(Debug)]
-pub struct PreparedFile {
+pub struct PreparedRun {
     /// The file's name.
     pub path: PathBuf,
     /// The file's content.
@@ -172,7 +172,7 @@ pub struct PreparedFile {
     pub limit_s: u64,
 }
 
-impl PreparedFile {
+impl PreparedRun {
     /// Translates a guest's refusal of the file into messages as from [`load`], one line a fault.
     /// Returns `None` for a refusal about anything else.
     pub fn translate(&self, said: &str) -> Option<String> {
@@ -186,7 +186,7 @@ impl PreparedFile {
 ///
 /// Lines for people: the faults of the options or of the file.
 #[allow(clippy::too_many_lines, reason = "one option after the other")]
-pub fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Vec<String>> {
+pub fn prepare(options: &CommandLine) -> Result<Option<PreparedRun>, Vec<String>> {
     let refuse = |line: String| vec![line];
     // Without a file, an option about DAG files is a mistake.
     let Some(path) = options.path(name::DAG) else {
@@ -254,7 +254,7 @@ pub fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Vec<String>>
     if !states_overheads(options.text(name::APPEND).unwrap_or_default()) {
         words.push(overheads(cores));
     }
-    Ok(Some(PreparedFile {
+    Ok(Some(PreparedRun {
         length,
         memory_mib,
         limit_s: limit_s.min(MOST_S),
@@ -277,7 +277,7 @@ fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
     })
 }
 
-fn length(options: &Arguments) -> Length {
+fn length(options: &CommandLine) -> Length {
     match (options.number(name::SECONDS), options.number(name::JOBS)) {
         (Some(seconds), _) => Length::Span(seconds.saturating_mul(1_000_000_000)),
         (None, Some(jobs)) => Length::Jobs(jobs),

@@ -19,14 +19,14 @@ pub struct WordMenu {
     /// One or more sentences describing the command.
     pub about: &'static str,
     /// The words, in the order of the help text.
-    pub choices: &'static [MenuWord],
+    pub choices: &'static [MenuChoice],
     /// Further text of the help, after the words.
     pub notes: &'static str,
 }
 
 /// A word of a menu.
 #[derive(Debug)]
-pub struct MenuWord {
+pub struct MenuChoice {
     /// The word.
     pub name: &'static str,
     /// A few words for the help text.
@@ -40,9 +40,9 @@ pub struct MenuWord {
 ///
 /// ```compile_fail
 /// use std::process::ExitCode;
-/// use tool::options::{MenuWord, choices};
+/// use tool::options::{MenuChoice, choices};
 ///
-/// static DISHES: &[MenuWord] = choices! {
+/// static DISHES: &[MenuChoice] = choices! {
 ///     "soup": "hot", |_| ExitCode::SUCCESS;
 ///     "soup": "cold", |_| ExitCode::SUCCESS;
 /// };
@@ -52,7 +52,7 @@ macro_rules! choices {
     ($($name:literal: $about:literal, $work:expr;)*) => {{
         #[deny(unreachable_patterns)]
         const _: fn(&str) -> bool = |word| matches!(word, $($name)|*);
-        &[$($crate::options::MenuWord { name: $name, about: $about, work: $work }),*]
+        &[$($crate::options::MenuChoice { name: $name, about: $about, work: $work }),*]
     }};
 }
 pub use choices;
@@ -76,7 +76,7 @@ impl WordMenu {
         }
     }
 
-    fn choose(&self, words: &[OsString]) -> Result<&MenuWord, Refusal> {
+    fn choose(&self, words: &[OsString]) -> Result<&MenuChoice, Refusal> {
         let Some(word) = words.first() else {
             let question = format!("which {}? {}", self.word, self.remedy());
             return Err(Refusal::Usage(question));
@@ -130,12 +130,12 @@ mod tests {
         word: "DISH",
         about: "Cooks.",
         choices: &[
-            MenuWord {
+            MenuChoice {
                 name: "soup",
                 about: "hot",
                 work: |words| ExitCode::from(u8::try_from(words.len()).unwrap()),
             },
-            MenuWord {
+            MenuChoice {
                 name: "salad",
                 about: "cold",
                 work: |_| ExitCode::SUCCESS,

@@ -9,7 +9,7 @@
 //! nothing before it has understood the whole line.
 //!
 //! Words come as bytes of the operating system and need not be text. The name of a file may be
-//! anything; every other word must be UTF-8. A fully checked command line becomes [`Arguments`].
+//! anything; every other word must be UTF-8. A fully checked command line becomes [`CommandLine`].
 
 mod menu;
 
@@ -26,7 +26,7 @@ use text::{quoted, shown, visible};
 
 use crate::files::NamedFile;
 
-pub use menu::{MenuWord, WordMenu, choices};
+pub use menu::{MenuChoice, WordMenu, choices};
 pub use sched_dag::nearest;
 
 /// The exit code of a run ended early by a person, equal to a shell's exit code for ctrl-C.
@@ -40,7 +40,7 @@ pub struct Command {
     pub about: &'static str,
     /// The positional words, if any are allowed, and their help: a single word, or any number of
     /// words if the placeholder ends in `...`.
-    pub positional: Option<(OptionValue, &'static str)>,
+    pub positional: Option<(ValueKind, &'static str)>,
     /// The options, in the order of the help text.
     pub options: &'static [Opt],
     /// Further text of the help, after the options.
@@ -92,7 +92,7 @@ impl Command {
     pub fn carry_out(
         &self,
         words: &[OsString],
-        work: impl FnOnce(&Arguments) -> Result<ExitCode, Refusal>,
+        work: impl FnOnce(&CommandLine) -> Result<ExitCode, Refusal>,
     ) -> ExitCode {
         let done = self.parse(words).and_then(|options| work(&options));
         done.unwrap_or_else(|refusal| self.report(refusal))
@@ -109,8 +109,8 @@ impl Command {
     /// # Errors
     ///
     /// The first word not allowed by the table; or the help text, if the line asks for help.
-    pub fn parse(&self, words: &[OsString]) -> Result<Arguments, Refusal> {
-        let mut parsed = Arguments {
+    pub fn parse(&self, words: &[OsString]) -> Result<CommandLine, Refusal> {
+        let mut parsed = CommandLine {
             options: self.options,
             given: BTreeMap::new(),
             positionals: Vec::new(),
@@ -133,8 +133,8 @@ impl Command {
                 return Err(Refusal::Usage(line));
             }
             let value = match (option.takes, attached) {
-                (OptionValue::Nothing, None) => OsStr::new("yes"),
-                (OptionValue::Nothing, Some(_)) => return Err(takes_no_value(name.as_str())),
+                (ValueKind::Nothing, None) => OsStr::new("yes"),
+                (ValueKind::Nothing, Some(_)) => return Err(takes_no_value(name.as_str())),
                 (_, Some(value)) => value,
                 // An option is no value: the person forgot the value.
                 (_, None) => words
@@ -147,7 +147,7 @@ impl Command {
         Ok(parsed)
     }
 
-    fn take_positional(&self, parsed: &mut Arguments, word: &OsStr) -> Result<(), Refusal> {
+    fn take_positional(&self, parsed: &mut CommandLine, word: &OsStr) -> Result<(), Refusal> {
         let shown = quoted(&word.to_string_lossy()).to_string();
         let Some((takes, _)) = self.positional else {
             return Err(Refusal::Usage(format!(
@@ -165,7 +165,7 @@ impl Command {
                 quoted(&first.to_string_lossy())
             )));
         }
-        if matches!(takes, OptionValue::Text(_)) && word.to_str().is_none() {
+        if matches!(takes, ValueKind::Text(_)) && word.to_str().is_none() {
             return Err(Refusal::Usage(format!(
                 "{shown}: a {name} must be UTF-8 text; write it so"
             )));
@@ -327,7 +327,7 @@ pub struct Opt {
     /// The short form without its dash, such as `q`.
     pub short: Option<char>,
     /// The kind of value after the option.
-    pub takes: OptionValue,
+    pub takes: ValueKind,
     /// The value of an omitted option; empty for none.
     pub default: &'static str,
     /// One sentence for the help text.
@@ -375,7 +375,7 @@ pub use options;
 
 /// The kind of value that an option takes.
 #[derive(Clone, Copy, Debug)]
-pub enum OptionValue {
+pub enum ValueKind {
     /// Nothing: the option is a flag.
     Nothing,
     /// A decimal number, from the first bound to the second, inclusive.
@@ -390,28 +390,28 @@ pub enum OptionValue {
     File(&'static str),
 }
 
-impl OptionValue {
+impl ValueKind {
     /// Returns the placeholder of a value in the help text; empty for a flag.
     const fn name(self) -> &'static str {
         match self {
-            OptionValue::Nothing => "",
-            OptionValue::Number(..) => "N",
-            OptionValue::Numbers(..) => "N,N,...",
-            OptionValue::OneOf(_) => "WORD",
-            OptionValue::Text(what) | OptionValue::File(what) => what,
+            ValueKind::Nothing => "",
+            ValueKind::Number(..) => "N",
+            ValueKind::Numbers(..) => "N,N,...",
+            ValueKind::OneOf(_) => "WORD",
+            ValueKind::Text(what) | ValueKind::File(what) => what,
         }
     }
 
     /// Describes the allowed values in words.
     fn allowed(self) -> String {
         match self {
-            OptionValue::Nothing => "nothing".into(),
-            OptionValue::Number(least, most) => format!("a number from {least} to {most}"),
-            OptionValue::Numbers(least, most) => {
+            ValueKind::Nothing => "nothing".into(),
+            ValueKind::Number(least, most) => format!("a number from {least} to {most}"),
+            ValueKind::Numbers(least, most) => {
                 format!("numbers from {least} to {most} with commas between")
             }
-            OptionValue::OneOf(words) => format!("one of {}", words.join(", ")),
-            OptionValue::Text(what) | OptionValue::File(what) => {
+            ValueKind::OneOf(words) => format!("one of {}", words.join(", ")),
+            ValueKind::Text(what) | ValueKind::File(what) => {
                 format!("a {}", what.to_lowercase())
             }
         }
@@ -423,7 +423,7 @@ impl Opt {
     pub const FLAG: Opt = Opt {
         name: OptionName(""),
         short: None,
-        takes: OptionValue::Nothing,
+        takes: ValueKind::Nothing,
         default: "",
         help: "",
         group: "",
@@ -433,17 +433,17 @@ impl Opt {
     fn check(&self, value: &OsStr) -> Result<(), String> {
         let text = value.to_str();
         let valid = match (self.takes, text) {
-            (OptionValue::Nothing, _) => true,
+            (ValueKind::Nothing, _) => true,
             // A file name may be any bytes; only an empty name, from `--name=`, is a mistake.
-            (OptionValue::File(_), _) => !value.is_empty(),
+            (ValueKind::File(_), _) => !value.is_empty(),
             // All other values are text.
             (_, None) => false,
-            (OptionValue::Number(least, most), Some(text)) => is_number(text, least..=most),
-            (OptionValue::Numbers(least, most), Some(text)) => {
+            (ValueKind::Number(least, most), Some(text)) => is_number(text, least..=most),
+            (ValueKind::Numbers(least, most), Some(text)) => {
                 text.split(',').all(|text| is_number(text, least..=most))
             }
-            (OptionValue::OneOf(words), Some(text)) => words.contains(&text),
-            (OptionValue::Text(_), Some(text)) => !text.is_empty(),
+            (ValueKind::OneOf(words), Some(text)) => words.contains(&text),
+            (ValueKind::Text(_), Some(text)) => !text.is_empty(),
         };
         if valid {
             return Ok(());
@@ -451,7 +451,7 @@ impl Opt {
         let mut must = format!("must be {}", self.takes.allowed());
         match (self.takes, text) {
             (_, None) => must = format!("is not UTF-8 text; {must}"),
-            (OptionValue::OneOf(words), Some(text)) => {
+            (ValueKind::OneOf(words), Some(text)) => {
                 must += &did_you_mean(text, words);
             }
             _ => {}
@@ -465,7 +465,7 @@ impl Opt {
     fn missing(&self, is_followed: bool) -> String {
         let (name, allowed) = (self.name, self.takes.allowed());
         let remedy = match (self.takes, is_followed) {
-            (OptionValue::Text(_) | OptionValue::File(_), true) => {
+            (ValueKind::Text(_) | ValueKind::File(_), true) => {
                 format!("; one that begins with `-` is written `--{name}=VALUE`")
             }
             _ => String::new(),
@@ -490,14 +490,14 @@ impl Opt {
         let mut parts = Vec::new();
         match self.takes {
             // `u64::MAX` means "no upper bound"; printing it would only be noise.
-            OptionValue::Number(least, most) | OptionValue::Numbers(least, most) => {
+            ValueKind::Number(least, most) | ValueKind::Numbers(least, most) => {
                 parts.push(match most {
                     u64::MAX => format!("from {least}"),
                     most => format!("{least} to {most}"),
                 })
             }
-            OptionValue::OneOf(words) => parts.push(words.join(" | ")),
-            OptionValue::Nothing | OptionValue::Text(_) | OptionValue::File(_) => {}
+            ValueKind::OneOf(words) => parts.push(words.join(" | ")),
+            ValueKind::Nothing | ValueKind::Text(_) | ValueKind::File(_) => {}
         }
         if !self.default.is_empty() {
             parts.push(format!("default {}", self.default));
@@ -523,13 +523,13 @@ fn is_number(text: &str, range: RangeInclusive<u64>) -> bool {
 
 /// A parsed and checked command line.
 #[derive(Clone, Debug)]
-pub struct Arguments {
+pub struct CommandLine {
     options: &'static [Opt],
     given: BTreeMap<OptionName, OsString>,
     positionals: Vec<OsString>,
 }
 
-impl Arguments {
+impl CommandLine {
     /// Returns whether the person gave the option (or flag).
     pub fn is_given(&self, name: OptionName) -> bool {
         self.given.contains_key(&name)
@@ -628,7 +628,7 @@ impl Arguments {
     }
 
     /// Returns a copy of the command line with another value of an option.
-    pub fn with(&self, name: OptionName, value: impl AsRef<OsStr>) -> Arguments {
+    pub fn with(&self, name: OptionName, value: impl AsRef<OsStr>) -> CommandLine {
         let mut other = self.clone();
         other.given.insert(name, value.as_ref().into());
         other

@@ -14,20 +14,20 @@ static COMMAND: Command = Command {
 
 options! {
     /// Processors of the guest.
-    CORES: OptionValue::Number(1, 64), or "8";
+    CORES: ValueKind::Number(1, 64), or "8";
     /// Parallel subtasks.
-    SUBTASKS: OptionValue::Numbers(1, 14);
+    SUBTASKS: ValueKind::Numbers(1, 14);
     /// The meaning of time.
-    MODE: OptionValue::OneOf(&["kvm", "deterministic", "threads"]);
+    MODE: ValueKind::OneOf(&["kvm", "deterministic", "threads"]);
     /// Keep the log.
-    SERIAL: OptionValue::File("FILE");
+    SERIAL: ValueKind::File("FILE");
     /// Only this.
-    ONLY: OptionValue::Text("NAME");
+    ONLY: ValueKind::Text("NAME");
     /// Say less.
-    QUIET 'q': OptionValue::Nothing;
+    QUIET 'q': ValueKind::Nothing;
 }
 
-fn parsed(line: &str) -> Arguments {
+fn parsed(line: &str) -> CommandLine {
     right(&COMMAND, line)
 }
 

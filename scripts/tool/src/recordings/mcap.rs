@@ -54,7 +54,7 @@ const CHUNK_BYTES: usize = 1 << 20;
 pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> {
     let header = recording.header();
     let channels = channels(header);
-    let mut file = WrittenFile {
+    let mut file = McapWriter {
         out,
         length: 0,
         chunk: MessageChunk::default(),
@@ -162,7 +162,7 @@ fn including(times: Times, time_ns: u64) -> Times {
 }
 
 /// The file as written so far.
-struct WrittenFile<'o> {
+struct McapWriter<'o> {
     out: &'o mut dyn Write,
     length: u64,
     chunk: MessageChunk,
@@ -172,7 +172,7 @@ struct WrittenFile<'o> {
     times: Times,
 }
 
-impl WrittenFile<'_> {
+impl McapWriter<'_> {
     fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.length += bytes.len() as u64;
         self.out.write_all(bytes)

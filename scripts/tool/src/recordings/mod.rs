@@ -21,7 +21,7 @@ use recording::{
 use text::{quoted, visible};
 
 use crate::files::{self, NamedFile};
-use crate::options::{Arguments, Command, OptionName, OptionValue, Refusal, options};
+use crate::options::{Command, CommandLine, OptionName, Refusal, ValueKind, options};
 use crate::proof::{self, observed};
 use crate::system;
 use views::protocol::Transcript;
@@ -35,7 +35,7 @@ pub static RECORDING: Command = Command {
     invocation: "./scripts/recording",
     about: "Shows a recording, and converts it from and to other formats.",
     positional: Some((
-        OptionValue::File("FILE"),
+        ValueKind::File("FILE"),
         "A recording; with --from-csv, a table to make one of.",
     )),
     options: OPTIONS,
@@ -49,32 +49,32 @@ file that is no whole and unaltered recording, or no such table
 
 options! {
     /// Write a table of each channel into this folder, and one of what else happened.
-    CSV: OptionValue::File("DIR");
+    CSV: ValueKind::File("DIR");
     /// Write an MCAP file, with messages in JSON, for Foxglove and others.
-    MCAP: OptionValue::File("FILE");
+    MCAP: ValueKind::File("FILE");
     /// Of a run that was kept (`./scripts/run --keep FILE`): write what proves the commit's
     /// bounds.
-    WITNESS: OptionValue::File("FILE");
+    WITNESS: ValueKind::File("FILE");
     /// Of such a run: write what calls took, as WCETs with a margin of 20 %.
-    OBSERVE: OptionValue::File("FILE");
+    OBSERVE: ValueKind::File("FILE");
     /// Show all that is recorded of a job. (What its subtasks compute of it is shown by the
     /// app's own replay.)
-    UNTIL: OptionValue::Text("DAG/JOB");
+    UNTIL: ValueKind::Text("DAG/JOB");
     /// Make a recording of a table whose rows are what a source returns.
-    FROM_CSV: OptionValue::Nothing;
+    FROM_CSV: ValueKind::Nothing;
     /// --from-csv: write the recording to this file.
-    OUT 'o': OptionValue::File("FILE");
+    OUT 'o': ValueKind::File("FILE");
     /// --from-csv: the DAG of the source.
-    DAG: OptionValue::Text("NAME");
+    DAG: ValueKind::Text("NAME");
     /// --from-csv: the topic that it writes.
-    TOPIC: OptionValue::Text("NAME");
+    TOPIC: ValueKind::Text("NAME");
     /// --from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its numbers
     /// in the order of the columns; else each column is a field of type f64.
-    TYPE: OptionValue::Text("TYPE");
+    TYPE: ValueKind::Text("TYPE");
     /// --from-csv: columns that are no part of the values, with commas between.
-    IGNORE: OptionValue::Text("COLUMNS");
+    IGNORE: ValueKind::Text("COLUMNS");
     /// --from-csv: the time from job to job, such as 10ms; a column release_ns has to agree.
-    PERIOD: OptionValue::Text("TIME");
+    PERIOD: ValueKind::Text("TIME");
 }
 
 /// Runs the subcommand with the words after its name.
@@ -84,7 +84,7 @@ pub fn recording(words: &[OsString]) -> ExitCode {
     })
 }
 
-fn attempt(options: &Arguments) -> Result<(), Refusal> {
+fn attempt(options: &CommandLine) -> Result<(), Refusal> {
     let question = "which file? name a recording, or with --from-csv a table";
     let input = options.file(question).map_err(Refusal::Usage)?;
     check(input, options).map_err(Refusal::Usage)?;
@@ -156,7 +156,7 @@ fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
 }
 
 /// Writes the requested views of commits and runs.
-fn of_runs(recording: &Recording<'_>, options: &Arguments) -> Result<(), String> {
+fn of_runs(recording: &Recording<'_>, options: &CommandLine) -> Result<(), String> {
     let Some(name) = options.given_of(&OF_RUNS) else {
         return Ok(());
     };
@@ -180,7 +180,7 @@ fn of_runs(recording: &Recording<'_>, options: &Arguments) -> Result<(), String>
 }
 
 /// Checks the options and all files before opening any of them.
-fn check(input: NamedFile<'_>, options: &Arguments) -> Result<(), String> {
+fn check(input: NamedFile<'_>, options: &CommandLine) -> Result<(), String> {
     let of_tables = [name::OUT, name::DAG, name::TOPIC];
     if options.is_given(name::FROM_CSV) {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(*name)) {

@@ -22,11 +22,11 @@ use text::quoted;
 
 use super::name;
 use crate::files;
-use crate::options::Arguments;
+use crate::options::CommandLine;
 
 /// Converts a table to a recording.
 #[allow(clippy::too_many_lines, reason = "one pass over a table")]
-pub(super) fn convert(file: &Path, options: &Arguments) -> Result<Vec<u8>, String> {
+pub(super) fn convert(file: &Path, options: &CommandLine) -> Result<Vec<u8>, String> {
     let text = files::read_text(file)?;
     let place = files::shown_path(file);
     let mut rows = TableRows {
@@ -161,7 +161,7 @@ struct ColumnRoles {
 }
 
 impl ColumnRoles {
-    fn new(titles: &[String], options: &Arguments) -> Result<Self, String> {
+    fn new(titles: &[String], options: &CommandLine) -> Result<Self, String> {
         let ignored = ignored(options);
         let unknown = ignored
             .iter()
@@ -191,20 +191,20 @@ impl ColumnRoles {
 }
 
 /// Returns the names of the columns left out of the values.
-fn ignored(options: &Arguments) -> Vec<&str> {
+fn ignored(options: &CommandLine) -> Vec<&str> {
     let all = options.text(name::IGNORE);
     all.map_or(Vec::new(), |all| all.split(',').collect())
 }
 
 /// Returns a name shared by two columns, unless the name is ignored.
-fn twice<'t>(titles: &'t [String], options: &Arguments) -> Option<&'t str> {
+fn twice<'t>(titles: &'t [String], options: &CommandLine) -> Option<&'t str> {
     let (ignored, mut seen) = (ignored(options), BTreeSet::new());
     let mut used = (titles.iter().map(String::as_str)).filter(|title| !ignored.contains(title));
     used.find(|title| !seen.insert(*title))
 }
 
 /// Returns the type of the values.
-fn schema(columns: &ColumnRoles, options: &Arguments) -> Result<Schema, String> {
+fn schema(columns: &ColumnRoles, options: &CommandLine) -> Result<Schema, String> {
     let Some(text) = options.text(name::TYPE) else {
         let field = |name: &String| Field {
             name: name.clone(),

@@ -15,7 +15,7 @@ use std::process::{self, ExitCode};
 use super::{RUN, on_linux, run};
 use crate::files;
 use crate::image;
-use crate::options::{Command, OptionValue, Refusal};
+use crate::options::{Command, Refusal, ValueKind};
 
 /// The help text of `boot`.
 static BOOT: Command = Command {
@@ -24,7 +24,7 @@ static BOOT: Command = Command {
 Boots an image, with the options of ./scripts/run after it, and runs any other program
 as it is: a runner for cargo.",
     positional: Some((
-        OptionValue::File("FILE"),
+        ValueKind::File("FILE"),
         "The image or program; all words after it are for that.",
     )),
     options: &[],

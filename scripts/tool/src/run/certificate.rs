@@ -9,14 +9,14 @@ use sched_dag::analysis::{AnalysisSettings, Overheads, answer, certify};
 use sched_dag::{CommitOptions, Policy, Preemption, SchedulerOptions};
 
 use super::name;
-use crate::options::Arguments;
+use crate::options::CommandLine;
 
 /// Gives a set a certificate for a run with these words, if the set needs one and can have one.
 /// Replaces a certificate of other words or another set. Returns the number of states.
 pub(super) fn give(
     set: &mut Set,
     words: &[String],
-    options: &Arguments,
+    options: &CommandLine,
     length: Length,
 ) -> Option<usize> {
     let cores = u32::try_from(options.number(name::CORES).unwrap_or(1)).ok()?;

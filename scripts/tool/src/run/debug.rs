@@ -22,14 +22,14 @@ use std::time::{Duration, Instant};
 
 use text::quoted;
 
-use super::handed::HandedFiles;
+use super::handed::GuestInput;
 use super::loading;
 use super::{RUN, check_files, choose_app};
 use crate::child;
 use crate::files;
 use crate::image;
 use crate::install;
-use crate::options::{Arguments, Command, Opt, OptionName, Refusal, did_you_mean};
+use crate::options::{Command, CommandLine, Opt, OptionName, Refusal, did_you_mean};
 use crate::qemu::{Mode, Qemu};
 use crate::run_options::name;
 use crate::system;
@@ -70,14 +70,14 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 
 /// The options that `run` does not have.
 mod own {
-    use crate::options::{OptionValue, options};
+    use crate::options::{ValueKind, options};
 
     options! {
         /// Where to stop, with commas between: a function, by the end of its path
         /// (control, attitude::control), or FILE:LINE (src/dags.rs:153).
-        BREAK: OptionValue::Text("PLACES"), or "kernel_main";
+        BREAK: ValueKind::Text("PLACES"), or "kernel_main";
         /// Have gdb do what this file says once it has stopped, and end; no person is asked.
-        COMMANDS: OptionValue::File("FILE");
+        COMMANDS: ValueKind::File("FILE");
     }
 }
 
@@ -98,7 +98,7 @@ pub fn debug(words: &[OsString]) -> ExitCode {
 }
 
 /// Starts gdb in place of this process; returns only if a step fails.
-fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
+fn attempt(own: &CommandLine) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
     let commands = own.path(own::name::COMMANDS);
@@ -112,7 +112,7 @@ fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
     let memory_mib = loading::choose_memory(&run, None)?;
     let program = loading::choose_program(&run)?;
     install::ensure(&install::GDB)?;
-    let handed = HandedFiles::read(&run, None)?;
+    let handed = GuestInput::read(&run, None)?;
     let mode = run.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let mut qemu = super::describe(&run, &program, mode, memory_mib, None);
@@ -143,7 +143,7 @@ fn attempt(own: &Arguments) -> Result<ExitCode, Refusal> {
 
 /// Returns a command line for `run` with the options shared by both commands: the given options,
 /// and options with other defaults here.
-fn as_run(own: &Arguments) -> Result<Arguments, Refusal> {
+fn as_run(own: &CommandLine) -> Result<CommandLine, Refusal> {
     let shared = DEBUG.options.iter().map(|option| option.name);
     let shared = shared.filter(|name| RUN.options.iter().any(|option| option.name == *name));
     let shared =

@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 
 use text::{quoted, shown, visible};
 
-use crate::dag_file::PreparedFile;
+use crate::dag_file::PreparedRun;
 use crate::files::{self, NamedFile, TemporaryFile};
-use crate::options::{Arguments, Refusal};
+use crate::options::{CommandLine, Refusal};
 use crate::outcome::Outcome;
 use crate::proof::observed;
 use crate::qemu::{Network, SecondPort};
@@ -26,7 +26,7 @@ use crate::system;
 use crate::wire_script;
 
 /// Files on their way to the guest.
-pub(super) struct HandedFiles {
+pub(super) struct GuestInput {
     /// The guest's words: the parameters, and the length of each part of the module; each word
     /// follows a blank.
     pub(super) words: String,
@@ -34,12 +34,12 @@ pub(super) struct HandedFiles {
     module: TemporaryFile,
 }
 
-impl HandedFiles {
+impl GuestInput {
     /// Reads the files named by the options, and writes the module.
     pub(super) fn read(
-        options: &Arguments,
-        dags: Option<&PreparedFile>,
-    ) -> Result<HandedFiles, Refusal> {
+        options: &CommandLine,
+        dags: Option<&PreparedRun>,
+    ) -> Result<GuestInput, Refusal> {
         let read = |path: &Path| observed::read(path).map_err(Refusal::Usage);
         let text = options.path(name::WCETS).map(read).transpose()?;
         let text = text.unwrap_or_default();
@@ -77,7 +77,7 @@ impl HandedFiles {
                 words += &format!(" {name}={}", part.len());
             }
         }
-        Ok(HandedFiles { words, module })
+        Ok(GuestInput { words, module })
     }
 
     /// Returns the path of the written module.
@@ -88,7 +88,7 @@ impl HandedFiles {
 
 /// Returns the bytes of the recording for the module. Returns none without a replay, or on Linux,
 /// where the program reads the file itself.
-fn read_replayed(options: &Arguments) -> Result<Vec<u8>, Refusal> {
+fn read_replayed(options: &CommandLine) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path(name::REPLAY) else {
         return Ok(Vec::new());
     };
@@ -103,7 +103,7 @@ fn read_replayed(options: &Arguments) -> Result<Vec<u8>, Refusal> {
 }
 
 /// Returns the word for the guest's parameters after a blank; empty without parameters.
-fn parameters(options: &Arguments) -> Result<String, Refusal> {
+fn parameters(options: &CommandLine) -> Result<String, Refusal> {
     let mut parts = Vec::new();
     if let Some(path) = options.path(name::PARAMS) {
         let place = files::shown_path(path);
@@ -153,12 +153,12 @@ fn pair(text: &str) -> Option<String> {
 const STREAM: &str = "-";
 
 /// Reports whether standard input goes to the port.
-pub(super) fn is_live(options: &Arguments) -> bool {
+pub(super) fn is_live(options: &CommandLine) -> bool {
     options.path(name::INPUT) == Some(Path::new(STREAM))
 }
 
 /// Returns the file named by `--input`, unless the name means standard input.
-pub(super) fn input(options: &Arguments) -> Vec<NamedFile<'_>> {
+pub(super) fn input(options: &CommandLine) -> Vec<NamedFile<'_>> {
     match is_live(options) {
         true => Vec::new(),
         false => options.named(&[name::INPUT]),
@@ -166,7 +166,7 @@ pub(super) fn input(options: &Arguments) -> Vec<NamedFile<'_>> {
 }
 
 /// Makes sure that `--input` and `--output` are compatible with the other options.
-pub(super) fn check(options: &Arguments) -> Result<(), Refusal> {
+pub(super) fn check(options: &CommandLine) -> Result<(), Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     if is_live(options) && options.is_given(name::CONSOLE) {
         return usage(
@@ -185,7 +185,7 @@ pub(super) fn check(options: &Arguments) -> Result<(), Refusal> {
 }
 
 /// Returns the script for the guest from the file named by `--input`; empty without a file.
-fn script(options: &Arguments) -> Result<Vec<u8>, Refusal> {
+fn script(options: &CommandLine) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path(name::INPUT).filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
     };
@@ -214,7 +214,7 @@ fn script(options: &Arguments) -> Result<Vec<u8>, Refusal> {
 }
 
 /// Returns the other end of the second serial port, if `--input` or `--output` is given.
-pub(super) fn second(options: &Arguments) -> Option<SecondPort> {
+pub(super) fn second(options: &CommandLine) -> Option<SecondPort> {
     let output = options.path(name::OUTPUT).map(PathBuf::from);
     (output.is_some() || options.is_given(name::INPUT)).then(|| SecondPort {
         is_live: is_live(options),
@@ -223,7 +223,7 @@ pub(super) fn second(options: &Arguments) -> Option<SecondPort> {
 }
 
 /// Returns the network, if `--net` is given.
-pub(super) fn network(options: &Arguments) -> Option<Network> {
+pub(super) fn network(options: &CommandLine) -> Option<Network> {
     let words = options.text(name::NET)?.into();
     // Without the option ROM with which a firmware would boot from the network.
     let card = match options.text(name::CARD) {
@@ -239,7 +239,7 @@ pub(super) fn network(options: &Arguments) -> Option<Network> {
 }
 
 /// Returns a warning if `--output` is given but the app has no wire and so has sent nothing.
-pub(super) fn warning(options: &Arguments, outcome: &Outcome) -> Option<String> {
+pub(super) fn warning(options: &CommandLine, outcome: &Outcome) -> Option<String> {
     let file = options.path(name::OUTPUT).map(files::shown_path)?;
     let has_wire = outcome.transcript.of_kind("wire").next().is_some();
     (!has_wire).then(|| format!("{file}: the app has connected no wire, and so it is empty"))
@@ -258,7 +258,7 @@ mod tests {
         let demo = workspace().join("apps/dag-file/examples/demo.dag");
         let options = right(&RUN, "--jobs 3").with(name::DAG, demo);
         let dags = prepare(&options).unwrap().unwrap();
-        let handed = HandedFiles::read(&options, Some(&dags)).unwrap();
+        let handed = GuestInput::read(&options, Some(&dags)).unwrap();
         let module = handed.module().unwrap();
         assert_eq!(fs::read_to_string(&module).unwrap(), dags.file.to_string());
         drop(handed);

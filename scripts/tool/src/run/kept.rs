@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 use recording::{Chunk, Header, Recording, Writer};
 
 use super::page::PageServer;
-use super::screen::LineOutputs;
+use super::screen::RunDisplay;
 use super::{EndedRun, handed};
 use crate::files::{self, TemporaryFile};
-use crate::options::{Arguments, OptionName, Refusal};
+use crate::options::{CommandLine, OptionName, Refusal};
 use crate::outcome::Outcome;
-use crate::page::{self, PageFiles};
-use crate::qemu::QemuEnd;
+use crate::page::{self, PageContent};
+use crate::qemu::RunEnd;
 use crate::recordings;
 use crate::run_options::name;
 use crate::system;
@@ -50,7 +50,7 @@ pub(super) struct KeptFiles {
 }
 
 /// Returns the guest's word for the kind of record wanted by the options.
-pub(super) fn word(options: &Arguments) -> Option<&'static str> {
+pub(super) fn word(options: &CommandLine) -> Option<&'static str> {
     // A full record has the events, too, so it prevails over the views.
     match options.given_of(&[name::KEEP, name::PAGE]) {
         Some(_) => Some("keep"),
@@ -61,10 +61,10 @@ pub(super) fn word(options: &Arguments) -> Option<&'static str> {
 }
 
 impl KeptFiles {
-    pub(super) fn new(options: &Arguments, app: &str) -> Result<Self, String> {
+    pub(super) fn new(options: &CommandLine, app: &str) -> Result<Self, String> {
         let path = system::new_log(app)?.with_extension("sent");
         let server = options.is_given(name::PAGE).then(|| {
-            let page = page::html(&PageFiles::default(), true)?;
+            let page = page::html(&PageContent::default(), true)?;
             PageServer::start(page, &path)
         });
         Ok(Self {
@@ -81,7 +81,7 @@ impl KeptFiles {
     }
 
     /// Says where to read the record while the run goes on.
-    pub(super) fn introduce(&self, screen: &LineOutputs) {
+    pub(super) fn introduce(&self, screen: &RunDisplay) {
         if let Some(server) = &self.server {
             // Not by the screen, which `--quiet` silences: without the address the page is of no
             // use.
@@ -123,11 +123,11 @@ impl KeptFiles {
     /// Writes the record to the files named by the options. Returns lines announcing the files.
     pub(super) fn write(
         &self,
-        options: &Arguments,
+        options: &CommandLine,
         outcome: &Outcome,
     ) -> Result<Vec<String>, String> {
         // A refused command line: nothing has run, and an older file must stay as it is.
-        if outcome.ending == QemuEnd::Guest(Status::Usage) {
+        if outcome.ending == RunEnd::Guest(Status::Usage) {
             return Ok(Vec::new());
         }
         // Bytes that nobody asked for come from a crash.
@@ -300,11 +300,11 @@ fn but_for(bytes: &[u8]) -> String {
 /// Writes and announces the files wanted of a run, and serves the record to its page. Only after a
 /// good run, warns of a wire that was never used.
 pub(super) fn write(
-    options: &Arguments,
+    options: &CommandLine,
     kept: &KeptFiles,
     mut outcome: Outcome,
     log: SerialLog,
-    screen: LineOutputs,
+    screen: RunDisplay,
 ) -> Result<EndedRun, Refusal> {
     kept.receive(&mut outcome)?;
     for line in kept.write(options, &outcome)? {
@@ -340,7 +340,7 @@ pub(super) struct SerialLog {
 }
 
 /// Makes sure that the named log can be read back while the guest writes it.
-pub(super) fn check(options: &Arguments) -> Result<(), String> {
+pub(super) fn check(options: &CommandLine) -> Result<(), String> {
     let is_other = |path: &&Path| fs::metadata(path).is_ok_and(|data| !data.is_file());
     options
         .path(name::SERIAL)
@@ -356,7 +356,7 @@ pub(super) fn check(options: &Arguments) -> Result<(), String> {
 
 impl SerialLog {
     /// Chooses the log's path. The file is made when the guest starts.
-    pub(super) fn choose(options: &Arguments, app: &str) -> Result<SerialLog, String> {
+    pub(super) fn choose(options: &CommandLine, app: &str) -> Result<SerialLog, String> {
         let named = options.path(name::SERIAL).map(Path::to_path_buf);
         let stays = named.is_some();
         let path = named.map_or_else(|| system::new_log(app), Ok)?;

@@ -2,22 +2,22 @@
 
 use std::path::PathBuf;
 
-use crate::dag_file::PreparedFile;
+use crate::dag_file::PreparedRun;
 use crate::files;
 use crate::install;
-use crate::options::{Arguments, Refusal};
+use crate::options::{CommandLine, Refusal};
 use crate::qemu::{Loader, Machine, Mode, PROGRAM};
 use crate::run_options::name;
 use crate::system;
 
 /// Returns the loader chosen by the options.
-pub(super) fn chosen(options: &Arguments) -> Loader {
+pub(super) fn chosen(options: &CommandLine) -> Loader {
     let named = options.text(name::BOOT).and_then(Loader::from_name);
     named.unwrap_or(Loader::Pvh)
 }
 
 /// Returns the feature that a microvm lacks and an option needs, with the option's name.
-fn needs_pc(options: &Arguments) -> Option<(&'static str, &'static str)> {
+fn needs_pc(options: &CommandLine) -> Option<(&'static str, &'static str)> {
     let stick = ("no firmware that boots from a stick", "boot");
     let boots = chosen(options).needs_stick().then_some(stick);
     let device = ("no PCI, which `--device` needs", "device");
@@ -28,7 +28,7 @@ fn needs_pc(options: &Arguments) -> Option<(&'static str, &'static str)> {
 }
 
 /// Returns the board chosen or needed by the options.
-pub(super) fn machine(options: &Arguments) -> Machine {
+pub(super) fn machine(options: &CommandLine) -> Machine {
     if needs_pc(options).is_some() {
         return Machine::Q35;
     }
@@ -41,7 +41,7 @@ pub(super) fn machine(options: &Arguments) -> Machine {
 /// # Errors
 ///
 /// In words: the options contradict each other.
-pub(super) fn check(options: &Arguments, mode: Option<Mode>) -> Result<(), String> {
+pub(super) fn check(options: &CommandLine, mode: Option<Mode>) -> Result<(), String> {
     let loader = chosen(options);
     let microvm = Machine::Microvm.name();
     // Only a board named by the person is refused: the default gives way.
@@ -72,8 +72,8 @@ pub(super) fn check(options: &Arguments, mode: Option<Mode>) -> Result<(), Strin
 /// Chooses the memory in MiB: the person's choice or the usual amount. Either must suffice for the
 /// stacks and tables of all processors.
 pub(super) fn choose_memory(
-    options: &Arguments,
-    dags: Option<&PreparedFile>,
+    options: &CommandLine,
+    dags: Option<&PreparedRun>,
 ) -> Result<u64, Refusal> {
     let cores = options.number(name::CORES).unwrap_or(1);
     let loader = chosen(options);
@@ -109,7 +109,7 @@ pub(super) fn choose_memory(
 }
 
 /// Finds the QEMU to use. Installs QEMU if the person named none and none is there.
-pub(super) fn choose_program(options: &Arguments) -> Result<PathBuf, Refusal> {
+pub(super) fn choose_program(options: &CommandLine) -> Result<PathBuf, Refusal> {
     if let Some(named) = options.path(name::QEMU) {
         return system::find_program(named).ok_or_else(|| {
             let place = files::shown_path(named);

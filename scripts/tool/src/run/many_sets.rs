@@ -19,7 +19,7 @@ use super::{certificate, name, on_linux, prepare, words};
 use crate::dag_file::translate;
 use crate::files::{self, TemporaryFile};
 use crate::image;
-use crate::options::{Arguments, Refusal};
+use crate::options::{CommandLine, Refusal};
 use crate::program::{self, ProgramOrder};
 use crate::progress::Progress;
 use crate::system;
@@ -47,7 +47,7 @@ struct PartRows {
 const SHARE: usize = 16;
 
 /// Runs all sets of the files, and prints the table.
-pub(super) fn run(options: &Arguments, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
+pub(super) fn run(options: &CommandLine, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let why = "is for one set; name a file of one with `--dag`";
     let apart = [&FOR_ONE_FILE[..], &[name::KEEP, name::JSON]].concat();
     let for_several = options.check_without(&apart, why);
@@ -87,7 +87,7 @@ pub(super) fn run(options: &Arguments, files: &[PathBuf]) -> Result<ExitCode, Re
 
 /// Reads all files. Returns their sets, the words for the program, and the length of a run.
 fn read<'f>(
-    options: &Arguments,
+    options: &CommandLine,
     files: &'f [PathBuf],
 ) -> Result<(Vec<Part<'f>>, Vec<String>, Length), Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files read");
@@ -116,7 +116,7 @@ fn read<'f>(
 /// set. A set may take up to `seconds`.
 fn run_share(
     program: &Path,
-    (words, options, length): (&[String], &Arguments, Length),
+    (words, options, length): (&[String], &CommandLine, Length),
     seconds: u64,
     share: &[Part<'_>],
 ) -> Result<Vec<PartRows>, String> {

@@ -27,20 +27,20 @@ use std::time::Duration;
 
 use text::quoted;
 
-use crate::child::EndReason;
-use crate::dag_file::{self, PreparedFile};
+use crate::child::StopReason;
+use crate::dag_file::{self, PreparedRun};
 use crate::files;
 use crate::image;
 use crate::install;
 use crate::medium;
-use crate::options::{Arguments, BY_PERSON, OptionName, Refusal};
+use crate::options::{BY_PERSON, CommandLine, OptionName, Refusal};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
-use crate::qemu::{Mode, Qemu, QemuEnd};
+use crate::qemu::{Mode, Qemu, RunEnd};
 use crate::run_options::{GUEST_WORDS, name};
-use handed::HandedFiles;
+use handed::GuestInput;
 use kept::{KeptFiles, SerialLog};
-use screen::LineOutputs;
+use screen::RunDisplay;
 use views::protocol::{Status, Transcript};
 
 pub use crate::run_options::RUN;
@@ -64,7 +64,7 @@ pub fn run(words: &[OsString]) -> ExitCode {
     RUN.carry_out(words, attempt)
 }
 
-fn attempt(options: &Arguments) -> Result<ExitCode, Refusal> {
+fn attempt(options: &CommandLine) -> Result<ExitCode, Refusal> {
     // First: the default number of cores depends on the platform.
     let options = &on_linux::settle(options)?;
     if !options.is_given(name::REPLAY) {
@@ -105,12 +105,12 @@ fn attempt(options: &Arguments) -> Result<ExitCode, Refusal> {
 }
 
 /// Reads the file named by `--dag`, if there is such a file.
-fn prepare(options: &Arguments) -> Result<Option<PreparedFile>, Refusal> {
+fn prepare(options: &CommandLine) -> Result<Option<PreparedRun>, Refusal> {
     dag_file::prepare(options).map_err(|lines| Refusal::Usage(lines.join("\n")))
 }
 
 /// Gives certificates to the sets of a file, and reports them.
-fn certified(options: &Arguments, mut dags: PreparedFile) -> PreparedFile {
+fn certified(options: &CommandLine, mut dags: PreparedRun) -> PreparedRun {
     let words = words(options, Some(&dags), on_linux::own_words(options));
     for set in &mut dags.file.sets {
         let states = certificate::give(set, &words, options, dags.length);
@@ -124,7 +124,7 @@ fn certified(options: &Arguments, mut dags: PreparedFile) -> PreparedFile {
 }
 
 /// Checks all files named by the options, before opening any of them.
-fn check_files(options: &Arguments) -> Result<(), Refusal> {
+fn check_files(options: &CommandLine) -> Result<(), Refusal> {
     handed::check(options)?;
     let names = [
         name::DAG,
@@ -147,13 +147,13 @@ fn check_files(options: &Arguments) -> Result<(), Refusal> {
 struct EndedRun {
     outcome: Outcome,
     log: SerialLog,
-    screen: LineOutputs,
+    screen: RunDisplay,
 }
 
 /// Boots the app named by the options; `shows` says whether its lines are shown.
 fn boot_app(
-    options: &Arguments,
-    dags: Option<&PreparedFile>,
+    options: &CommandLine,
+    dags: Option<&PreparedRun>,
     shows: bool,
 ) -> Result<EndedRun, Refusal> {
     let app = choose_app(options, dags.is_some())?;
@@ -167,7 +167,7 @@ fn boot_app(
     // May install packages, so it comes after the checks of the loader.
     install::ensure_loader(loading::chosen(options))?;
 
-    let handed = HandedFiles::read(options, dags)?;
+    let handed = GuestInput::read(options, dags)?;
     let kept = KeptFiles::new(options, &app)?;
     let describe = |mode| {
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
@@ -197,7 +197,7 @@ fn boot_app(
     let (mode, why) = chosen?;
     let qemu = describe(mode);
     let limit = limit(options, dags);
-    let mut screen = LineOutputs::new(options, &image);
+    let mut screen = RunDisplay::new(options, &image);
     introduce(&screen, &app, &qemu, why);
     kept.introduce(&screen);
     let show = |line: &str| {
@@ -217,7 +217,7 @@ fn boot_app(
 
 /// Returns the app to run: the app named by the options, which a given image must match, or else
 /// the app named by the image.
-fn choose_app(options: &Arguments, is_dag_file: bool) -> Result<String, Refusal> {
+fn choose_app(options: &CommandLine, is_dag_file: bool) -> Result<String, Refusal> {
     let app = match is_dag_file {
         true => "dag-file",
         false => options.text(name::APP).unwrap_or_default(),
@@ -252,11 +252,11 @@ fn choose_app(options: &Arguments, is_dag_file: bool) -> Result<String, Refusal>
 }
 
 fn describe(
-    options: &Arguments,
+    options: &CommandLine,
     program: &Path,
     mode: Mode,
     memory_mib: u64,
-    dags: Option<&PreparedFile>,
+    dags: Option<&PreparedRun>,
 ) -> Qemu {
     let words = words(options, dags, screen::guest_words(options)).join(" ");
     // Emulated cores take much longer than their instructions suggest, and budgets do not allow for
@@ -287,7 +287,7 @@ fn describe(
 
 /// Returns the guest's words: first the options' words, then the platform's, and last the person's
 /// own.
-fn words(options: &Arguments, dags: Option<&PreparedFile>, own: Vec<String>) -> Vec<String> {
+fn words(options: &CommandLine, dags: Option<&PreparedRun>, own: Vec<String>) -> Vec<String> {
     let mut words = Vec::new();
     for name in GUEST_WORDS.iter().copied() {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
@@ -302,7 +302,7 @@ fn words(options: &Arguments, dags: Option<&PreparedFile>, own: Vec<String>) -> 
 
 /// Returns the time limit: the person's, or two minutes and a second for each job. The default is
 /// generous even where a job takes its real time. A DAG file states its own limit.
-fn limit(options: &Arguments, dags: Option<&PreparedFile>) -> Duration {
+fn limit(options: &CommandLine, dags: Option<&PreparedRun>) -> Duration {
     let jobs = options.number(name::JOBS).unwrap_or(200);
     let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
     let seconds = options.number(name::TIMEOUT).unwrap_or(usual);
@@ -315,12 +315,12 @@ fn limit(options: &Arguments, dags: Option<&PreparedFile>) -> Duration {
 }
 
 /// Reports whether somebody sends input while the guest runs.
-fn is_live(options: &Arguments) -> bool {
+fn is_live(options: &CommandLine) -> bool {
     options.is_given(name::CONSOLE) || handed::is_live(options)
 }
 
 /// Prints the app, its guest, and how far the times can be trusted.
-fn introduce(screen: &LineOutputs, app: &str, qemu: &Qemu, why: Option<String>) {
+fn introduce(screen: &RunDisplay, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
     screen.say(&format!(
         "mode {}, machine {}, booted by {}, {} cores, {} MiB of memory",
@@ -340,13 +340,13 @@ fn introduce(screen: &LineOutputs, app: &str, qemu: &Qemu, why: Option<String>) 
 }
 
 /// Reports how a run has ended, and returns the exit code.
-fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments) -> ExitCode {
+fn conclude(booted: &EndedRun, dags: Option<&PreparedRun>, options: &CommandLine) -> ExitCode {
     let EndedRun {
         outcome,
         log,
         screen,
     } = booted;
-    let by_person = outcome.asked == Some(EndReason::ByPerson);
+    let by_person = outcome.asked == Some(StopReason::ByPerson);
     let Err(fault) = outcome.judge() else {
         let (how, code) = match by_person {
             true => ("ended by ctrl-C, in order,", ExitCode::from(BY_PERSON)),
@@ -390,12 +390,12 @@ fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments)
         Err(_) => eprint!("{}", outcome.tail()),
     }
     let remedy = match outcome.ending {
-        QemuEnd::TimedOut { .. } => format!(
+        RunEnd::TimedOut { .. } => format!(
             "{}; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
              if it has a WCET or a budget",
             stalled(&outcome.transcript)
         ),
-        QemuEnd::Guest(Status::Success) if matches!(outcome.asked, Some(EndReason::ByLimit(_))) => {
+        RunEnd::Guest(Status::Success) if matches!(outcome.asked, Some(StopReason::ByLimit(_))) => {
             "; `--timeout SECONDS` gives it longer".into()
         }
         _ => String::new(),
@@ -412,7 +412,7 @@ fn conclude(booted: &EndedRun, dags: Option<&PreparedFile>, options: &Arguments)
 /// Returns an error to stop a series of runs if a person has ended this run.
 fn go_on(booted: &EndedRun) -> Result<(), Refusal> {
     match booted.outcome.asked {
-        Some(EndReason::ByPerson) => Err(Refusal::ByPerson),
+        Some(StopReason::ByPerson) => Err(Refusal::ByPerson),
         _ => Ok(()),
     }
 }

@@ -7,17 +7,17 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::handed::{self, HandedFiles};
+use super::handed::{self, GuestInput};
 use super::kept::{self, KeptFiles, SerialLog};
-use super::screen::LineOutputs;
+use super::screen::RunDisplay;
 use super::{EndedRun, limit};
 
-use crate::dag_file::PreparedFile;
+use crate::dag_file::PreparedRun;
 use crate::debian::{Guest, GuestOrder};
 use crate::image;
-use crate::options::{Arguments, OptionName, Refusal};
+use crate::options::{CommandLine, OptionName, Refusal};
 use crate::program;
-use crate::qemu::{self, Mode, QemuEnd};
+use crate::qemu::{self, Mode, RunEnd};
 use crate::run_options::name;
 
 /// Options that concern only QEMU, its guest, or the bare-metal kernel.
@@ -64,22 +64,22 @@ const NOT_ON_HOST: [OptionName; 11] = [
 const START: Duration = Duration::from_secs(120);
 
 /// Reports whether the options ask for Linux, or at least for a program of this computer.
-pub(super) fn is_asked_for(options: &Arguments) -> bool {
+pub(super) fn is_asked_for(options: &CommandLine) -> bool {
     options.text(name::ON) != Some("machine")
 }
 
 /// Reports whether the options ask for virtual time.
-pub(super) fn is_on_host(options: &Arguments) -> bool {
+pub(super) fn is_on_host(options: &CommandLine) -> bool {
     options.text(name::ON) == Some("host")
 }
 
 /// Reports whether Linux runs as a guest in QEMU.
-fn is_in_guest(options: &Arguments) -> bool {
+fn is_in_guest(options: &CommandLine) -> bool {
     options.text(name::ON) == Some("debian")
 }
 
 /// Refuses options unavailable on Linux, and settles the number of cores.
-pub(super) fn settle(options: &Arguments) -> Result<Arguments, Refusal> {
+pub(super) fn settle(options: &CommandLine) -> Result<CommandLine, Refusal> {
     if !is_asked_for(options) {
         // The reverse case: options of Linux on the bare machine.
         let why = "is for Linux; leave it out, or give `--on linux` or `--on debian`";
@@ -120,7 +120,7 @@ pub(super) fn settle(options: &Arguments) -> Result<Arguments, Refusal> {
     Ok(options.with(name::CORES, usual.min(there).to_string()))
 }
 
-fn settle_host(options: &Arguments) -> Result<Arguments, String> {
+fn settle_host(options: &CommandLine) -> Result<CommandLine, String> {
     options.check_without(
         &NOT_ON_HOST,
         "is not for virtual time; leave it or `--on host` out",
@@ -139,16 +139,16 @@ const GUEST_CORES: &str = "4";
 /// Builds the app's program and runs it as the options say.
 #[allow(clippy::too_many_lines, reason = "the steps of a run, in order")]
 pub(super) fn run_app(
-    options: &Arguments,
+    options: &CommandLine,
     app: &str,
-    dags: Option<&PreparedFile>,
+    dags: Option<&PreparedRun>,
     shows: bool,
 ) -> Result<EndedRun, Refusal> {
     let given = options.path(name::IMAGE);
     if given.is_none() {
         image::check_linux(app).map_err(Refusal::Usage)?;
     }
-    let handed = HandedFiles::read(options, dags)?;
+    let handed = GuestInput::read(options, dags)?;
     let mut words: Vec<OsString> = super::words(options, dags, own_words(options))
         .iter()
         .map(OsString::from)
@@ -178,7 +178,7 @@ pub(super) fn run_app(
         None if is_on_host(options) => image::build_host()?,
         None => image::build_linux(app, None)?,
     };
-    let mut screen = LineOutputs::new(options, &image);
+    let mut screen = RunDisplay::new(options, &image);
     let mode = options.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let guest = is_in_guest(options).then(|| {
@@ -238,7 +238,7 @@ pub(super) fn run_app(
     screen.wipe();
     let mut outcome = outcome?;
     // If Linux itself failed, the app's log is empty; the guest's console tells why.
-    if let (Some(guest), QemuEnd::Program(why)) = (&guest, &mut outcome.ending) {
+    if let (Some(guest), RunEnd::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
     kept::write(options, &kept, outcome, log, screen)
@@ -246,10 +246,10 @@ pub(super) fn run_app(
 
 /// Prints the program, its words, and how far its times can be trusted.
 fn introduce(
-    screen: &LineOutputs,
+    screen: &RunDisplay,
     app: &str,
     words: &[OsString],
-    options: &Arguments,
+    options: &CommandLine,
     guest: Option<Mode>,
 ) {
     let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
@@ -284,7 +284,7 @@ fn meaning(mode: Mode) -> &'static str {
 }
 
 /// Returns the words for programs of this computer only.
-pub(super) fn own_words(options: &Arguments) -> Vec<String> {
+pub(super) fn own_words(options: &CommandLine) -> Vec<String> {
     let mut words = Vec::new();
     for name in [name::CORES, name::MECHANISM, name::OUTPUT] {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));

@@ -17,7 +17,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::handed;
-use crate::options::Arguments;
+use crate::options::CommandLine;
 use crate::places;
 use crate::progress::Progress;
 use crate::run_options::name;
@@ -29,7 +29,7 @@ use views::protocol::{MachineLine, read_line};
 pub(super) const NOTHING: &str = "nothing";
 
 /// The destinations of each kind of line.
-pub(super) struct LineOutputs {
+pub(super) struct RunDisplay {
     people: bool,
     machine: bool,
     quiet: bool,
@@ -42,9 +42,9 @@ pub(super) struct LineOutputs {
     image: PathBuf,
 }
 
-impl LineOutputs {
-    pub(super) fn new(options: &Arguments, image: &Path) -> LineOutputs {
-        LineOutputs {
+impl RunDisplay {
+    pub(super) fn new(options: &CommandLine, image: &Path) -> RunDisplay {
+        RunDisplay {
             people: !options.is_given(name::JSON),
             machine: options.text(name::QUIET) != Some(NOTHING)
                 && (options.is_given(name::JSON) || !options.is_given(name::CONSOLE)),
@@ -180,7 +180,7 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
 }
 
 /// Returns the guest's words needed for the screen.
-pub(super) fn guest_words(options: &Arguments) -> Vec<String> {
+pub(super) fn guest_words(options: &CommandLine) -> Vec<String> {
     let mut words = Vec::new();
     if options.is_given(name::CONSOLE) {
         words.push("console=on".into());
@@ -194,7 +194,7 @@ pub(super) fn guest_words(options: &Arguments) -> Vec<String> {
 /// Reports whether the tool can ask the guest to end by ctrl-C. It cannot if standard input feeds
 /// the guest's second port, since QEMU has only one standard input, or if the person's own words
 /// set `console=`.
-pub(super) fn can_stop(options: &Arguments) -> bool {
+pub(super) fn can_stop(options: &CommandLine) -> bool {
     let says_otherwise = options
         .text(name::APPEND)
         .is_some_and(|words| words.contains("console="));
@@ -202,7 +202,7 @@ pub(super) fn can_stop(options: &Arguments) -> bool {
 }
 
 /// Reports whether a person watches without typing.
-fn is_watched(options: &Arguments) -> bool {
+fn is_watched(options: &CommandLine) -> bool {
     let is_silent = options
         .given_of(&[name::QUIET, name::JSON, name::GDB])
         .is_some();
@@ -215,7 +215,7 @@ fn is_watched(options: &Arguments) -> bool {
 ///
 /// Starts when the guest has written to `log`: before the guest sets up its serial port, input is
 /// lost.
-pub(super) fn relay(options: &Arguments, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
+pub(super) fn relay(options: &CommandLine, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
     let is_read = options.is_given(name::CONSOLE) || handed::is_live(options);
     let farewell = match options.number(name::JOBS) {

@@ -19,11 +19,11 @@ use super::screen::NOTHING;
 use super::{EndedRun, RUN, boot_app, certified, check_files, conclude, go_on, prepare};
 use crate::dag_file::{ENDINGS, Format, states_overheads};
 use crate::files::{self, TemporaryFile};
-use crate::options::{Arguments, OptionName, Refusal};
+use crate::options::{CommandLine, OptionName, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
-use crate::proof::observed::{self, OfDag};
+use crate::proof::observed::{self, DagTimes};
 use crate::proof::{self, ProofRow};
 use crate::run_options::name;
 use crate::system;
@@ -35,7 +35,7 @@ use views::record::Record;
 type Measurement = Result<MeasuredCosts, String>;
 
 /// Proves the DAGs of an app or a file: observes, commits, compares, and prints the table.
-pub(super) fn run(options: &Arguments) -> Result<ExitCode, Refusal> {
+pub(super) fn run(options: &CommandLine) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
     let others = [name::CONSOLE, name::GDB, name::PAGE, name::PRINT_DAG];
     let alone = options.check_without(&others, why);
@@ -54,7 +54,7 @@ pub(super) fn run(options: &Arguments) -> Result<ExitCode, Refusal> {
 
 /// Proves the DAGs of each file, one file after the other, and prints all results in one table.
 /// Goes on with the next file after a refusal or a failure.
-pub(super) fn of_files(options: &Arguments, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
+pub(super) fn of_files(options: &CommandLine, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files");
     let (mut rows, mut over) = (Vec::new(), 0);
     let (refused, failed) = each(files, |file| {
@@ -90,7 +90,7 @@ type Proven = (Vec<ProofRow>, ExitCode);
 
 /// Observes a run, commits with its measurements, and compares. Returns `None` if the first run
 /// failed; the failure has been reported.
-fn prove(options: &Arguments) -> Result<Option<Proven>, Refusal> {
+fn prove(options: &CommandLine) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
     // The WCETs of the first run.
     let own = TemporaryFile(Some(log.with_extension("wcets")));
@@ -113,7 +113,7 @@ fn prove(options: &Arguments) -> Result<Option<Proven>, Refusal> {
 
 /// Observes a run, unless the person states both WCETs and overheads. Returns the command line for
 /// the next run, which commits with the measurements. Returns `None` if the run failed.
-fn observe_first(options: &Arguments, own: &Path) -> Result<Option<Arguments>, Refusal> {
+fn observe_first(options: &CommandLine, own: &Path) -> Result<Option<CommandLine>, Refusal> {
     let append = options.text(name::APPEND).unwrap_or_default();
     let measures = !states_overheads(append);
     if options.is_given(name::WCETS) && !measures {
@@ -153,12 +153,12 @@ fn compare(booted: &EndedRun) -> Result<Vec<ProofRow>, String> {
 
 /// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
 /// the overheads. Returns `None` if a run failed; the failure has been reported.
-fn observe(options: &Arguments, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
+fn observe(options: &CommandLine, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
     let observing = options.with(name::PROVE, OBSERVING);
     // Saturating, since a person's seed may be the largest `u64`.
     let first = options.number(name::SEED).unwrap_or(1);
     let seeds = options.number(name::SEEDS).unwrap_or(1);
-    let mut all: Vec<OfDag> = Vec::new();
+    let mut all: Vec<DagTimes> = Vec::new();
     let mut latest = Record::default();
     for seed in first..first.saturating_add(seeds) {
         let one = match seeds {
@@ -193,13 +193,13 @@ fn observe(options: &Arguments, file: Option<&Path>) -> Result<Option<Measuremen
 const OBSERVING: &str = "observing";
 
 /// Prints the rows of a proof.
-fn say_all(options: &Arguments, rows: &[ProofRow]) {
+fn say_all(options: &CommandLine, rows: &[ProofRow]) {
     let lines = rows.iter().map(ProofRow::line);
     say(options, &proof::table(rows), lines);
 }
 
 /// Prints a table for people and lines for programs, as far as the options want them.
-fn say(options: &Arguments, table: &str, lines: impl Iterator<Item = String>) {
+fn say(options: &CommandLine, table: &str, lines: impl Iterator<Item = String>) {
     if !options.is_given(name::JSON) {
         print!("{table}");
     }
@@ -210,14 +210,14 @@ fn say(options: &Arguments, table: &str, lines: impl Iterator<Item = String>) {
 
 /// Returns the word that keeps a guest from judging bounds while it only observes: its WCETs and
 /// overheads are not known yet.
-pub(super) fn bounds_word(options: &Arguments) -> Option<String> {
+pub(super) fn bounds_word(options: &CommandLine) -> Option<String> {
     let observes = options.text(name::PROVE) == Some(OBSERVING);
     observes.then(|| "bounds=observe".into())
 }
 
 /// Reports a guest's refusal of a WCET file with the file's name and line; returns whether the
 /// refusal was about that file.
-pub(super) fn refused(options: &Arguments, reason: &str) -> bool {
+pub(super) fn refused(options: &CommandLine, reason: &str) -> bool {
     let path = options.path(name::WCETS);
     match path.and_then(|path| observed::translate(reason, path)) {
         Some(line) => {
@@ -242,7 +242,7 @@ pub(super) const FOR_ONE_FILE: [OptionName; 8] = [
 
 /// Runs all files, going on after refused and failed files. Returns the exit code of the worst
 /// file.
-pub(super) fn run_folder(options: &Arguments, folder: &Path) -> Result<ExitCode, Refusal> {
+pub(super) fn run_folder(options: &CommandLine, folder: &Path) -> Result<ExitCode, Refusal> {
     let why = "is for one file; name one with `--dag`";
     let for_several = options.check_without(&FOR_ONE_FILE, why);
     for_several.map_err(Refusal::Usage)?;
@@ -322,7 +322,7 @@ pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
 }
 
 /// Returns the path named by `--dag`, if it is a folder.
-pub(super) fn folder(options: &Arguments) -> Option<PathBuf> {
+pub(super) fn folder(options: &CommandLine) -> Option<PathBuf> {
     let path = options.path(name::DAG)?;
     path.is_dir().then(|| path.to_path_buf())
 }
@@ -400,14 +400,14 @@ fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::qemu::QemuEnd;
+    use crate::qemu::RunEnd;
     use views::json::{self, Value};
 
     #[test]
     fn any_name_of_a_file_is_one_member_of_a_machine_line() {
         let serial = "{\"kind\":\"dag_run\",\"dag\":\"x\"}\n";
         let place = Path::new("the log");
-        let outcome = Outcome::of(QemuEnd::Signal, serial.into(), place, place);
+        let outcome = Outcome::of(RunEnd::Signal, serial.into(), place, place);
         for name in ["a.dag", "a\nb.dag", "\"\\.dag", "\u{1b}.dag"] {
             let all: Vec<String> = lines(Path::new(name), &outcome).collect();
             assert_eq!(all.concat().lines().count(), 1, "{all:?}");

@@ -11,14 +11,14 @@ use views::view::View;
 
 use super::{perfetto, read_files};
 use crate::files::{self, NamedFile};
-use crate::options::{Arguments, Command, OptionValue, Refusal, options};
+use crate::options::{Command, CommandLine, Refusal, ValueKind, options};
 
 /// The options and the help text of `trace`.
 pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
     about: "Draws the traces of runs: for Perfetto's viewer, or as one picture.",
     positional: Some((
-        OptionValue::File("FILE..."),
+        ValueKind::File("FILE..."),
         "A record of runs, as `./scripts/run --trace FILE` and --keep write it, or a serial log; or \
          records of machines that send each other messages.",
     )),
@@ -34,22 +34,22 @@ line, or a file without a well-formed trace with events
 
 options! {
     /// Write to this file; else to standard output.
-    OUT 'o': OptionValue::File("FILE");
+    OUT 'o': ValueKind::File("FILE");
     /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
-    SVG: OptionValue::Nothing;
+    SVG: ValueKind::Nothing;
     /// How many times the longest period the picture shows.
-    PERIODS: OptionValue::Number(1, 1000), or "1";
+    PERIODS: ValueKind::Number(1, 1000), or "1";
     /// The picture begins at this time of the run, such as 20ms; else at 0, or where
     /// machines first hear of each other.
-    FROM: OptionValue::Text("TIME");
+    FROM: ValueKind::Text("TIME");
     /// It shows the jobs that are released before this time, whatever --periods says.
-    TO: OptionValue::Text("TIME");
+    TO: ValueKind::Text("TIME");
     /// Only these DAGs, with commas between; else all of them.
-    DAGS: OptionValue::Text("NAMES");
+    DAGS: ValueKind::Text("NAMES");
     /// Only the run of this number; else all of them, side by side from time 0.
-    RUN: OptionValue::Number(0, u64::MAX);
+    RUN: ValueKind::Number(0, u64::MAX);
     /// As for ./scripts/check-trace, whose breaches are shown as markers.
-    BOUND_US: OptionValue::Number(0, 1_000_000_000);
+    BOUND_US: ValueKind::Number(0, 1_000_000_000);
 }
 
 /// Runs the subcommand with the words after its name.
@@ -73,7 +73,7 @@ pub fn trace(words: &[OsString]) -> ExitCode {
 }
 
 /// Converts the runs named by the options.
-fn draw(options: &Arguments) -> Result<String, String> {
+fn draw(options: &CommandLine) -> Result<String, String> {
     options.file("which file? name a record of a run")?;
     let inputs = options.files().map(|path| NamedFile { option: "", path });
     files::check(&inputs.collect::<Vec<_>>(), &options.named(&[name::OUT]))?;

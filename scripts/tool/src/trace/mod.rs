@@ -24,7 +24,7 @@ use views::units::shown as shown_ns;
 use views::view::View;
 
 use crate::files;
-use crate::options::{Arguments, Command, OptionValue, Refusal, did_you_mean, options};
+use crate::options::{Command, CommandLine, Refusal, ValueKind, did_you_mean, options};
 
 pub use drawn::{TRACE, trace};
 
@@ -42,7 +42,7 @@ pub static CHECK_TRACE: Command = Command {
     invocation: "./scripts/check-trace",
     about: "Replays the traces of runs against the model's rules and reports each breach.",
     positional: Some((
-        OptionValue::File("FILE..."),
+        ValueKind::File("FILE..."),
         "Records of runs, as `./scripts/run --trace FILE` and --keep write them, or serial logs.",
     )),
     options: OPTIONS,
@@ -81,15 +81,15 @@ options! {
     /// Microseconds for which an instance may wait for what it is owed, because a decision
     /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
     /// by sched_ext, 100000 where nothing is preempted, else 1000.
-    BOUND_US: OptionValue::Number(0, 1_000_000_000);
+    BOUND_US: ValueKind::Number(0, 1_000_000_000);
     /// Only the chains that begin with this subtask; with --to.
-    FROM: OptionValue::Text("DAG/SUBTASK");
+    FROM: ValueKind::Text("DAG/SUBTASK");
     /// Only the chains that end with this subtask; with --from.
-    TO: OptionValue::Text("DAG/SUBTASK");
+    TO: ValueKind::Text("DAG/SUBTASK");
     /// Check the witness of a certified run, and name the theorems of its bounds; needs Coq.
-    PROVEN: OptionValue::Nothing;
+    PROVEN: ValueKind::Nothing;
     /// Only the machine lines on standard output, the rest on standard error.
-    JSON: OptionValue::Nothing;
+    JSON: ValueKind::Nothing;
 }
 
 /// Runs the subcommand with the words after its name.
@@ -101,7 +101,7 @@ pub fn check_trace(words: &[OsString]) -> ExitCode {
 }
 
 /// Judges the runs of all files, and returns the number of breaches.
-fn judge_all(options: &Arguments) -> Result<usize, String> {
+fn judge_all(options: &CommandLine) -> Result<usize, String> {
     if options.files().len() == 0 {
         return Err("which files? name at least one record of a run".into());
     }
@@ -131,7 +131,7 @@ fn judge_all(options: &Arguments) -> Result<usize, String> {
 }
 
 /// Reads all files.
-fn read_files(options: &Arguments) -> Result<Vec<(String, Record)>, String> {
+fn read_files(options: &CommandLine) -> Result<Vec<(String, Record)>, String> {
     let read = |path| Ok((files::shown_path(path), read_file(path)?));
     options.files().map(read).collect()
 }
@@ -153,7 +153,7 @@ pub(crate) fn read_file(path: &Path) -> Result<Record, String> {
 }
 
 /// Judges a run, prints the findings, and returns the number of breaches.
-fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Arguments) -> usize {
+fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &CommandLine) -> usize {
     let bound_ns = tolerance_ns(run, options.number(name::BOUND_US));
     let (mut table, lines, breaches) = match &run.machines[..] {
         [] => {
@@ -272,7 +272,7 @@ const SHOWN: usize = 8;
 /// # Errors
 ///
 /// In words: there is no such subtask, or no chain between the two subtasks.
-fn measure(run: &Run, options: &Arguments) -> Result<Vec<MeasuredChain>, String> {
+fn measure(run: &Run, options: &CommandLine) -> Result<Vec<MeasuredChain>, String> {
     let ends = match (options.text(name::FROM), options.text(name::TO)) {
         (None, None) => None,
         (Some(from), Some(to)) => {

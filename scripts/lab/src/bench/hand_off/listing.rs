@@ -14,7 +14,7 @@ use std::path::Path;
 use super::boots::{HandOffBoot, Kind, LIMIT};
 use crate::bench::code::{self, Frames};
 use tool::places::Frame;
-use tool::qemu::{Mode, QemuEnd};
+use tool::qemu::{Mode, RunEnd};
 use tool::{files, system};
 use views::protocol::Status;
 
@@ -59,7 +59,7 @@ fn executed(image: &Path) -> Result<Vec<u64>, String> {
         let followed = running.follow(LIMIT, &mut |_| ());
         followed.map(|(ending, _)| (ending, reader.join().unwrap_or_default()))
     })?;
-    if ending != QemuEnd::Guest(Status::Success) {
+    if ending != RunEnd::Guest(Status::Success) {
         let (said, log) = (running.complaints(), serial.display());
         return Err(format!("{ending} {said}; its serial log is {log}"));
     }

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use super::baseline::{self, Baseline};
 use super::frame::{Figure, by_plan};
 use tool::files;
-use tool::options::{Arguments, Command, OptionName, OptionValue, options};
+use tool::options::{Command, CommandLine, OptionName, ValueKind, options};
 use tool::progress::Progress;
 use tool::qemu::Mode;
 use tool::{image, install, probe};
@@ -36,16 +36,16 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 
 options! {
     /// The unit of what is counted: instructions (deterministic), time (kvm, threads), or both.
-    MODE: OptionValue::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
+    MODE: ValueKind::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
     /// Compare the instructions with the baseline; one that grew is a failure.
-    COMPARE: OptionValue::Nothing;
+    COMPARE: ValueKind::Nothing;
     /// Write the instructions into the baseline, tests/baselines/hand-off.json.
-    SAVE_BASELINE: OptionValue::Nothing;
+    SAVE_BASELINE: ValueKind::Nothing;
     /// Instead, count what the workloads cost on more cores and with more subtasks.
-    SCALE: OptionValue::Nothing;
+    SCALE: ValueKind::Nothing;
     /// Instead, log each instruction of one hop, count them by parts of the code, and write
     /// them to FILE. Needs objdump and addr2line (binutils).
-    LISTING: OptionValue::File("FILE");
+    LISTING: ValueKind::File("FILE");
 }
 
 const BASELINE: Baseline = Baseline {
@@ -73,7 +73,7 @@ impl HandOffPlan {
     /// # Errors
     ///
     /// The options exclude each other: one line with the reason.
-    fn new(options: &Arguments) -> Result<Self, String> {
+    fn new(options: &CommandLine) -> Result<Self, String> {
         let all = [
             name::LISTING,
             name::SCALE,

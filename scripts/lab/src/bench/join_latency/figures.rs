@@ -13,7 +13,7 @@ use std::fmt::Write;
 use join_latency::{CompletedJoin, ExecutionSpan, RunSamples};
 use sched_dag::law::Distribution;
 
-use super::{JoinCondition, MachineSetting};
+use super::{JoinCondition, JoinSetup};
 use tool::output::Table;
 use views::json::{Object, Value};
 use views::protocol::Transcript;
@@ -247,7 +247,7 @@ fn pooled(
 }
 
 /// Returns the summary, with a line for each policy and N.
-pub(super) fn summary_json(setting: &MachineSetting<'_>, measured: &MeasuredConditions) -> String {
+pub(super) fn summary_json(setting: &JoinSetup<'_>, measured: &MeasuredConditions) -> String {
     let plan = setting.plan;
     let results = pooled(measured).map(|(condition, figures)| result_json(condition, &figures));
     let results = results.collect::<Vec<_>>().join(",\n");

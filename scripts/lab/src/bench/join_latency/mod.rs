@@ -24,7 +24,7 @@ use text::quoted;
 use super::frame::{by_plan, draw, judged};
 use figures::ConditionFigures;
 use tool::files;
-use tool::options::{Arguments, Command, OptionValue, options};
+use tool::options::{Command, CommandLine, ValueKind, options};
 use tool::program::ProgramOrder;
 use tool::progress::Progress;
 use tool::qemu::{Mode, PROGRAM, Qemu};
@@ -39,7 +39,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 
 /// Measures the missing conditions, and writes all results.
 fn measure_all(plan: &JoinPlan) -> Result<(), String> {
-    let (setting, why) = MachineSetting::new(plan)?;
+    let (setting, why) = JoinSetup::new(plan)?;
     let (conditions, jobs, cores) = (plan.conditions.len(), plan.jobs, plan.cores);
     let (mode, version) = (setting.mode_name(), &setting.version);
     println!("{conditions} conditions of {jobs} jobs; mode {mode}, {cores} cores; {version}");
@@ -116,23 +116,23 @@ exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command lin
 options! {
     /// The folder for all results; what is there already is not measured again. If not given,
     /// target/join-latency, or target/join-latency-on-linux.
-    OUT 'o': OptionValue::File("DIR");
+    OUT 'o': ValueKind::File("DIR");
     /// Jobs of each condition.
-    JOBS: OptionValue::Number(1, 100_000), or "2000";
+    JOBS: ValueKind::Number(1, 100_000), or "2000";
     /// Parallel subtasks N; a condition has two processors more than the largest.
-    SUBTASKS: OptionValue::Numbers(1, 16), or "2,4,6";
+    SUBTASKS: ValueKind::Numbers(1, 16), or "2,4,6";
     /// The policies: fass, exact, approximate-MS with the longest interval.
-    POLICIES: OptionValue::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+    POLICIES: ValueKind::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
     /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
     /// every policy.
-    REPEAT: OptionValue::Number(1, 1000), or "1";
+    REPEAT: ValueKind::Number(1, 1000), or "1";
     /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
     /// there are fewer.
-    ON: OptionValue::OneOf(&["machine", "linux"]), or "machine";
+    ON: ValueKind::OneOf(&["machine", "linux"]), or "machine";
     /// Queue size of the synchronizers.
-    QUEUE: OptionValue::Number(1, 100_000), or "1000";
+    QUEUE: ValueKind::Number(1, 100_000), or "1000";
     /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
-    MODE: OptionValue::OneOf(Mode::NAMES);
+    MODE: ValueKind::OneOf(Mode::NAMES);
 }
 
 /// The settings that all conditions share, and the conditions.
@@ -158,7 +158,7 @@ impl JoinPlan {
     /// # Errors
     ///
     /// One line with the reason: the options contradict each other.
-    fn new(options: &Arguments) -> Result<JoinPlan, String> {
+    fn new(options: &CommandLine) -> Result<JoinPlan, String> {
         let on_linux = options.text(name::ON) == Some("linux");
         if on_linux {
             let why = "is for guests; leave it or `--on linux` out";
@@ -301,7 +301,7 @@ impl fmt::Display for JoinCondition {
 const MOST_BOOTS: usize = 6;
 
 /// The machine for all conditions, and its versions, for the summary.
-struct MachineSetting<'p> {
+struct JoinSetup<'p> {
     plan: &'p JoinPlan,
     /// The mode of the guests; `None`: programs of this computer.
     mode: Option<Mode>,
@@ -314,7 +314,7 @@ struct MachineSetting<'p> {
     commit: String,
 }
 
-impl<'p> MachineSetting<'p> {
+impl<'p> JoinSetup<'p> {
     /// Builds the program, settles the mode, and returns the reason for the mode.
     ///
     /// # Errors

@@ -31,7 +31,7 @@ use text::quoted;
 use super::baseline;
 use super::frame::{Figure, by_plan};
 use tool::install;
-use tool::options::{Arguments, Command, OptionValue, options};
+use tool::options::{Command, CommandLine, ValueKind, options};
 use tool::output::Table;
 use tool::progress::Progress;
 use tool::qemu::Mode;
@@ -58,18 +58,18 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or a run did not comp
 
 options! {
     /// How many rounds of about 20,000 instances each figure has.
-    ROUNDS: OptionValue::Number(10, 100_000), or "300";
+    ROUNDS: ValueKind::Number(10, 100_000), or "300";
     /// The jobs whose joins across cores are measured.
-    JOBS: OptionValue::Number(100, 10_000_000), or "20000";
+    JOBS: ValueKind::Number(100, 10_000_000), or "20000";
     /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
     /// layered-1000, dags-1000, join, clusters; all.
-    ONLY: OptionValue::Text("NAMES");
+    ONLY: ValueKind::Text("NAMES");
     /// Instead, count the instructions of `closures, static` on one worker. Needs Valgrind.
-    INSTRUCTIONS: OptionValue::Nothing;
+    INSTRUCTIONS: ValueKind::Nothing;
     /// Count them, and compare with the baseline; one that grew is a failure.
-    COMPARE: OptionValue::Nothing;
+    COMPARE: ValueKind::Nothing;
     /// Count them, and write them into the baseline, tests/baselines/native.json.
-    SAVE_BASELINE: OptionValue::Nothing;
+    SAVE_BASELINE: ValueKind::Nothing;
 }
 
 /// The name of the workload of joins across cores.
@@ -101,7 +101,7 @@ struct NativePlan {
 const WORKERS: [u32; 2] = [1, 2];
 
 impl NativePlan {
-    fn read(options: &Arguments) -> Result<Self, String> {
+    fn read(options: &CommandLine) -> Result<Self, String> {
         options.check_distinct(&[name::ONLY])?;
         let names = MeasuredGraph::ALL.iter().map(|graph| graph.name);
         let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
