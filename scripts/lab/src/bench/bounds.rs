@@ -38,8 +38,8 @@ Exit code: 0 counted; 1 no file can be written; 2 the command line or a file is 
 options! {
     /// The numbers of cores.
     CORES: ValueKind::Numbers(1, 64), or "4,8,16";
-    /// The kind of random sets: ours, ours with periods on a grid, Melani's graphs, or small ones of
-    /// these.
+    /// The kind of random sets: ours, ours with periods on a grid, Melani's graphs, or small ones
+    /// of these.
     FROM: ValueKind::OneOf(Generator::WORDS), or "ours";
     /// Random sets for each number of cores, utilization and kind of deadlines.
     SETS: ValueKind::Number(1, 1_000_000), or "200";

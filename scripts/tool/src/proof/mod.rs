@@ -32,7 +32,7 @@ use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption};
 
 use crate::files;
 use crate::output::Table;
-use observed::DagTimes;
+use observed::ObservedDag;
 use views::json::Object;
 use views::record::{self, CommittedDags};
 use views::units::shown;
@@ -54,7 +54,7 @@ pub struct ProofRow {
 /// # Errors
 ///
 /// In words: a DAG was committed but has not run.
-pub fn rows(commits: &[CommittedDags], observed: &[DagTimes]) -> Result<Vec<ProofRow>, String> {
+pub fn rows(commits: &[CommittedDags], observed: &[ObservedDag]) -> Result<Vec<ProofRow>, String> {
     let mut rows = Vec::new();
     for commit in commits {
         for (number, dag) in (0..).map(DagId).zip(&commit.told.dags) {

@@ -28,7 +28,7 @@ use views::units::shown;
 
 /// The observed times of a DAG, identified by names and edges, in all its runs.
 #[derive(Clone, Debug)]
-pub struct DagTimes {
+pub struct ObservedDag {
     /// Its name.
     pub name: String,
     /// The hash of its names and edges.
@@ -44,7 +44,7 @@ pub struct DagTimes {
 /// # Errors
 ///
 /// In words: there are no times, or a DAG's times do not fit its subtasks.
-pub fn add(all: &mut Vec<DagTimes>, record: &Record) -> Result<(), String> {
+pub fn add(all: &mut Vec<ObservedDag>, record: &Record) -> Result<(), String> {
     let mut is_told = false;
     for (place, times) in &record.times {
         let committed = &record.commits[*place];
@@ -62,7 +62,7 @@ pub fn add(all: &mut Vec<DagTimes>, record: &Record) -> Result<(), String> {
             // A DAG of this shape was not seen before.
             let place = place.unwrap_or_else(|| {
                 let names = dag.subtasks.iter().map(|subtask| subtask.name.clone());
-                all.push(DagTimes {
+                all.push(ObservedDag {
                     name: dag.name.clone(),
                     hash: dag.hash,
                     longest_responses_ns: BTreeMap::new(),
@@ -93,8 +93,8 @@ pub fn distribution(counted: &Counted) -> Distribution {
 }
 
 /// Returns a machine line for each subtask.
-pub fn lines(all: &[DagTimes]) -> impl Iterator<Item = String> {
-    let of_dag = |dag: &DagTimes| -> Vec<String> {
+pub fn lines(all: &[ObservedDag]) -> impl Iterator<Item = String> {
+    let of_dag = |dag: &ObservedDag| -> Vec<String> {
         let lines = dag.subtasks.iter().map(|(name, times)| {
             let buckets = times.values();
             let buckets = buckets.map(|(top, count)| format!("[{top},{count}]"));
@@ -167,7 +167,7 @@ pub fn overheads_line(measured: &MeasuredCosts, margin_percent: u64) -> String {
 pub const MARGIN_PERCENT: u64 = 20;
 
 /// Returns a file of the longest calls with a margin, without subtasks that never ran.
-pub fn text(all: &[DagTimes], margin_percent: u64) -> String {
+pub fn text(all: &[ObservedDag], margin_percent: u64) -> String {
     let mut text = String::from(
         "# WCETs that were observed, by `./scripts/recording --observe`: a margin in per cent, then of\n\
          # each DAG a hash of its names and edges, and of each subtask the longest call and the\n\
@@ -257,7 +257,7 @@ pub fn translate(said: &str, path: &Path) -> Option<String> {
 }
 
 /// Returns the table of the observed times.
-pub fn table(all: &[DagTimes], margin_percent: u64) -> String {
+pub fn table(all: &[ObservedDag], margin_percent: u64) -> String {
     let mut text = String::new();
     for dag in all {
         // Writing into a `String` cannot fail.

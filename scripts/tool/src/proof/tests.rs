@@ -1,6 +1,6 @@
 //! Views of the record of a guest that has proven a DAG and run it three times.
 
-use super::observed::DagTimes;
+use super::observed::ObservedDag;
 use super::*;
 use crate::tests::made::{commit, record_of};
 use crate::tests::{altered, rows as rows_of};
@@ -41,7 +41,7 @@ fn record(longest_ns: u64) -> Record {
     Record::read(&record.end()).unwrap()
 }
 
-fn observed(longest_ns: &[u64]) -> Vec<DagTimes> {
+fn observed(longest_ns: &[u64]) -> Vec<ObservedDag> {
     let mut all = Vec::new();
     for longest_ns in longest_ns {
         observed::add(&mut all, &record(*longest_ns)).unwrap();

@@ -23,7 +23,7 @@ use crate::options::{CommandLine, OptionName, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
-use crate::proof::observed::{self, DagTimes};
+use crate::proof::observed::{self, ObservedDag};
 use crate::proof::{self, ProofRow};
 use crate::run_options::name;
 use crate::system;
@@ -158,7 +158,7 @@ fn observe(options: &CommandLine, file: Option<&Path>) -> Result<Option<Measurem
     // Saturating, since a person's seed may be the largest `u64`.
     let first = options.number(name::SEED).unwrap_or(1);
     let seeds = options.number(name::SEEDS).unwrap_or(1);
-    let mut all: Vec<DagTimes> = Vec::new();
+    let mut all: Vec<ObservedDag> = Vec::new();
     let mut latest = Record::default();
     for seed in first..first.saturating_add(seeds) {
         let one = match seeds {
