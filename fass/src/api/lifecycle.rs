@@ -2,10 +2,10 @@
 //!
 //! A subtask has to declare such changes at registration, as for raising a signal. A request by its
 //! function takes effect when the instance is complete (R3); the rules L1 to L6 are in
-//! `sched-dag/src/lifecycle.rs`.
+//! `sched-dag/src/lifecycle/mod.rs`.
 //!
-//! Modes are named sets of DAGs, of which one set runs at a time; `sched-dag/src/lifecycle.rs` has
-//! the rules, M1 to M7.
+//! Modes are named sets of DAGs, of which one set runs at a time;
+//! `sched-dag/src/lifecycle/modes.rs` has the rules, M1 to M7.
 
 use alloc::boxed::Box;
 use alloc::format;
