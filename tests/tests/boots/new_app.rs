@@ -276,7 +276,7 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
     let blocks = blocks(&readme);
     let code = blocks.iter().find(|block| block.info.starts_with("rust"));
     let code = &code.expect("the app's code").text;
-    let place = "`src/lib.rs`, in place of what follows `#![forbid(unsafe_code)]`";
+    let place = "`src/lib.rs`. Keep everything up to `#![forbid(unsafe_code)]`";
     assert!(readme.contains(place), "the README puts it elsewhere");
     let app = repository("vision");
     let library = app.join("src/lib.rs");
