@@ -10,7 +10,7 @@ use sched_dag::lifecycle::WaitId;
 use super::{AnswerSource, DeviceCell, Question};
 use crate::platform;
 
-/// The driver's end of a device. Made by [`create_device`].
+/// The driver's end of a device. Made by [`create_device`](super::create_device).
 ///
 /// There is only one, so a device has a single driver at any time.
 ///
