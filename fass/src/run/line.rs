@@ -204,6 +204,7 @@ impl KeptState {
     pub(crate) fn new(state: Arc<dyn AnyState>, every: u32) -> Self {
         Self {
             state,
+            // By 0, job 0 alone would count as a multiple.
             every: AtomicU32::new(every.max(1)),
         }
     }

@@ -216,6 +216,7 @@ impl LogLine {
 /// waits: a place in use by somebody else is passed over.
 fn find<T>(next: &AtomicUsize, fits: impl Fn(&mut LogSlot) -> Option<T>) -> Option<T> {
     let first = next.load(Ordering::Relaxed);
+    // A single round: the call ends even if others fill or empty places all the time.
     (first..first + PLACES).find_map(|number| {
         let found = fits(&mut *RING[number % PLACES].change()?)?;
         // A slow caller does not set back the progress of others.

@@ -270,6 +270,7 @@ impl SubtaskCode {
         let turn = subtask.turn().map(Arc::clone);
         Self {
             effects: turn.map_or(Effects::None, |turn| Effects::OfTurns(turn, Vec::new())),
+            // A wait is asked for by `complete`, so a subtask with waits needs that call, too.
             has_effects: subtask.turn().is_some(),
             subtask,
             job: NO_JOB,
@@ -288,6 +289,7 @@ impl SubtaskCode {
                     Effects::Several(all)
                 }
                 Effects::OfTurns(turn, mut all) => {
+                    // By the address a device refuses questions in the turn of another subtask.
                     effect.bind(turn.address());
                     all.push(effect);
                     Effects::OfTurns(turn, all)
@@ -484,6 +486,7 @@ impl SubtaskCode {
     /// app.
     pub fn replace(&mut self) {
         self.subtask.replace();
+        // The fault has left the failed job here, and `run` would refuse the next one.
         self.job = NO_JOB;
     }
 

@@ -168,6 +168,7 @@ struct ReplayedSource {
 
 impl PolledSubtask for ReplayedSource {
     fn take_turn(&mut self, job: u64) {
+        // Only in the last turn: values go out at the finish, and not at a wait.
         if self.turn.pass(job) {
             self.outputs.iter_mut().for_each(|send| send(job));
         }

@@ -172,6 +172,7 @@ const FALLBACK: u8 = 2;
 
 impl<T: Send + Sync> Alternate for ReplaceableEnds<T> {
     fn is_there(&self) -> bool {
+        // The claim is a test, given back at once: it fails if the fault came in mid hand-over.
         self.next.load(Ordering::Relaxed) != NONE && self.both.change().is_some()
     }
 
@@ -225,6 +226,7 @@ impl<Args: VecToSubs, Ret: VecToPubs> PolledSubtask for ReplaceableBody<Args, Re
         self.alternatives.lose();
         // A state that the failed function changed may be half changed, too.
         self.states.iter().for_each(|state| state.reset());
+        // There is only one fallback, so its own fault ends the DAG.
         if self.ends.is_fallback() {
             self.ends.next.store(NONE, Ordering::Relaxed);
         }

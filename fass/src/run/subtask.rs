@@ -122,6 +122,7 @@ struct UntypedLoop<F> {
 
 impl<F: FnMut(u64) + Send> PolledSubtask for UntypedLoop<F> {
     fn take_turn(&mut self, job: u64) {
+        // Tokens carry nothing, but have to leave their slots to later jobs.
         self.before.iter_mut().for_each(|edge| {
             edge.recv(job);
         });

@@ -182,6 +182,8 @@ impl TurnState {
             WaitEnd::Limit => (AFTER, limit_ns, limit_ns),
             WaitEnd::After(ns) => (AFTER, ns, ns),
             WaitEnd::AtMost(ns) => (AFTER, ns.min(limit_ns), limit_ns),
+            // Saturating: an instant that an earlier wait has reached takes no time, and is no
+            // fault.
             WaitEnd::SinceRelease(ns) => (SINCE_RELEASE, ns, ns.saturating_sub(reached_ns)),
         };
         if most_ns > limit_ns {

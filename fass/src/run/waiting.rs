@@ -307,6 +307,8 @@ where
     }
 
     fn discard(&mut self, job: u64) {
+        // Without the future, whose destructor may not run in the scheduler's step; the next
+        // instance drops it.
         self.ends.discard(job);
     }
 

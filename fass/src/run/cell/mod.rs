@@ -84,6 +84,7 @@ const fn stamp_of(job: u64) -> u64 {
 /// If `slots` is 0.
 pub(crate) fn ring<T>(slots: usize) -> (Writer<T>, Reader<T>) {
     assert!(slots > 0, "an edge needs at least one slot");
+    // A power of two, so that `search` can count without end and find its place by a mask.
     let others = match slots {
         1 => 0,
         _ => (slots - 1).next_power_of_two(),
@@ -360,6 +361,7 @@ impl<T> ExclusiveCell<T> {
 
 impl<T> Drop for WriteClaim<'_, T> {
     fn drop(&mut self) {
+        // A store suffices: as long as this claim is there, nobody else changes the count.
         self.0.claims.store(0, Ordering::Release);
     }
 }
@@ -408,6 +410,8 @@ impl<T> SetOnce<T> {
     /// Sets the value, unless the value is set already. Reports whether this call has set the
     /// value.
     pub fn set(&self, value: T) -> bool {
+        // Relaxed suffices: the claim itself guards nothing, and the store of `SET` publishes the
+        // value.
         let claim =
             self.state
                 .compare_exchange(EMPTY, WRITING, Ordering::Relaxed, Ordering::Relaxed);

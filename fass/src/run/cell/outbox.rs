@@ -99,7 +99,10 @@ impl Outbox {
         if !records.claim(FREE) && !records.claim_again() {
             return;
         }
+        // At most two rounds: from the start of the words, `go_to_start` refuses to go there again.
         let state = loop {
+            // Relaxed, as only the claim's holder moves `written`. Acquire for `read`: the reader
+            // has read the words that it has given back.
             let place = records.written.load(Ordering::Relaxed);
             let read = records.read.load(Ordering::Acquire);
             let mut words = records.words.get(place..).unwrap_or_default();
@@ -116,6 +119,8 @@ impl Outbox {
                     let bytes = unsafe { slice::from_raw_parts_mut(bytes, size_of_val(rest)) };
                     match write(bytes) {
                         Ok(count) if count <= most => {
+                            // Relaxed: the reader sees these words only by the `Release` store of
+                            // `written`.
                             of_job.store(job, Ordering::Relaxed);
                             length.store(count as u64, Ordering::Relaxed);
                             break place + words_of(count);
@@ -140,6 +145,7 @@ impl Outbox {
     pub(crate) fn publish(&self, at_ns: u64) -> bool {
         let records = &*self.0;
         let state = records.state.load(Ordering::Relaxed);
+        // Any larger state is the end of a staged record: its head alone has three words.
         if state <= LOST || !records.claim(state) {
             return false;
         }
@@ -147,6 +153,7 @@ impl Outbox {
         if let Some(at) = records.words.get(place + 1) {
             at.store(at_ns, Ordering::Relaxed);
         }
+        // Before the claim is given back: the next holder loads the new `written`.
         records.written.store(state, Ordering::Release);
         records.state.store(FREE, Ordering::Release);
         true
@@ -207,6 +214,8 @@ impl RecordRing {
         if place < read || words_of(needed) >= read {
             return false;
         }
+        // The mark comes before the new `written`, by which the reader finds the mark. Behind the
+        // last word no mark is needed.
         if let Some(word) = self.words.get(place) {
             word.store(WRAP, Ordering::Relaxed);
         }
@@ -258,6 +267,7 @@ impl OutboxReader {
     /// Gives the record's words back.
     pub(crate) fn forget(&mut self) {
         if let Some(length) = self.next().map(|record| record.bytes.len()) {
+            // Loaded after `next`, which may have moved the reader to the start.
             let place = self.0.read.load(Ordering::Relaxed);
             (self.0.read).store(place + words_of(length), Ordering::Release);
         }

@@ -64,6 +64,7 @@ impl<T> Putter<T> {
     pub(crate) fn place(&mut self, ahead: usize) -> Option<&mut T> {
         let places = &*self.0;
         let written = places.written.load(Ordering::Relaxed);
+        // Wrapping, since both numbers are counted up without end, and only their distance matters.
         let shown = written.wrapping_sub(places.read.load(Ordering::Acquire));
         if ahead >= places.places.len() - shown {
             return None;
@@ -101,6 +102,7 @@ impl<T> Taker<T> {
     pub(crate) fn front(&mut self, mark: usize) -> Option<&mut T> {
         let places = &*self.0;
         let read = places.read.load(Ordering::Relaxed);
+        // Not by the mark alone: after a mark passed before, the next place may be the putter's.
         if read == mark || read == self.mark() {
             return None;
         }
@@ -113,6 +115,7 @@ impl<T> Taker<T> {
     #[inline]
     pub(crate) fn give_back(&mut self) {
         let read = self.0.read.load(Ordering::Relaxed);
+        // Otherwise `read` would pass `written`, and all places would count as the taker's.
         if read != self.mark() {
             self.0.read.store(read.wrapping_add(1), Ordering::Release);
         }

@@ -42,6 +42,7 @@ impl<T> SharedLatest<T> {
         let triple = Arc::new(TripleBuffer::new());
         let mut triples = self.triples.borrow_mut();
         triples.push(Arc::clone(&triple));
+        // At first slot 0 is the writer's, and slot 1 the one in the middle.
         (Sampler { triple, front: 2 }, triples.len() - 1)
     }
 
@@ -172,6 +173,7 @@ impl<T: Send + Sync> Stage<T> for Arc<TripleBuffer<T>> {
             *slot = Some(LatestEntry {
                 value,
                 job,
+                // The completion sets the time; until then nobody sees the entry.
                 completed_ns: 0,
             });
         });
@@ -219,6 +221,7 @@ impl<T: 'static> Sampler<T> {
         let probe = triple.probe.get();
         let slot = &triple.slots[usize::from(*front)];
         // In a replay the recorded sample takes the place of the value shown by the writer.
+        // If the middle slot were not fresh, the exchange would bring back an older value.
         if probe.is_none_or(|probe| !probe.replay(slot))
             && triple.middle.load(Ordering::Relaxed) & FRESH != 0
         {

@@ -33,6 +33,7 @@ impl Buffer {
 
     /// Makes an empty buffer of at least `bytes` bytes. Allocates.
     pub fn new(bytes: usize) -> Self {
+        // A device swaps buffers with all its wires, so each has to hold the longest frame.
         Self {
             bytes: alloc::vec![0; bytes.max(Self::LEAST_BYTES)].into(),
             range: 0..0,

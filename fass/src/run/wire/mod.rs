@@ -208,11 +208,14 @@ impl WireInput {
         peer: Option<SocketAddrV4>,
         now_ns: u64,
     ) -> bool {
+        // Before the swap, after which `packet` is the place's old buffer.
         let mut seen = packet.content().len();
         let Some(mut arrivals) = self.arrivals.change() else {
             return false;
         };
         let putter = &mut arrivals.0;
+        // The driver keeps the buffer of a packet too long or without a place; `close` only counts
+        // it.
         let place = putter.place(0).filter(|_| seen <= self.longest);
         let is_lost = place.is_none();
         if let Some(place) = place {
@@ -239,6 +242,8 @@ impl WireInput {
             Framing::LengthFirst if open.prefix < 2 => {
                 open.prefix += 1;
                 open.announced = open.announced << 8 | usize::from(bytes[0]);
+                // A packet of 0 bytes ends here, or it would end only with the first byte of the
+                // next.
                 return (&[], &bytes[1..], open.prefix == 2 && open.announced == 0);
             }
             Framing::LengthFirst | Framing::Fixed(_) => {
@@ -262,6 +267,7 @@ impl WireInput {
 
     /// Puts bytes of the packet into its place, if it can still be shown.
     fn put(&self, putter: &mut Putter<PacketInPlace>, open: &mut OpenPacket, part: &[u8]) {
+        // Saturating: a device may send on for ever without the end of a packet.
         let seen = open.seen.saturating_add(part.len());
         // A packet too long is counted to its end, but not stored: the next packet must begin at
         // the right byte.
@@ -461,6 +467,8 @@ impl WireOutput {
     /// Begins an instance, with nothing sent.
     pub(crate) fn begin_instance(&self) {
         forget_claim(&self.staging);
+        // Whatever an earlier instance has left staged, as after a fault, must not go out with this
+        // one's.
         self.show(|_| false);
     }
 
@@ -600,6 +608,7 @@ impl Effect for SendCompletion {
     }
 
     fn wait(&mut self, _: (u64, u64), _: &mut dyn FnMut(Request)) -> bool {
+        // A write waits until its bytes have gone, so they go out now and not at the finish.
         self.0.show_staged();
         false
     }
