@@ -136,6 +136,7 @@ impl<T> Lock<T> {
         let mut place = &self.first_user;
         let user = loop {
             place.set(Arc::default());
+            // Nothing yet: another thread is setting the same place just now.
             let Some(user) = place.get() else { continue };
             // A dropped permit frees its user for the next one, so the list stays short.
             if !user.is_taken.swap(true, Relaxed) {
@@ -175,6 +176,8 @@ impl<T> Lock<T> {
             // A section ended by a fault never releases its claim of the data, so a later `change`
             // fails.
             if let (Some(section), Some(data)) = (section.take(), self.data.change()) {
+                // Where panics unwind, too, the claim has to stay: so it is given back by hand
+                // below.
                 let mut data = ManuallyDrop::new(data);
                 result = Some(section(&mut data));
                 drop(ManuallyDrop::into_inner(data));
@@ -196,6 +199,8 @@ impl<T> Lock<T> {
         while let Some(user) = next {
             if user.is_of(running) {
                 is_stated = true;
+                // Not an exchange: the entry belongs to this instance alone (R2). With no section
+                // left, the search goes on, as the subtask may state the lock twice.
                 let left = user.left.load(Relaxed);
                 if left > 0 {
                     user.left.store(left - 1, Relaxed);

@@ -133,6 +133,7 @@ impl DraftPart for Rc<StateOptions> {
     fn tie(self: Box<Self>, dag: &mut TiedDag<'_>) {
         if let Some(provide) = self.provide.take() {
             provide(match dag.verified.on_fault() {
+                // No fault is survived, so the first value is the only one used.
                 OnFault::EndDag => 0,
                 OnFault::DropJob(limit) => limit.in_all,
             });
@@ -181,6 +182,7 @@ impl<T: StateValue> State<T> {
     pub fn reset_to(&self, mut make: impl FnMut() -> T + 'static) -> &Self {
         let value = Arc::clone(&self.value);
         let provide = move |faults| value.provide((0..faults).map(|_| make()));
+        // For its check: after the commit, nobody would ask for the values.
         let _open = self.dag.open();
         self.options.provide.replace(Some(Box::new(provide)));
         self
@@ -251,6 +253,7 @@ impl<T: StateValue> State<T> {
         T: Recordable,
     {
         let value = Arc::<ResettableState<T>>::clone(&self.value);
+        // For its check: the commit has taken the recording of states already.
         let _open = self.dag.open();
         let kept = Arc::new(KeptState::new(value, jobs));
         self.options.kept.replace(Some(kept));

@@ -275,6 +275,7 @@ impl Wire {
     #[track_caller]
     fn claim(&self, is_taken: &AtomicBool, does: &str) {
         assert!(
+            // Relaxed: the flag refuses a second subtask, and hands nothing over.
             !is_taken.swap(true, Ordering::Relaxed),
             "another subtask {does} on wire `{}`; let that one do it, or make another wire",
             self.name()
@@ -633,6 +634,7 @@ impl<T: 'static> Uses for ReceiveUse<T> {
         draft.add(PartKind::Input, OutsideInput { subtask, takes });
         let shared = Arc::clone(&self.wire.shared);
         draft.tie(move |dag| {
+            // Packets for a periodic DAG wait for the job released by the clock.
             if dag.verified.is_sporadic() {
                 let _ = shared.signal.set(Arc::clone(dag.target));
             }
@@ -654,6 +656,8 @@ impl<T: 'static> Uses for ReceiveUse<T> {
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
         Received {
+            // A fixed mark: a device sending faster than the function reads cannot prolong the
+            // instance.
             mark: guard.taker.mark(),
             held: guard,
         }

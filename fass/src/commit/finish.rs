@@ -179,6 +179,7 @@ pub fn finish_create_dags_in_order(
         mut task_set,
         mut warnings,
     } = verify(&drafts, options, terms.wcets.as_deref())?;
+    // Before the first analysis: the times of stated lists have to include the overheads.
     task_set.charge_tables(&terms.settings());
     if let Err(error) = divide(&mut task_set, &terms, &drafts, !lists.is_empty()) {
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
@@ -352,6 +353,7 @@ fn verify(
         let warnings = Vec::new();
         return Err(CommitError { faults, warnings });
     }
+    // Also after faults of this crate, so that the app learns of all faults at once.
     match sched_dag::verify(&specs, &options) {
         Ok(verified) if faults.is_empty() => Ok(verified),
         Ok(VerifiedDags { warnings, .. }) => Err(CommitError { faults, warnings }),

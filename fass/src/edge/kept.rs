@@ -92,6 +92,7 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
             // `before` is beyond `taken` where the journal has lost events.
             *taken = before + count as u64;
             if count > 0 {
+                // Not inside `look`, where the cluster's lock is held: the sink may be slow.
                 self.stream.events(cluster, before, &words[..count]);
                 are_there = true;
             }

@@ -260,6 +260,7 @@ impl LatestJobs {
         let Some(place) = place_of(value.job, places.values.len()) else {
             return;
         };
+        // After a fault, later jobs would take the places of the inputs that led to it.
         if value.job > self.last[places.dag] {
             return;
         }
@@ -303,6 +304,7 @@ impl LatestJobs {
         (0_u16..).zip(&self.places).flat_map(|(channel, places)| {
             self.jobs(places.dag).filter_map(move |job| {
                 let place = place_of(job, places.values.len())?;
+                // A job without a value has left the value of an older job in the place.
                 let (_, completed_ns, length) =
                     places.values[place].filter(|(of, ..)| *of == job)?;
                 let room = &places.bytes[place * places.room..][..places.room];

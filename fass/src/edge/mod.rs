@@ -381,6 +381,7 @@ impl Edge {
     /// Takes the recorded topics of a DAG. Reports whether their values are read in the places
     /// where they are written.
     pub fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
+        // Made at the first recorded topic: an app without one contains no code behind `begin`.
         if self.is_wished() && self.crossing.is_none() && self.echo.is_none() {
             (self.crossing, self.echo) = begin(self.wish, self.shows);
         }

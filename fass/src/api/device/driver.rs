@@ -134,6 +134,8 @@ impl<Q, A> DeviceDriver<Q, A> {
         }
         if cell.answers.get().is_some_and(|answers| answers.is_open()) {
             let posted_ns = cell.posted_ns.load(Ordering::Relaxed);
+            // Stored before `decide`, which hands this time to the asking end along with the
+            // answer.
             let took_ns = now_ns.saturating_sub(posted_ns);
             cell.took_ns.store(took_ns, Ordering::Relaxed);
         }

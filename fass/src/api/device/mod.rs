@@ -222,6 +222,7 @@ impl<Q, A> DeviceCell<Q, A> {
     /// Writes a question to a free place without showing it to the driver yet, and returns its
     /// number.
     fn stage(&self, wait: (u64, u32), question: Q) -> u64 {
+        // Relaxed: the number only has to be unique; `posted` hands the question over.
         let number = QUESTIONS.fetch_add(1, Ordering::Relaxed) + 1;
         // The driver holds at most one of the two places.
         let place = self.questions.iter().find_map(SharedCell::change);
@@ -303,6 +304,7 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
             return false;
         }
         cell.staged.store(0, Ordering::Relaxed);
+        // All these before `posted`: the driver may answer as soon as it sees the number.
         cell.posted_ns.store(ended_ns, Ordering::Relaxed);
         cell.took_ns.store(0, Ordering::Relaxed);
         let last_ns = ended_ns.saturating_add(limit_ns);
@@ -310,6 +312,7 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
         cell.latest.store(number, Ordering::Relaxed);
         // Release: the question is in its place.
         cell.posted.store(number, Ordering::Release);
+        // The driver is called only now: it must find the question.
         if let Some(server) = cell.server.get().filter(|_| !self.is_muted) {
             ask(Request::Signal(server.dag()));
         }
@@ -331,6 +334,7 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
     }
 
     fn withdraw(&mut self) {
+        // Not by `decide`, which needs the number: only the latest question can still be open.
         self.cell.posted.store(0, Ordering::Release);
     }
 
@@ -610,6 +614,7 @@ impl<Q, A> PendingAnswer<'_, Q, A> {
         // The lookup comes before the wait begins, since the wait's end depends on the recorded
         // time.
         let next = self.wait.next_id(context);
+        // Without a recorded answer the wait goes on to its limit, as in the recorded run.
         if let Some((took_ns, Some(answer))) = next.and_then(|wait| answers.recorded(wait)) {
             self.recorded = Some(answer);
             self.wait.end(WaitEnd::AtMost(took_ns));

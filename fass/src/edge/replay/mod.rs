@@ -539,6 +539,7 @@ impl Crossing for OfMachine {
         replay.prepare(plan);
         replay.guard(plan);
         self.lines = mem::take(&mut plan.lines);
+        // After `prepare`, which counts the signals; this takes the first of each DAG out.
         let signals = SignalTimes::take_over(plan, &mut replay);
         self.replayer = signals.raiser(self.host);
         self.replay = Some((replay, signals));
