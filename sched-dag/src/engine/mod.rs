@@ -373,6 +373,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             WaitLimit::For(limit_ns) => limit_ns,
             WaitLimit::SinceRelease(after_ns) => {
                 let until_ns = self.scheduler.release_ns(vertex).saturating_add(after_ns);
+                // An instant that has passed is a wait of no time.
                 until_ns.saturating_sub(now_ns)
             }
         }

@@ -133,6 +133,7 @@ impl Mailboxes {
                         sent(cluster);
                     }
                 }
+                // The request concerns the sender's own cluster as well.
                 return false;
             }
             Request::Begin | Request::GoOn | Request::Step => return false,
@@ -186,6 +187,8 @@ impl Mailboxes {
             let end = to.end.swap(NOTHING, Ordering::Acquire);
             let signals = to.signals.swap(0, Ordering::Acquire);
             let change = to.change.swap(NOTHING, Ordering::Acquire);
+            // Only now: a mode that the same sender has left before these letters is there by now,
+            // and comes first.
             mode().into_iter().for_each(&mut take);
             match change {
                 PAUSE => take(Request::Pause(dag)),
@@ -221,6 +224,7 @@ fn answers(dag: &Dag) -> Box<[(SubtaskId, AtomicU64)]> {
 
 /// Returns a word for a wait of a subtask: larger for a later wait, never 0.
 const fn wait_word(wait: WaitId) -> u64 {
+    // Eight bits are enough: a subtask states at most 254 waits (`MOST_WAITS`).
     (wait.instance.job << 8) | (wait.number as u64 + 1)
 }
 

@@ -156,6 +156,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// may still execute.
     pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {
         *self.body_state(vertex) = BodyState::Resting(body);
+        // Core 0 is merely looked at first: the core waiting for the instance, if any, is unknown.
         self.forget_target(0, vertex);
     }
 
@@ -253,6 +254,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Running) {
             BodyState::Resting(body) => {
+                // The target, too, since the short way makes no decision to set it.
                 self.seats[core.index()] = CoreSlot {
                     current: vertex,
                     target: vertex,

@@ -27,6 +27,7 @@ impl BitSet {
         let mut between = Vec::new();
         let count = limit.div_ceil(64);
         let mut above = count.div_ceil(64);
+        // The level of a single word is `top`, in the set itself.
         while above > 1 {
             between.push(vec![0; above].into_boxed_slice());
             above = above.div_ceil(64);
@@ -89,6 +90,8 @@ impl BitSet {
         let word = &mut self.words[number / 64];
         *word &= word.wrapping_sub(1);
         if *word == 0 {
+            // The emptied word was the first, so its bit is the lowest of `top`. A level in between
+            // may have other bits left, so there `remove` looks at each.
             match self.between.is_empty() {
                 true => self.top &= self.top.wrapping_sub(1),
                 false => self.remove(number),

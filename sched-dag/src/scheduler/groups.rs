@@ -101,6 +101,7 @@ impl ReadyLines {
         self.groups = groups.into();
         let lines = (0..).map(LineId).take(cores as usize);
         let apart = lines.map(|line| GroupLine {
+            // A copy with room for all vertices: ranks count over the whole cluster.
             ready: match self.groups.contains(&line) {
                 true => self.cluster.clone(),
                 false => ReadyQueue::without_room(),
@@ -222,6 +223,8 @@ impl ReadyLines {
         {
             return Some(key);
         }
+        // Empty for the cores of groups: a DAG without an affinity would share cores with them,
+        // which the commit refuses.
         self.cluster.pop()
     }
 
@@ -289,6 +292,8 @@ impl ReadyLines {
             return self.lists.touches_others(core);
         }
         let is_elsewhere = !line.is_cluster() && !self.is_for(line, core);
+        // An instance that kept its core kept entries off it, too. Now the list may go on, and
+        // displace a member to another core.
         count > 1 || is_elsewhere || kept && self.lists.has(core)
     }
 }
@@ -317,6 +322,8 @@ impl Scheduler {
 
     #[inline(never)]
     fn give_apart(&mut self) {
+        // Entries precede all lines (T1), and the members displaced by them are in line for the
+        // groups.
         self.decide_lists();
         for line in (0..).map(LineId).take(self.ready.apart.len()) {
             // Each exchange brings in a larger key than the one before and takes out a smaller one.

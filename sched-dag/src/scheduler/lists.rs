@@ -117,6 +117,7 @@ impl ListTable {
             }
             all.lists[list.core as usize] = state;
         }
+        // Nobody has looked at the lists yet, and their first entries may be void (T2).
         all.touch_all();
         all
     }
@@ -132,6 +133,7 @@ impl ListTable {
     )]
     fn place(&self, vertex: u32, job: i64) -> usize {
         let [first, count] = self.rows[vertex as usize];
+        // Euclidean, since jobs before the first one have negative numbers.
         first as usize + job.rem_euclid(count.into()) as usize
     }
 
@@ -163,6 +165,7 @@ impl ListTable {
         let job = job.cast_signed();
         let core = self.cores[self.place(vertex, job)].index();
         let list = &mut self.lists[core];
+        // If a begun entry is in the way, the end of that entry touches the core.
         let is_next = list.next().is_some_and(|(entry, next)| {
             (entry.vertex, next) == (vertex, job) && list.open <= entry.depth
         });
@@ -262,6 +265,8 @@ impl ListState {
 
     /// Takes a vertex out of the begun entries, if it is there.
     fn remove(&mut self, vertex: u32) {
+        // An entry below the innermost may end first: it may finish before the machine takes its
+        // core away, or be cancelled. Its place is passed over when those above have ended.
         if self.innermost != vertex {
             let place = self.below.iter_mut().find(|below| **below == vertex);
             place.into_iter().for_each(|place| *place = NONE);
@@ -336,7 +341,7 @@ impl Scheduler {
                     // A member back in line may be for another core (T4).
                     self.fresh += 1;
                 }
-                // The core was idle: out of the idle stack with it, so that no line takes it.
+                // The core was idle: it leaves the idle stack, so that no line gets it.
                 _ => _ = self.cores.take_idle_of(&[core]),
             }
             let decision = self.give_to_entry(core, entry);

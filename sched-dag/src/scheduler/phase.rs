@@ -351,6 +351,8 @@ impl Scheduler {
             let state = &mut self.dags[dag.index()];
             let skipped = state.jobs.skip_all_waiting();
             state.statistics.skips += skipped.end - skipped.start;
+            // The rest of an older backlog is given up here: it is counted, but no longer reported
+            // (P2).
             state.untold = skipped;
             self.tell_skip(dag);
             self.tell_skips();
@@ -364,6 +366,7 @@ impl Scheduler {
     #[inline(never)]
     pub(super) fn tell_skips(&mut self) {
         let now_ns = self.log.now_ns;
+        // By instant, not by call: all pauses of one instant share the limit.
         if self.told.0 != now_ns {
             self.told = (now_ns, 0);
         }

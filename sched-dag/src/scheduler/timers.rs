@@ -82,6 +82,8 @@ impl Timers {
         let phase = |dag: usize| (dags[dag].period_ns(), dags[dag].offset_ns());
         let order = sorted_by_key(dags.len(), phase);
         let periodic: Vec<usize> = (order.into_iter())
+            // A sporadic DAG is released by its signals, so it has no releases in common with
+            // others.
             .filter(|&dag| !dags[dag].is_sporadic() && dags[dag].cluster() == cluster)
             .collect();
         let classes = periodic.chunk_by(|one, other| phase(*one) == phase(*other));
@@ -91,12 +93,15 @@ impl Timers {
                 let dag = &dags[class[place]];
                 let sinks = dag.sinks().iter();
                 let deadlines = sinks.map(|sink| dag.subtask(*sink).relative_deadline_ns());
+                // One nanosecond later: a finish at the deadline itself is in time.
                 deadlines.min().map_or(0, |ns| ns.saturating_add(1))
             };
             let by_dag = (0..class.len()).map(|place| (0, to_u32(class[place])));
             let by_deadline = sorted_by_key(class.len(), distance_ns).into_iter();
             let by_deadline = by_deadline.map(|at| (distance_ns(at), to_u32(class[at])));
             let (by_dag, by_deadline) = (by_dag.collect(), by_deadline.collect());
+            // Two lanes of releases: while the members' jobs of one instant are released one by
+            // one, some wait for that instant, and the others for the next.
             let orders: [Arc<[(u64, u32)]>; LANES] = [Arc::clone(&by_dag), by_dag, by_deadline];
             for (kind, order) in orders.iter().enumerate() {
                 for (place, &(_, dag)) in (0..).zip(&**order) {
@@ -260,6 +265,7 @@ impl ReleaseLane {
     #[inline(always)]
     fn join(&mut self, place: u32, event_ns: u64) -> Option<bool> {
         let release_ns = event_ns - self.order[place as usize].0;
+        // An empty lane counts from any release.
         if self.release_ns != release_ns && self.first != NONE {
             return None;
         }

@@ -148,6 +148,8 @@ impl Scheduler {
         let place = self.waits.begin(vertex.0, instance.job);
         (self.log.now_ns, self.log.here) = (instant_ns, core);
         let limit_ns = now_ns.saturating_add(limit_ns);
+        // Counted from the time of the core, which may lie before the instant: then the wait may be
+        // over.
         if limit_ns > instant_ns {
             waiting.phase = InstancePhase::Waiting;
             self.log.on_this(EventKind::Wait, now_ns, instance);
@@ -189,6 +191,7 @@ impl Scheduler {
     #[inline]
     pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
         let (limit_ns, timer) = self.timers.peek()?;
+        // The event due first may be of a DAG: a release or a deadline is for the whole step.
         let place = timer.checked_sub(self.dags.len())?;
         // While a core is idle, the cluster's line is empty; but the idle core may belong to
         // another line. The last timer belongs to no wait.
@@ -212,7 +215,9 @@ impl Scheduler {
     #[inline]
     fn set_limit(&mut self, place: usize, limit_ns: u64) {
         self.timers.set(self.dags.len() + place, limit_ns);
+        // A new time can only make the earliest earlier, so the heap need not be asked.
         self.quiet_until_ns = self.quiet_until_ns.min(limit_ns);
+        // The platform's alarm may have to come earlier.
         self.log.has_job_event = true;
     }
 

@@ -257,6 +257,8 @@ impl JobTable {
         let kind = release_kind(self.next_due + 1);
         let event = sooner(next_due_ns.map(|due_ns| (due_ns, kind)), late_ns);
         let is_alone = is_due && self.phase == DagPhase::Running && self.are_at_rest();
+        // A late driver finds the deadline or the next release due as well: then their order
+        // counts.
         if !is_alone || event.0 <= now_ns {
             return None;
         }
