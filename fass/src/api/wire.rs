@@ -636,6 +636,7 @@ impl<T: 'static> Uses for ReceiveUse<T> {
         draft.tie(move |dag| {
             // Packets for a periodic DAG wait for the job released by the clock.
             if dag.verified.is_sporadic() {
+                // Cannot fail: one subtask receives on a wire, and its DAG is committed once.
                 let _ = shared.signal.set(Arc::clone(dag.target));
             }
         });

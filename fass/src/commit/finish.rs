@@ -317,6 +317,7 @@ fn verify(
             name: draft.spec.name.clone(),
         };
         if is_repeated {
+            // Its other faults are those of the first occurrence, and are reported there.
             faults.push(Fault::GivenTwice { dag: label });
             continue;
         }

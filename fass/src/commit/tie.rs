@@ -44,7 +44,7 @@ pub(crate) fn tie(
         // From now on a handle that the app has kept names this DAG of this plan.
         draft.borrow().target.set(plan.number, id);
     }
-    // While all drafts are there: samples, signals and modes cross DAGs.
+    // Before the first draft is closed: samples, signals and modes cross DAGs.
     for (_, complete) in one_of_each::<Planner>(drafts) {
         complete(drafts, &mut plan);
     }

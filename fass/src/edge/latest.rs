@@ -68,7 +68,7 @@ impl Crossing for RecentJobs {
         name(&mut header, self.app, &plan.task_set);
         // A replay begins at one of these jobs, so the states before each have to be known.
         plan.keep_states_of(self.jobs);
-        // Without memory the app runs as if nothing were kept, for nobody has asked for it.
+        // A lack of memory is no error: nobody has asked for this history.
         let latest = LatestJobs::new(&header.channels, self.jobs);
         self.kept = latest.map(|latest| PlanHistory {
             header,

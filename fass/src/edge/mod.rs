@@ -413,7 +413,7 @@ impl Edge {
         let is_second = is_asked_for && self.is_on;
         let launched = match &mut self.crossing {
             None if !replays => return Ok(()),
-            // Of a later commit, everything is kept except its values.
+            // The values of a later commit are not recorded.
             Some(_) if is_second && !replays => return Ok(()),
             None => Err("`replay`: no topic of the app is recorded; name topics by `Dag::record`".into()),
             Some(_) if is_second => Err(
@@ -433,6 +433,8 @@ impl Edge {
             drain.send_header(to);
         }
         self.is_on = true;
+        // Not for the latest jobs: their history keeps no told times, so functions read the clock
+        // itself.
         self.tells |= is_asked_for;
         Ok(())
     }

@@ -116,6 +116,7 @@ pub(crate) struct InstanceRequests {
 
 impl Effect for InstanceRequests {
     fn happen(&mut self, _completed_ns: u64, ask: &mut dyn FnMut(Request)) {
+        // Not an exchange: the function has returned, and nobody else changes the wish.
         let wish = self.wish.load(Ordering::Relaxed);
         if wish == NOTHING {
             return;

@@ -245,6 +245,7 @@ impl TurnState {
     pub(super) fn take_wait(&self) -> Option<(WaitLimit, u64)> {
         let ns = self.asked_ns.load(Ordering::Relaxed);
         let asks = self.asks.load(Ordering::Relaxed);
+        // The next turn has to ask anew: `expect_wait` would take this wait for its own.
         self.asks.store(NONE, Ordering::Relaxed);
         match asks {
             NONE => None,

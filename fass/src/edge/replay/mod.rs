@@ -313,6 +313,7 @@ impl Replay {
             let channel = &self.own.channels[usize::from(*channel)];
             self.describe(channel, *job, place, Some(&self.computed))
         });
+        // As long as the run goes on, a value or a fault may still come.
         let missing = || is_over.then(|| self.missing()).flatten();
         let unmet = || is_over.then(|| self.unmet_fault(None)).flatten();
         ReplayOutcome {
