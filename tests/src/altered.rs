@@ -1,11 +1,11 @@
-//! QEMU with other words than the tool gives it: other processors, boards and devices.
+//! QEMU with other words than the tool's: other processors, boards and devices.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
 use crate::file::File;
 
-/// Makes a script that is QEMU with words in place of ours, and with these added.
+/// Makes a script running QEMU with other words in place of ours, and with more words added.
 pub(crate) fn altered(changes: &[(&str, &str)], more: &str) -> File {
     let change = |(other, word): &(&str, &str)| format!("set -- \"${{@/{other}/{word}}}\"\n");
     let changes: String = changes.iter().map(change).collect();

@@ -1,11 +1,11 @@
-//! Booting in Bochs, the emulator that imitates a PC more strictly than QEMU does.
+//! Boots in Bochs, an emulator imitating a PC more strictly than QEMU.
 //!
-//! It judges what QEMU does not: a local APIC that is not enabled keeps its timer
-//! masked, processors come out of INIT with their caches off, and x2APIC, the counter's
-//! deadline timer and five-level paging are there, as on PCs of today. It is slow, and its
-//! clock is its own: a test may judge by counts and order alone.
+//! Bochs tests properties QEMU does not imitate: a disabled local APIC keeps its timer masked,
+//! processors come out of INIT with their caches off, and x2APIC, the counter's deadline timer and
+//! five-level paging are there, as on today's PCs. Bochs is slow, and has its own clock: a test may
+//! judge by counts and order alone.
 //!
-//! A run ends when the kernel powers the PC off, by ACPI, which ends Bochs.
+//! A run ends when the kernel powers the PC off by ACPI: then Bochs ends.
 
 use std::fs;
 use std::path::Path;
@@ -21,21 +21,21 @@ use views::protocol::Transcript;
 
 use crate::guest::built;
 
-/// Files of a boot: the PC, what it prints, and what Bochs says.
+/// Files of a boot: the PC's settings, its serial output, and Bochs' messages.
 const SETTINGS: &str = "settings";
 const SERIAL: &str = "serial";
 const SAID: &str = "said";
 
-/// How long a boot may take in wall time: many times what any takes.
+/// The most wall time of a boot: many times the usual time.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// Boots the image of a package from an ISO, after a command of GRUB's if there is one, in a PC
-/// with so many processors of Bochs' model `model`, and returns what it has printed, which must be
-/// success.
+/// Boots the image of a package from an ISO in a PC, and returns the output of the run, which must
+/// succeed. The PC has `cores` processors of Bochs' model `model`. GRUB first executes `command`,
+/// unless it is empty.
 ///
 /// # Panics
 ///
-/// Panics with what is missing, or with the serial log if it does not succeed.
+/// Panics if a program or file is missing, or, with the serial log, if the run does not succeed.
 pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u64) -> Transcript {
     let run = || -> Result<(String, String), String> {
         install::ensure(&install::BOCHS)?;
@@ -65,8 +65,8 @@ pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u6
     transcript
 }
 
-/// Puts a command in the place of the question whether the processor has 64 bits, which is in
-/// the ISO as text.
+/// Replaces GRUB's question whether the processor has 64 bits by a command. The ISO has the
+/// question as text.
 fn put_before(command: &str, iso: &Path) -> Result<(), String> {
     const QUESTION: &[u8] = b"if cpuid -l; then\n";
     const ANSWER: &[u8] = b"\nelse\n";
@@ -92,8 +92,8 @@ fn put_before(command: &str, iso: &Path) -> Result<(), String> {
     fs::write(iso, bytes).map_err(|why| format!("`{}`: {why}", iso.display()))
 }
 
-/// Runs Bochs with the settings in a folder until it ends, at most for the limit, and returns how
-/// it ended and its last words, which are in its log and in its standard error.
+/// Runs Bochs with the settings in a folder until its end, at most until the limit. Returns the way
+/// Bochs ended, and its last words from its log and its standard error.
 fn boot(program: &Path, folder: &Path) -> Result<String, String> {
     let cannot = |why| format!("cannot write in `{}`: {why}", folder.display());
     let mut command = bound_to_us(program);
@@ -116,7 +116,7 @@ fn boot(program: &Path, folder: &Path) -> Result<String, String> {
     }
 }
 
-/// Returns the last lines of a file of another program's.
+/// Returns the last lines of a file written by another program.
 fn last_words(file: &Path) -> String {
     const LINES: usize = 20;
     let text = fs::read(file).unwrap_or_default();
@@ -128,8 +128,8 @@ fn last_words(file: &Path) -> String {
         .collect()
 }
 
-/// Returns the settings of the PC. It has no sound: Bochs would end itself where the host has no
-/// sound card.
+/// Returns the settings of the PC. It has no sound: without the host's sound card Bochs would end
+/// itself.
 fn settings_text(model: &str, cores: u64, iso: &Path, folder: &Path) -> String {
     let [log, said] = [SERIAL, SAID].map(|file| folder.join(file));
     let (iso, log, said) = (iso.display(), log.display(), said.display());

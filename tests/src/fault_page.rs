@@ -1,8 +1,8 @@
-//! The page `docs/errors.md`, as the tests read it: what a commit says of each fault is
-//! compared with it word for word, so it cannot go stale.
+//! The page `docs/errors.md`, as the tests read it: tests compare a commit's text for each fault
+//! with the page word for word, so the page cannot go stale.
 //!
-//! A fault's *entry* is a row of a table that is headed `| fault | text |`, and a third
-//! column: its name in backquotes, its text, and what else there is to say.
+//! A fault's *entry* is a row of a table with the head `| fault | text |` and a third column: the
+//! name in backquotes, the text, and notes.
 
 use std::collections::BTreeMap;
 
@@ -16,13 +16,13 @@ const PAGE: &str = "docs/errors.md";
 ///
 /// # Panics
 ///
-/// Panics if the page has no entries, or if one lacks a part or stands there twice.
+/// Panics if the page has no entries, or if an entry lacks a part or occurs twice.
 pub fn documented_faults() -> BTreeMap<String, String> {
     read(&page(PAGE)).unwrap_or_else(|why| panic!("{PAGE}: {why}"))
 }
 
-/// Reads the first column of one of the page's tables, which is found by the head of
-/// that column and the columns behind it; `...` stands for what varies.
+/// Reads the first column of a table of the page. `head` is the head of the first column and of the
+/// columns behind it. In the cells `...` replaces varying parts.
 ///
 /// # Panics
 ///
@@ -36,17 +36,17 @@ pub fn table(head: &str) -> Vec<String> {
     texts.map(|text| text.trim().to_string()).collect()
 }
 
-/// Holds the text of a fault's entry to what is said now.
+/// Compares the text of a fault's entry with the present text.
 ///
 /// # Panics
 ///
-/// Panics if it is another; see [`golden::assert_is`].
+/// Panics if the texts differ; see [`golden::assert_is`].
 #[track_caller]
 pub fn assert_is(fault: &str, text: &str, now: &str) {
     golden::assert_is(PAGE, &format!("\n| `{fault}` | "), text, now);
 }
 
-/// Returns a fault's text with the names, in backquotes, that another text has.
+/// Returns a fault's text with another text's names, in backquotes.
 pub fn with_names_of(other: &str, text: &str) -> String {
     let mut names = other.split('`').skip(1).step_by(2);
     let parts = text

@@ -1,7 +1,7 @@
-//! Booting a guest inside a test.
+//! Boots a guest inside a test.
 //!
-//! A boot test says which image, how many cores, which words on the guest's
-//! command line, and then judges the [`Outcome`]:
+//! A boot test states the image, the number of cores, and words on the guest's command line, and
+//! then judges the [`Outcome`]:
 //!
 //! ```no_run
 //! use harness::Guest;
@@ -10,8 +10,8 @@
 //! assert_eq!(outcome.transcript.of_kind("fork_join").count(), 3);
 //! ```
 //!
-//! Any failure ends in a panic that shows the end of the serial log
-//! and where all of it lies. A good run's log is removed.
+//! Any failure ends in a panic showing the end of the serial log and the path of the whole log. A
+//! good run's log is removed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -35,29 +35,30 @@ use crate::Said;
 use crate::altered::altered;
 use crate::file::File;
 
-/// How long a guest may take in wall time if the test does not say: many times what
-/// any takes, so that it ends what hangs and nothing that a busy host makes slow.
+/// The most wall time of a guest unless the test states another. It is many times the usual time:
+/// it ends a hanging guest, but no guest slowed by a busy host.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// A guest that a test describes and boots.
+/// A guest, described and booted by a test.
 #[derive(Clone, Debug, Default)]
 #[must_use = "a guest does nothing until it boots"]
 pub struct Guest {
     package: String,
-    /// A file to boot instead of what the package is built into.
+    /// A file to boot instead of the package's image.
     image: Option<PathBuf>,
     qemu: Qemu,
-    /// The program in QEMU's place, if there is one.
+    /// The program in place of QEMU, if there is another.
     altered: Option<Arc<File>>,
     words: Vec<String>,
     limit: Duration,
-    /// The words to type at the console, each once a line with such a text has come.
+    /// Pairs of a text in the guest's output and the words to type at the console after a line with
+    /// this text.
     conversation: Vec<(String, String)>,
 }
 
 impl Guest {
-    /// Describes a guest that boots the image of a package: one core, 32 MiB,
-    /// a microvm, deterministic, 600 s.
+    /// Describes a guest booting the image of a package: one core, 32 MiB, a microvm,
+    /// deterministic, 600 s.
     pub fn new(package: &str) -> Guest {
         Guest {
             package: package.into(),
@@ -66,7 +67,7 @@ impl Guest {
         }
     }
 
-    /// Describes a guest that runs a test of `tests/guest`.
+    /// Describes a guest running a test of `tests/guest`.
     pub fn test(name: &str) -> Guest {
         Guest::new("guest-tests").word(&format!("test={name}"))
     }
@@ -83,15 +84,15 @@ impl Guest {
         self
     }
 
-    /// Sets what time means.
+    /// Sets the meaning of time in the guest.
     pub fn mode(mut self, mode: Mode) -> Guest {
         self.qemu.mode = mode;
         self
     }
 
-    /// Runs on emulated processors in real time, where a busy host may hold any of them
-    /// back at any moment. So no budget is derived from a WCET, and the test may judge
-    /// by order and by counts alone.
+    /// Runs on emulated processors in real time, where a busy host may hold any of them back at any
+    /// moment. So no budget is derived from a WCET, and the test may judge by order and by counts
+    /// alone.
     pub fn in_real_time(self) -> Guest {
         self.mode(Mode::Threads).word("budget_factor=0")
     }
@@ -102,8 +103,8 @@ impl Guest {
         self
     }
 
-    /// Boots as a PC does: from a stick, by this loader, with its words and its module on
-    /// the stick. It is in real time, as firmware takes long otherwise, on a q35.
+    /// Boots like a PC from a stick, by a loader; the words and the module are on the stick. The
+    /// guest is a q35 in real time: otherwise its firmware would take long.
     pub fn from_stick(self, loader: Loader) -> Guest {
         let mut guest = self.in_real_time().machine(Machine::Q35);
         guest.qemu.loader = loader;
@@ -116,14 +117,14 @@ impl Guest {
         self
     }
 
-    /// Boots this file, which is not built first; the package only names it.
+    /// Boots a file without building it first. The package gives only its name.
     pub fn image(mut self, file: &Path) -> Guest {
         self.image = Some(file.into());
         self
     }
 
-    /// Boots by a QEMU with other words in place of ours, each given with its place, and with
-    /// these added.
+    /// Boots by a QEMU with altered words: `changes` has pairs of our word's place and the other
+    /// word, and `more` is added.
     pub fn altered(mut self, changes: &[(&str, &str)], more: &str) -> Guest {
         let program = altered(changes, more);
         self.qemu.program.clone_from(&program.0);
@@ -131,12 +132,13 @@ impl Guest {
         self
     }
 
-    /// Boots on a processor of this model, which may lack or have things: `max,-nx`.
+    /// Boots on a processor of a QEMU model, with or without some features: `max,-nx`.
     pub fn model(self, model: &str) -> Guest {
         self.altered(&[("#max", model)], "")
     }
 
-    /// Puts a card of that name in a network, given by QEMU's words. It is in a q35.
+    /// Puts a network card of a kind into the guest, and its network by QEMU's words. The guest is
+    /// a q35.
     pub fn network(mut self, card: &'static str, words: &str) -> Guest {
         self.qemu.network = Some(Network {
             words: words.into(),
@@ -152,11 +154,11 @@ impl Guest {
         self
     }
 
-    /// Lets bytes arrive on the app's wire, as a file of `run --input` has them.
+    /// Lets bytes arrive on the app's wire, given as in a file of `run --input`.
     ///
     /// # Panics
     ///
-    /// Panics if the file is wrong, or cannot be written.
+    /// Panics if the text is wrong, or its file cannot be written.
     pub fn input(self, text: &str) -> Guest {
         let entries = wire_script::read(text).unwrap_or_else(|why| panic!("the input:{why}"));
         let script = wire_script::for_guest(&entries);
@@ -165,7 +167,7 @@ impl Guest {
         self.module(&file).word(&format!("input={}", script.len()))
     }
 
-    /// Boots the guest, which must succeed, and returns what it has sent on its wire, too. Removes
+    /// Boots the guest, which must succeed. Returns the bytes sent on its wire, too, and removes
     /// the file of its input.
     ///
     /// # Panics
@@ -186,13 +188,13 @@ impl Guest {
         (outcome, sent)
     }
 
-    /// Has the guest's recording written to a file, from a buffer of so many KiB.
+    /// Writes the guest's recording to a file, from a buffer of `kib` KiB.
     pub fn records(mut self, file: &Path, kib: u64) -> Guest {
         self.qemu.records = Some(file.into());
         self.word(&format!("keep={kib}"))
     }
 
-    /// Has the guest replay a recording.
+    /// Makes the guest replay a recording.
     ///
     /// # Panics
     ///
@@ -202,14 +204,14 @@ impl Guest {
         self.module(file).word(&format!("replay={bytes}"))
     }
 
-    /// Gives the guest a console. Each pair is a text to wait for, in any line that
-    /// comes after what was said before, and what to say then.
+    /// Gives the guest a console. Each pair is a text to wait for, in any line after the words
+    /// typed before, and the words to type then.
     pub fn conversation(self, conversation: &[(&str, &str)]) -> Guest {
         self.typing(conversation).word("console=on")
     }
 
-    /// As [`conversation`](Self::conversation), without a console: what is said goes
-    /// to the app.
+    /// Types like [`conversation`](Self::conversation), but without a console: the words go to the
+    /// app.
     pub fn typing(mut self, conversation: &[(&str, &str)]) -> Guest {
         let owned = |&(text, answer): &(&str, &str)| (text.into(), answer.into());
         self.conversation = conversation.iter().map(owned).collect();
@@ -217,14 +219,13 @@ impl Guest {
         self
     }
 
-    /// Sets how long the guest may take in wall time.
+    /// Sets the most wall time of the guest.
     pub fn limit(mut self, limit: Duration) -> Guest {
         self.limit = limit;
         self
     }
 
-    /// Builds the image if need be, boots it and waits for the end, whatever
-    /// that is.
+    /// Builds the image if need be, boots the guest and waits for its end, good or bad.
     ///
     /// # Panics
     ///
@@ -241,12 +242,12 @@ impl Guest {
         })
     }
 
-    /// Boots the guest, which must succeed, next to a peer, which gets the guest's lines. When the
-    /// peer is done the guest is ended by ctrl-C.
+    /// Boots the guest, which must succeed, next to a peer receiving the guest's lines. When the
+    /// peer has returned, ctrl-C ends the guest.
     ///
     /// # Panics
     ///
-    /// As [`succeed`](Self::succeed), and if the peer does.
+    /// As [`succeed`](Self::succeed), and if the peer panics.
     pub fn succeed_beside<T: Send>(
         self,
         peer: impl FnOnce(&Receiver<String>) -> T + Send,
@@ -298,18 +299,17 @@ impl Guest {
     ///
     /// # Panics
     ///
-    /// Panics with the serial log's end if it does not.
+    /// Panics with the serial log's end if the guest fails.
     #[must_use]
     pub fn succeed(&self) -> Outcome {
         judged(self.boot())
     }
 
-    /// Boots the guest, which must end with this status and say so in both
-    /// ways, verdict and exit status.
+    /// Boots the guest, which must end with a status in both its verdict and its exit status.
     ///
     /// # Panics
     ///
-    /// Panics with the serial log's end if it ends otherwise.
+    /// Panics with the serial log's end if the guest ends otherwise.
     #[must_use]
     pub fn end_in(&self, status: Status) -> Outcome {
         let outcome = self.boot();
@@ -323,7 +323,7 @@ impl Guest {
         outcome
     }
 
-    /// Boots the guest, which must refuse its words or its file, and returns why.
+    /// Boots the guest, which must refuse its words or its file, and returns the reason.
     ///
     /// # Panics
     ///
@@ -334,14 +334,14 @@ impl Guest {
     }
 }
 
-/// Says something to a guest. If it is gone, its outcome says so.
+/// Types words to a guest. If the guest is gone, its outcome tells.
 fn say(pipe: &Mutex<Option<ChildStdin>>, words: &str) {
     if let Some(pipe) = pipe.lock().expect("nobody panics with it").as_mut() {
         let _ = pipe.write_all(words.as_bytes());
     }
 }
 
-/// Returns an outcome, which must be a success, and removes its log.
+/// Judges an outcome, which must be a success, removes its log, and returns the outcome.
 #[track_caller]
 fn judged(outcome: Outcome) -> Outcome {
     if let Err(fault) = outcome.judge() {
@@ -351,7 +351,7 @@ fn judged(outcome: Outcome) -> Outcome {
     outcome
 }
 
-/// Builds each image once in the life of a test binary.
+/// Returns a package's image, built once in the life of a test binary.
 pub(crate) fn built(package: &str) -> Result<PathBuf, String> {
     static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
     // The map is whole at every moment, so a panic elsewhere does not harm it.

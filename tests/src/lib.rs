@@ -1,9 +1,9 @@
-//! Support of the boot tests, above the host tool's library: a [`Guest`] that a test
-//! describes and boots, [`said`] for what it says, [`stick`] for what it boots from as a PC does,
-//! [`bochs`], where it is not QEMU that boots it, [`peer`] for a router, [`markdown`] and
-//! [`fault_page`] for pages that are held to their word, [`workload`] for what the baseline's policies
-//! do by their rules, and the tutorials, whose examples are
-//! this crate's doctests.
+//! Support of the boot tests, above the host tool's library.
+//!
+//! A test describes and boots a [`Guest`], looks at its output by [`said`], boots like a PC by
+//! [`stick`], in Bochs by [`bochs`], and starts a router by [`peer`]. [`markdown`] and
+//! [`fault_page`] read pages for comparison with the code. [`workload`] computes the behaviour of
+//! the baseline's policies by their rules. The tutorials' examples are this crate's doctests.
 
 #![forbid(unsafe_code)]
 
@@ -27,12 +27,12 @@ use views::protocol::Transcript;
 pub use guest::Guest;
 pub use said::{Members, Said, lawful_runs};
 
-/// Runs an app, or a DAG file, by `./scripts/run` with these words, wherever they say, and returns
-/// what it said.
+/// Runs an app, or a DAG file, by `./scripts/run` with words, on any platform they name, and
+/// returns its output.
 ///
 /// # Panics
 ///
-/// Panics if it ends in a failure.
+/// Panics if the run fails.
 pub fn run(app: &str, words: &[&str]) -> Transcript {
     let mut command = Command::new(system::workspace().join("scripts/run"));
     // On Linux a panic's backtrace counts as its instance's time, which a budget limits.
@@ -63,7 +63,7 @@ mod guide_examples {}
 #[doc = include_str!("../../docs/wires.md")]
 mod wire_examples {}
 
-/// As above, of the page for those who have a ROS 2 graph.
+/// As above, of the page for owners of a ROS 2 graph.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/from-ros-2.md")]
 mod ros_examples {}

@@ -1,7 +1,7 @@
 //! The blocks of a page in Markdown.
 //!
-//! A *block* is what stands between two fences; its *info* is what the first fence
-//! says of it, such as `rust` or `text output-new-app`.
+//! A *block* is the text between two fences; its *info* is the text behind the first fence, such as
+//! `rust` or `text output-new-app`.
 
 use std::fs;
 
@@ -12,7 +12,7 @@ use tool::system::workspace;
 pub struct Block {
     /// The text of the opening fence.
     pub info: String,
-    /// Its lines, each with its newline.
+    /// The block's lines, each with its newline.
     pub text: String,
 }
 
@@ -20,7 +20,7 @@ pub struct Block {
 ///
 /// # Panics
 ///
-/// Panics if it cannot be read.
+/// Panics if the file cannot be read.
 #[track_caller]
 pub fn page(path: &str) -> String {
     let text = fs::read_to_string(workspace().join(path));

@@ -1,4 +1,4 @@
-//! A router of Zenoh on loopback, as users have one: `peers/router.py`, in a Python of its own.
+//! A router of Zenoh on loopback, the same as users have: `peers/router.py`, in its own Python.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, UdpSocket};
@@ -13,9 +13,9 @@ use tool::{install, system};
 /// The most time for a router's start: many times the usual.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// A running router. To drop the value ends the process.
+/// A running router. Dropping the value ends the process.
 pub struct Router {
-    /// Its port for UDP.
+    /// The router's UDP port.
     pub port: u16,
     commands: ChildStdin,
     lines: Receiver<String>,
@@ -23,12 +23,12 @@ pub struct Router {
 }
 
 impl Router {
-    /// Starts a router at a port, or at a free one, and waits until the router is up.
+    /// Starts a router at a port, or at a free port, and waits until the router is up.
     ///
     /// # Panics
     ///
-    /// Panics if the router does not come up, as where no Python has one: there `./scripts/test` skips
-    /// the module `with_router`, and counts it.
+    /// Panics if the router does not come up, as on computers without Zenoh in Python: there
+    /// `./scripts/test` skips the module `with_router`, and counts it.
     #[must_use]
     pub fn start(port: Option<u16>) -> Self {
         let python = install::python().expect("a Python with a router");
@@ -68,7 +68,7 @@ impl Router {
         writeln!(self.commands, "{line}").expect("a router");
     }
 
-    /// Returns what the router has said since the last call.
+    /// Returns the router's output since the last call.
     pub fn said(&self) -> impl Iterator<Item = String> {
         self.lines.try_iter()
     }

@@ -1,5 +1,5 @@
-//! A guest's output, as a test looks for it: a missing line ends in a panic that shows
-//! the end of the log.
+//! A guest's output, with a test's queries: a missing line ends in a panic showing the end of the
+//! log.
 
 use tool::Outcome;
 use tool::trace;
@@ -9,10 +9,10 @@ use views::record::Run;
 
 /// Queries of a run's output.
 pub trait Said {
-    /// Returns what it has said, taken apart.
+    /// Returns the output, parsed.
     fn transcript(&self) -> &Transcript;
 
-    /// Returns the end of it, for a person.
+    /// Returns the end of the output, for a person.
     fn end(&self) -> String;
 
     /// Returns all lines of a kind.
@@ -36,7 +36,7 @@ pub trait Said {
         self.line(kind)
     }
 
-    /// Returns the reason that its verdict gives.
+    /// Returns the verdict's reason.
     #[track_caller]
     fn reason(&self) -> String {
         let verdict = self.transcript().verdict();
@@ -70,13 +70,13 @@ pub trait Members {
     /// Returns the number at a path such as `join_latency_ns.max`.
     fn number(&self, path: &str) -> u64;
 
-    /// Returns a text.
+    /// Returns the text of a member.
     fn member(&self, name: &str) -> &str;
 
-    /// Holds numbers to what they must be.
+    /// Asserts the values of numbers, each at its path.
     fn has<const COUNT: usize>(&self, numbers: [(&str, u64); COUNT]);
 
-    /// Holds texts to what they must be.
+    /// Asserts the values of texts, each by its member's name.
     fn reads<const COUNT: usize>(&self, texts: [(&str, &str); COUNT]);
 }
 
@@ -108,12 +108,12 @@ impl Members for MachineLine {
     }
 }
 
-/// Reads the traces of a log, and holds each run to the rules: nothing waits longer than
-/// `bound_ns` for what it is owed.
+/// Reads the traces of a log, and checks each run by the rules: nothing is overdue by more than
+/// `bound_ns`.
 ///
 /// # Panics
 ///
-/// Panics with what breaks a rule, or if there is no trace.
+/// Panics with the breaches of the rules, or if there is no trace.
 #[track_caller]
 pub fn lawful_runs(outcome: &Outcome, bound_ns: u64) -> Vec<Run> {
     let runs = trace::read(&outcome.serial);

@@ -1,15 +1,15 @@
-//! Checks of every boot from a stick, whatever loads the image.
+//! Checks of every boot from a stick, by any loader.
 
 use tool::qemu::Loader;
 
 use crate::file::File;
 use crate::{Guest, Members, Said};
 
-/// Boots the demo and checks that words, processors and memory came through the loader.
+/// Boots the demo and checks the words, processors and memory passed on by the loader.
 ///
 /// # Panics
 ///
-/// Panics if they did not.
+/// Panics if they differ from the given values.
 pub fn boots(loader: Loader, cores: u64, memory_mib: u64) {
     let guest = Guest::new("fork-join").from_stick(loader).cores(cores);
     let guest = guest.memory_mib(memory_mib).word("jobs=3 subtasks=2");
@@ -24,11 +24,11 @@ pub fn boots(loader: Loader, cores: u64, memory_mib: u64) {
     outcome.line("fork_join").has([("joins", 3)]);
 }
 
-/// Boots an app that shows how the file begins that the loader has left in memory.
+/// Boots an app showing the first bytes of the file left in memory by the loader.
 ///
 /// # Panics
 ///
-/// Panics if it is another file.
+/// Panics if another file was left.
 pub fn hands_over_a_file(loader: Loader) {
     let mut content = vec![b'z'; 100_001];
     content[..2].copy_from_slice(b"xy");

@@ -1,15 +1,14 @@
 //! The paper's workload under a policy of publish and subscribe, in virtual time.
 //!
-//! Every period a source starts a job. Each of N parallel subtasks takes the jobs in
-//! order, one at a time, on a core of its own: it starts a job when that has been
-//! released and the job before is done, executes for a given time, and publishes on
-//! its topic when it finishes. A synchronizer joins the N topics. Inputs of the
-//! parallel subtasks are unbounded, and nothing else takes any time: publications,
-//! the source and the synchronizer itself cost nothing. So what is seen is what the
-//! policy does by its rules, which no implementation of it can better.
+//! Every period a source starts a job. Each of N parallel subtasks takes the jobs in order, one at
+//! a time, on a core of its own: it starts a job after the job's release and the completion of the
+//! job before, executes for a given time, and publishes on its topic at the finish. A synchronizer
+//! joins the N topics. Inputs of the parallel subtasks are unbounded, and nothing else takes any
+//! time: publications, the source and the synchronizer itself cost nothing. So the result shows the
+//! policy's rules alone, and no implementation can do better.
 //!
-//! The same execution times make the same publications. The result
-//! depends on nothing but the arguments.
+//! The same execution times make the same publications. The result depends on nothing but the
+//! arguments.
 
 use std::num::NonZeroUsize;
 
@@ -17,9 +16,9 @@ use fork_join::PERIOD;
 use join_latency::{CompletedJoin, ExecutionSpan, RunSamples};
 use pub_sub::{ApproximateTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 
-/// Runs jobs through a synchronizer that joins close stamps, as the paper does: each parallel subtask
-/// stamps its message anew when it finishes. `times_ns` has for each of its topics the execution
-/// time of each job.
+/// Runs jobs through a synchronizer joining close stamps, as the paper does: each parallel subtask
+/// stamps its message anew when it finishes. `times_ns` has for each topic the execution time of
+/// each job.
 ///
 /// Publications of the same instant arrive in the order of their topics.
 ///
@@ -69,7 +68,7 @@ fn executions(times_ns: &[u64]) -> Vec<ExecutionSpan> {
     execution.collect()
 }
 
-/// Writes down what comes out while one publication is handled.
+/// Records the sets emitted while one publication is handled.
 struct Ready<'a> {
     ready_ns: u64,
     samples: &'a mut RunSamples,

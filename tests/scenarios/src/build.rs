@@ -1,8 +1,8 @@
-//! The DAGs of a scenario, of real functions on real topics.
+//! Builds a scenario's DAGs, of real functions on real topics.
 //!
-//! Each subtask writes a topic of its own name, with the number of the call in which the source
-//! has begun the job. A join of one source's values panics if they are not of one job, so that a
-//! platform that mixes jobs fails by a fault that no scenario expects.
+//! Each subtask writes a topic named like itself. The value is the number of the call in which the
+//! source began the job. A join of one source's values panics if the values are of different jobs,
+//! so a platform mixing jobs fails by a fault no scenario expects.
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -19,13 +19,13 @@ use crate::dag::{DagText, Replaced, SubtaskText, Use, of_call};
 use crate::waiting::{self, ScenarioDevice};
 use crate::{Calls, Scenario};
 
-/// Tuples that a subtask takes.
+/// Tuples of a subtask's inputs.
 pub(crate) trait Inputs: VecToSubs + Send {
     /// Returns the first value, and whether the others are the same.
     fn first(self) -> Option<(u64, bool)>;
 }
 
-/// Tuples that a subtask returns.
+/// Tuples of a subtask's outputs.
 pub(crate) trait Outputs: VecToPubs {
     fn of(value: u64) -> Self;
 }
@@ -40,7 +40,7 @@ impl Outputs for (Whole,) {
     }
 }
 
-/// A number that cannot be half written, or read while it is written, without showing it.
+/// A number of 16 equal words: a half-written value, or a value read during the write, shows.
 #[derive(Clone, Copy)]
 struct Whole([u64; 16]);
 
@@ -68,16 +68,16 @@ macro_rules! inputs {
 
 inputs!(()(a)(a b)(a b c)(a b c d));
 
-/// The steps of a subtask's functions in a call; one follows another that has failed.
+/// The steps of a subtask's functions in a call; after a fault the next function goes on with them.
 pub(crate) struct Step {
     takes: Vec<Duration>,
-    /// A budget is one of processor time, so it is exceeded only by what computes.
+    /// The kind of occupation: a budget limits processor time, so only computing exceeds it.
     how: Occupation,
     fails: Vec<u64>,
     when: Vec<u64>,
-    /// How often they have been called.
+    /// The number of calls so far.
     calls: AtomicU64,
-    /// Whether all that it gets began in one call of one source.
+    /// Whether all inputs began in the same call of the only source.
     joins: bool,
     of_all: Arc<Calls>,
 }
@@ -99,14 +99,14 @@ impl Step {
         })
     }
 
-    /// Does it, where `act` is what else it may do.
+    /// Does the steps of a call; `act` does the rest, as the scenario asks.
     fn call<I: Inputs, O: Outputs>(&self, inputs: I, act: impl FnOnce(u64, bool)) -> O {
         let call = self.begin();
         act(call, self.when.contains(&call));
         self.end(call, inputs)
     }
 
-    /// Begins a call, up to its first wait, and returns its number.
+    /// Begins a call, up to its first wait, and returns the call's number.
     pub(crate) fn begin(&self) -> u64 {
         let call = self.calls.fetch_add(1, Relaxed);
         self.execute(&self.takes, call);
@@ -132,7 +132,7 @@ impl Step {
     }
 }
 
-/// A DAG that is being built, and what its subtasks use.
+/// A DAG under construction, with everything its subtasks use.
 struct Building<'a> {
     dag: &'a Dag,
     calls: &'a Arc<Calls>,
@@ -142,7 +142,7 @@ struct Building<'a> {
     modes: &'a BTreeMap<String, Mode>,
     latest: &'a BTreeMap<String, Latest<Whole>>,
     states: BTreeMap<String, State<u64>>,
-    /// The devices that its subtasks ask.
+    /// The devices asked by the subtasks.
     devices: &'a mut Vec<ScenarioDevice>,
 }
 
@@ -250,8 +250,8 @@ impl Building<'_> {
     }
 }
 
-/// Registers a subtask that uses something: `act` gets it in each call, with the call's number and
-/// whether this is one in which it acts.
+/// Registers a subtask with a use besides its inputs. Each call of `act` gets the used thing, the
+/// call's number, and whether the scenario has the subtask act in this call.
 fn using<U: Uses + 'static, I: Inputs, O: Outputs>(
     dag: &Dag,
     uses: U,
@@ -293,7 +293,7 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
 }
 
 impl DagText {
-    /// Begins the DAG. Returns its signal, too, if it is sporadic.
+    /// Begins the DAG. Returns its signal, too, if the DAG is sporadic.
     fn begin(&self) -> (Dag, Option<Signal>) {
         let dag = create_dag();
         dag.name(&self.name).overrun(self.overrun);
@@ -327,16 +327,16 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// The faults for which the commit is refused.
+    /// The faults of a refused commit.
     ///
     /// # Panics
     ///
-    /// If the text names what it does not state.
+    /// If the text uses a name without stating it.
     pub fn commit(&self) -> Result<Commit, CommitError> {
         self.commit_with(drop)
     }
 
-    /// Likewise, where `connect` takes each device that is asked.
+    /// Builds and commits likewise, and hands each asked device to `connect`.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! A DAG of a scenario, as it is stated.
+//! The DAGs of a scenario, as the text states them.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -9,12 +9,12 @@ use fass::{FaultLimit, OverrunPolicy};
 
 use crate::number;
 
-/// A DAG: `NAME`, then any of
-/// `period T` or `sporadic T`, `deadline T`, `offset T`, `jobs N`, `in-flight N`,
-/// `overrun queue|skip|abort`, `survives FAULTS/WINDOW/ALL`, `cluster N`,
+/// A DAG: `NAME`, then any of `period T` or `sporadic T`, `deadline T`, `offset T`, `jobs N`,
+/// `in-flight N`, `overrun queue|skip|abort`, `survives FAULTS/WINDOW/ALL`, `cluster N`,
 /// `affinity N,N`, `paused`, `on-fault DAG`.
 ///
-/// It has one job, unless that is said (`jobs 0`: no end), and room for all of its jobs.
+/// The DAG has one job unless `jobs` is given (`jobs 0`: no end), and room for all of its jobs
+/// unless `in-flight` is given.
 #[derive(Clone, Debug, Default)]
 pub struct DagText {
     pub(crate) name: String,
@@ -29,46 +29,48 @@ pub struct DagText {
     pub(crate) cluster: Option<u32>,
     pub(crate) affinity: Vec<u32>,
     pub(crate) is_paused: bool,
-    /// The DAG that a fault releases.
+    /// The DAG released by a fault.
     pub(crate) on_fault: Option<String>,
-    /// Its subtasks.
+    /// The DAG's subtasks.
     pub subtasks: Vec<SubtaskText>,
 }
 
-/// A subtask: `NAME TIMES`, then any of
-/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `non-preemptive`,
-/// `fails N,N` (in these of its calls, from 0), `restarts` or `falls-back` (what replaces it after
-/// a fault), `updates STATE`, `reads STATE`, `samples NAME` (a subtask of another DAG), and with
-/// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N,N` and then
-/// `resumes DAG N,N`, `enters MODE N` or `enters-idle MODE N`, `ends-run N`.
+/// A subtask: `NAME TIMES`, then any of `after NAME NAME`, `priority N`, `wcet T`, `budget T`,
+/// `due T` (of a sink), `non-preemptive`, `fails N,N` (the numbers of the failing calls, from 0),
+/// `restarts` or `falls-back` (the remedy after a fault), `updates STATE`, `reads STATE`,
+/// `samples NAME` (a subtask of another DAG), and with the numbers of the acting calls
+/// `raises DAG N,N`, `pauses DAG N,N` and then `resumes DAG N,N`, `enters MODE N` or
+/// `enters-idle MODE N`, `ends-run N`.
 ///
-/// One that waits has for each wait `wait LIMIT then TIMES`, or `wait LIMIT answered TIMES then
-/// TIMES`: it asks a device, which answers after these times, and then executes for those. Without
-/// `answered` it sleeps until the limit. In real time no device answers.
+/// A waiting subtask has for each wait `wait LIMIT then TIMES`, or
+/// `wait LIMIT answered TIMES then TIMES`. With `answered` the subtask asks a device, which answers
+/// after the first times; without, it sleeps until the limit. Then the subtask executes for the
+/// last times. In real time no device answers.
 ///
-/// `TIMES` are how long its first calls take, separated by `/`; the last of them is that of all
-/// others.
+/// `TIMES` are the execution times of the first calls, separated by `/`; all later calls take the
+/// last time.
 #[derive(Clone, Debug, Default)]
 pub struct SubtaskText {
     pub(crate) name: String,
     pub(crate) takes: Vec<Duration>,
-    /// Its waits.
+    /// The waits.
     pub waits: Vec<WaitText>,
     pub(crate) after: Vec<String>,
-    /// Its priority, if it is not the one that its DAG's deadline gives it.
+    /// The priority, if the DAG's deadline does not give it.
     pub priority: Option<u32>,
-    /// The longest that it executes.
+    /// The longest execution time.
     pub wcet: Option<Duration>,
-    /// How long a call of it may compute.
+    /// The most time a call may compute.
     pub budget: Option<Duration>,
     pub(crate) due: Option<Duration>,
     pub(crate) is_non_preemptive: bool,
-    /// Whether it computes and does not hold its core; one with a budget does so in any case.
+    /// Whether the subtask computes instead of holding its core; a subtask with a budget always
+    /// computes.
     pub computes: bool,
     pub(crate) fails: Vec<u64>,
     pub(crate) replaced: Replaced,
     pub(crate) uses: Use,
-    /// The calls in which it does what it may.
+    /// The numbers of the calls in which the subtask acts.
     pub(crate) when: Vec<u64>,
 }
 
@@ -76,9 +78,9 @@ pub struct SubtaskText {
 #[derive(Clone, Debug)]
 pub struct WaitText {
     pub(crate) limit: Duration,
-    /// When a device answers in the first calls; none if it sleeps.
+    /// The times until a device's answers, in the first calls; empty for a sleep.
     pub(crate) answered: Vec<Duration>,
-    /// How long the segment behind it takes in the first calls, and at most.
+    /// The execution times of the segment behind the wait, in the first calls; below, the longest.
     pub(crate) takes: Vec<Duration>,
     pub(crate) wcet: Option<Duration>,
 }
@@ -103,21 +105,21 @@ impl WaitText {
     }
 }
 
-/// Returns the time of a call, where the first calls have these.
+/// Returns the time of a call, from the times of the first calls.
 pub(crate) fn of_call(times: &[Duration], call: u64) -> Option<Duration> {
     let call = usize::try_from(call).unwrap_or(usize::MAX);
     times.get(call).or(times.last()).copied()
 }
 
-/// Which function follows one that has failed.
+/// The successor of a failed function.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Replaced {
-    /// None: the DAG ends.
+    /// No function: the DAG ends.
     #[default]
     Never,
-    /// One made anew.
+    /// The same function, made anew.
     Anew,
-    /// Another one.
+    /// Another function.
     ByFallback,
 }
 
@@ -130,7 +132,7 @@ pub(crate) enum Use {
     Reads(String),
     Samples(String),
     Raises(String),
-    /// A DAG, and the calls in which it resumes it.
+    /// A DAG, and the numbers of the calls resuming the DAG.
     Switches(String, Vec<u64>),
     Enters(String),
     EntersIdle(String),
@@ -255,14 +257,14 @@ impl DagText {
         Ok(())
     }
 
-    /// Returns how many predecessors a subtask has, and whether it has successors.
+    /// Returns a subtask's number of predecessors, and whether it has successors.
     pub(crate) fn shape(&self, subtask: &SubtaskText) -> (usize, bool) {
         let mut all = self.subtasks.iter();
         let is_read = all.any(|other| other.after.contains(&subtask.name));
         (subtask.after.len(), is_read)
     }
 
-    /// Returns the subtasks of other DAGs that are sampled.
+    /// Returns the sampled subtasks of other DAGs.
     pub(crate) fn samples(&self) -> Vec<&str> {
         let mut names = vec![];
         for subtask in &self.subtasks {

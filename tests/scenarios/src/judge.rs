@@ -1,4 +1,4 @@
-//! Whether a run was as its scenario says.
+//! Compares runs with their scenarios.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -16,8 +16,8 @@ use crate::dag::Use;
 use crate::{BYSTANDER, Calls, Scenario, UNIT_NS};
 
 impl Scenario {
-    /// Holds the statistics of DAGs against what is said of them; `is_exact`: also against what is
-    /// said of virtual time. Returns what differs, a line each.
+    /// Compares DAGs' statistics with the lines `everywhere` and, if `is_exact`, with the lines for
+    /// virtual time, too. Returns the differences, a line each.
     pub fn judge_counts<'a>(
         &self,
         task_set: &TaskSet,
@@ -47,9 +47,8 @@ impl Scenario {
         wrong
     }
 
-    /// Holds what each DAG's counters say against each other, against the record, and against what
-    /// functions have counted themselves, of a scenario without an asked end. Returns what does not
-    /// hold, a line each.
+    /// Compares each DAG's counters with each other, with the record, and with the functions' own
+    /// counts. The scenario must have no requested end. Returns the broken claims, a line each.
     #[allow(clippy::too_many_lines, reason = "a list of claims")]
     pub fn judge_accounts<'a>(
         &self,
@@ -157,8 +156,8 @@ impl Scenario {
         wrong
     }
 
-    /// Holds a run in real time against what is said of every platform, against R1 to R4, and for
-    /// allocations after the commit.
+    /// Compares a run in real time with the lines `everywhere` and with R1 to R4, and looks for
+    /// allocations after the commit. Returns the differences, a line each.
     #[must_use]
     pub fn judge_run(&self, run: &Run) -> Vec<String> {
         let mut wrong = self.judge_counts(run.task_set(), |dag| run.statistics(dag), false);
@@ -172,8 +171,8 @@ impl Scenario {
         wrong
     }
 
-    /// Holds the events of a run in virtual time, by the lines of its report, against the
-    /// timeline. Returns both if they differ.
+    /// Compares a virtual-time run's events, given as the report's lines, with the timeline.
+    /// Returns both if they differ.
     #[must_use]
     pub fn judge_events(&self, lines: &[String]) -> Vec<String> {
         let mut expected = vec![];
@@ -205,8 +204,8 @@ impl Scenario {
         }
     }
 
-    /// Holds a commit against what is to be refused of it. `None`: it is accepted, as it should,
-    /// and the run follows.
+    /// Compares a commit with the scenario's `refused` line. Returns `None` if the commit is
+    /// accepted, as it should be; then the run follows.
     #[must_use]
     pub fn judge_commit(&self, commit: Result<Commit, CommitError>) -> Option<Vec<String>> {
         let refusal = commit.err();
@@ -222,12 +221,12 @@ impl Scenario {
     }
 }
 
-/// Returns which kind of event a line is of.
+/// Returns the kind of a line's event.
 fn kind(line: &str) -> &str {
     line.split(' ').nth(1).unwrap_or_default()
 }
 
-/// Returns a line with its time in units; a deadline is missed a nanosecond later, `N+`.
+/// Returns a line with its time in units of 1 ms; a deadline is missed a nanosecond later, `N+`.
 fn in_units(line: &str) -> String {
     let (time_ns, event) = line.split_once(' ').unwrap_or((line, ""));
     let time_ns: u64 = time_ns.parse().unwrap_or(u64::MAX);

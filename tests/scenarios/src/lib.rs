@@ -1,9 +1,9 @@
-//! Scenarios: runs that are stated as text, once for all platforms.
+//! Scenarios: runs as text, written once for all platforms.
 //!
-//! A scenario has DAGs, what their functions do, and what the record must show. It is built with
-//! `fass` and run by whatever platform is installed. In virtual time the record is compared event
-//! by event; in real time, on Linux and on the machine, by what holds however long anything
-//! takes: counts, and the laws R1 to R4. `tests/scenarios/*.txt` are the suite.
+//! A scenario states DAGs, the acts of their functions, and the expected record. It is built with
+//! `fass` and run by any installed platform. In virtual time the record is compared event by event.
+//! In real time, on Linux and on the machine, only timing-independent properties are compared:
+//! counts, and the laws R1 to R4. `tests/scenarios/*.txt` are the suite.
 //!
 //! ```text
 //! scenario A join waits for all its predecessors
@@ -22,21 +22,23 @@
 //!
 //! | line | meaning |
 //! | --- | --- |
-//! | `scenario TITLE` | begins one |
-//! | `cores N` | on so many; 1 if not said |
-//! | `clusters N,N` | which are divided so |
+//! | `scenario TITLE` | begins a scenario |
+//! | `cores N` | the number of cores; 1 if not given |
+//! | `clusters N,N` | the sizes of clusters, which divide the cores |
 //! | `policy WORD` | instead of static priorities |
-//! | `core N: DAG.SUBTASK ...` | the list of a core, as `docs/dag-file.md` says |
-//! | `preemption off` | nobody loses its core |
+//! | `core N: DAG.SUBTASK ...` | the list of a core, as in `docs/dag-file.md` |
+//! | `preemption off` | no instance loses its core |
 //! | `mode NAME DAG DAG` | a mode, in which these DAGs run |
 //! | `dag NAME WORDS` | a DAG, see [`dag::DagText`] |
-//! | `  NAME TIMES WORDS` | a subtask of it, see [`dag::SubtaskText`] |
-//! | `TIME EVENT, EVENT` | what happens then, in virtual time. Only events of the kinds that are
-//! named somewhere in the scenario are compared; `core N` may be left out. |
+//! | `  NAME TIMES WORDS` | a subtask of the DAG, see [`dag::SubtaskText`] |
+//! | `TIME EVENT, EVENT` | the events at this time, in virtual time; see below |
 //! | `never KIND` | no such event happens, in virtual time |
 //! | `DAG: COUNTER=N ...` | a DAG's statistics, in virtual time |
-//! | `everywhere DAG: COUNTER=N ...` | its statistics, on every platform |
+//! | `everywhere DAG: COUNTER=N ...` | a DAG's statistics, on every platform |
 //! | `refused CODE CODE` | the commit is refused, for these faults |
+//!
+//! Only events of kinds named somewhere in the scenario are compared; an event's `core N` may be
+//! left out.
 
 #![no_std]
 
@@ -75,43 +77,43 @@ pub const SUITE: &[(&str, &str)] = &[
     ("waits", include_str!("../waits.txt")),
 ];
 
-/// The DAG that runs next to a scenario in a cluster.
+/// The DAG running next to a scenario's cluster.
 const BYSTANDER: &str = "bystander";
 
-/// A run as it is stated.
+/// A run as stated by its text.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// Its title: the rule that it shows.
+    /// The title: the rule shown.
     pub title: String,
-    /// On how many cores it runs.
+    /// The number of cores.
     pub cores: u32,
-    /// The sizes of clusters, if it has several.
+    /// The sizes of clusters, if there are several.
     pub clusters: Vec<u32>,
-    /// How ready instances are ordered.
+    /// The order of ready instances.
     pub policy: fass::Policy,
     /// Whether a started instance may lose its core.
     pub preemption: fass::Preemption,
     /// Modes, with the names of their DAGs.
     pub modes: Vec<(String, Vec<String>)>,
-    /// Its DAGs.
+    /// The DAGs.
     pub dags: Vec<DagText>,
     /// The lists of cores.
     pub lists: Vec<String>,
     /// The events in virtual time, an instant a line.
     pub timeline: Vec<String>,
-    /// Kinds of events that do not happen.
+    /// Kinds of events not happening.
     pub never: Vec<String>,
     /// Statistics of DAGs in virtual time.
     pub exactly: Vec<String>,
     /// Statistics of DAGs on every platform.
     pub everywhere: Vec<String>,
-    /// The faults of its commit.
+    /// The expected faults of the commit.
     pub refused: Vec<String>,
     /// The functions' counts since the last commit.
     pub(crate) calls: Arc<Calls>,
 }
 
-/// How the calls of all functions of a run have ended.
+/// The numbers of returned and of failed calls, for all functions of a run.
 #[derive(Debug, Default)]
 pub(crate) struct Calls {
     pub(crate) returned: AtomicU64,
@@ -123,7 +125,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// The line that is none, and what is wrong with it.
+    /// The first malformed line, and its mistake.
     pub fn read_all(text: &str) -> Result<Vec<Self>, String> {
         let mut all: Vec<Self> = Vec::new();
         for (number, line) in (1..).zip(text.lines()) {
@@ -141,8 +143,8 @@ impl Scenario {
         Ok(all)
     }
 
-    /// Returns the scenarios of the suite, and each that is undivided in a cluster next to
-    /// another one, too.
+    /// Returns the scenarios of the suite, and each undivided scenario a second time, in a cluster
+    /// next to another cluster.
     ///
     /// # Errors
     ///
@@ -160,8 +162,8 @@ impl Scenario {
         Ok(all)
     }
 
-    /// Returns the scenario on a cluster of its own, next to one whose DAG neither disturbs it nor
-    /// is disturbed.
+    /// Returns the scenario in a cluster of its own. In a second cluster a bystander runs, with no
+    /// effect on the first, and none from it.
     fn in_a_cluster(&self) -> Result<Self, String> {
         let mut divided = self.clone();
         divided.title += " (in a cluster)";

@@ -1,16 +1,16 @@
-//! Random scenarios: a set of DAGs for a load, and what befalls it.
+//! Random scenarios: a set of DAGs for a load, and its troubles.
 //!
-//! A *round* is a number that with a seed gives one scenario, the same everywhere. Drawn are the
-//! policy, the load, the DAGs with their graphs and times, how each treats jobs that overrun, and
-//! whether cores are divided. Each of these is in about half of the rounds: some DAGs are
-//! in a table, some subtasks wait, sinks have deadlines of their own, DAGs release others, and two modes take
-//! turns. Two of three rounds have *trouble*: functions that fail, after which their DAG ends or
-//! goes on, and DAGs that pause others, over and over. In one of eight rounds instances compute,
-//! and these have none: where cores take turns, the report of a fault is a longer turn than others
-//! may have to wait.
+//! A *round* is a number; with a seed it gives a scenario, the same everywhere. The draw decides
+//! the policy, the load, the DAGs with their graphs and times, each DAG's overrun policy, and
+//! whether clusters divide the cores. Each of these features is in about half of the rounds: tables
+//! for some DAGs, waiting subtasks, sinks with their own deadlines, DAGs released by others, and
+//! two modes taking turns. Two of three rounds have *trouble*: functions fail, and then their DAG
+//! ends or goes on; and DAGs pause others, over and over. In one of eight rounds instances compute.
+//! Such rounds have no trouble: where cores take turns, the report of a fault is a longer turn than
+//! others may have to wait.
 //!
 //! Every DAG by itself could be served forever: no subtask takes longer than most of a period, and
-//! no path longer than the deadline. So what is late is due to other DAGs.
+//! no path longer than the deadline. So other DAGs cause all lateness.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -23,35 +23,35 @@ use random::{Random, nth};
 use crate::Scenario;
 use crate::dag::{DagText, Replaced, SubtaskText, Use, WaitText};
 
-/// The periods to draw from, the more urgent first.
+/// The periods to draw from, the most urgent first.
 const PERIODS_MS: [u64; 6] = [2, 5, 10, 20, 50, 100];
 
-/// How long an instance executes at least, in percent of its WCET.
+/// The shortest execution of an instance, in percent of its WCET.
 const LEAST_PERCENT: u64 = 40;
 
-/// The most times that are drawn for a subtask; later calls take the last one.
+/// The most times drawn for a subtask; later calls take the last time.
 const MOST_TIMES: u64 = 32;
 
-/// The draw for all DAGs of a round.
+/// The draws valid for all DAGs of a round.
 struct Round {
     length: Duration,
     /// The average of a subtask's WCETs, in millionths of a core.
     share: u64,
     dags: u64,
     computes: bool,
-    /// Cores by cluster.
+    /// The number of cores of each cluster.
     clusters: Vec<u32>,
     has_trouble: bool,
     has_sinks: bool,
     has_waits: bool,
-    /// Whether each DAG but the first is released by the one before it.
+    /// Whether each DAG is released by the DAG before it; never for the first.
     is_released: Vec<bool>,
     modes: Vec<(String, Vec<String>)>,
 }
 
 impl Scenario {
-    /// Draws a round for so many cores, in which each DAG releases jobs for `length`: 3 to 8 DAGs
-    /// of 3 to 12 subtasks, and up to one more that fails.
+    /// Draws a round for a number of cores. Each DAG releases jobs for `length`: 3 to 8 DAGs of 3
+    /// to 12 subtasks, and up to one more, failing subtask.
     pub fn random(seed: u64, round: u64, cores: u32, length: Duration) -> Self {
         let random = &mut Random::new(nth(seed, round));
         let policy = random.one_of(&Policy::ALL);
@@ -113,7 +113,7 @@ impl Scenario {
 }
 
 /// Draws a table for some DAGs of the first cluster: their subtasks in the order of releases, each
-/// on any core, some nested in the one before.
+/// on any core, some nested in the entry before.
 fn lists(dags: &[DagText], cores: u32, random: &mut Random) -> Vec<String> {
     let may_be_listed = |dag: &&DagText| {
         let waits = dag.subtasks.iter().any(|of| !of.waits.is_empty());
@@ -160,7 +160,8 @@ fn lists(dags: &[DagText], cores: u32, random: &mut Random) -> Vec<String> {
         .collect()
 }
 
-/// Draws two modes: one with all DAGs of a cluster but the first two, and one with some of them.
+/// Draws two modes: the first has all DAGs of a cluster except the first two DAGs, the second has
+/// some of them.
 fn modes(dags: u64, is_divided: bool, random: &mut Random) -> Vec<(String, Vec<String>)> {
     let all = (2..dags).filter(|number| !is_divided || number % 2 == 0);
     let some = all.clone();
@@ -285,7 +286,8 @@ impl Round {
 }
 
 impl DagText {
-    /// Gives some sinks that do nothing else deadlines of their own, not before they can end.
+    /// Gives some sinks without other uses their own deadlines, none before the sink's earliest
+    /// end.
     fn give_sinks_deadlines(&mut self, ends_ns: &[u64], deadline_ns: u64, random: &mut Random) {
         for (place, end_ns) in ends_ns.iter().enumerate() {
             let (_, is_read) = self.shape(&self.subtasks[place]);
@@ -297,7 +299,8 @@ impl DagText {
         }
     }
 
-    /// Adds a subtask of which a call fails. It has no WCET: the report of a fault takes its time.
+    /// Adds a subtask with a failing call. The subtask has no WCET: the report of a fault takes its
+    /// time.
     fn fail(&mut self, random: &mut Random) {
         const REPLACED: [Replaced; 3] = [Replaced::Never, Replaced::Anew, Replaced::ByFallback];
         let replaced = REPLACED[random.index(REPLACED.len())];

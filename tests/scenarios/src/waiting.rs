@@ -1,4 +1,4 @@
-//! Subtasks of a scenario that wait: async functions, whose device is told when to answer.
+//! A scenario's waiting subtasks: async functions, telling their devices the times of the answers.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -10,10 +10,10 @@ use fass::{Dag, SubtaskAttributes, sleep};
 use crate::build::{Inputs, Outputs, Step};
 use crate::dag::{SubtaskText, WaitText, of_call};
 
-/// The device of a subtask. A question is the time after which it is to be answered.
+/// The device of a subtask. A question is the time until the answer.
 pub type ScenarioDevice = DeviceDriver<Duration, ()>;
 
-/// Registers a subtask that waits, and returns the device that it asks.
+/// Registers a waiting subtask, and returns the device it asks.
 pub(crate) fn register<I: Inputs + 'static, O: Outputs + 'static>(
     dag: &Dag,
     subtask: &SubtaskText,

@@ -1,4 +1,5 @@
-//! The suite on Linux by each mechanism that every computer has: counts, R1 to R4, and allocations.
+//! The suite on Linux by each mechanism available on every computer: counts, R1 to R4, and
+//! allocations.
 
 #[path = "../../../sched-dag/tests/it/counting.rs"]
 mod counting;

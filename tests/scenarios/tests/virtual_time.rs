@@ -9,8 +9,8 @@ use scenarios::Scenario;
 use sched_dag::{DagId, DagStatistics};
 use virtual_time::{Report, VirtualTime};
 
-/// Runs a scenario, which shows what is wrong with the report. Nothing is, if it is refused as it
-/// should be.
+/// Runs a scenario, and returns the faults of the run as `judge` finds them in the report. Returns
+/// none for a scenario refused as expected.
 fn run(scenario: &Scenario, judge: impl FnOnce(&Report) -> Vec<String>) -> Vec<String> {
     let mut machine = VirtualTime::new()
         .cores(scenario.cores)
@@ -30,7 +30,7 @@ fn run(scenario: &Scenario, judge: impl FnOnce(&Report) -> Vec<String>) -> Vec<S
     wrong
 }
 
-/// Returns what is wrong with a scenario of the suite.
+/// Returns the faults in the run of a scenario of the suite.
 fn judge(scenario: &Scenario) -> Vec<String> {
     run(scenario, |report| {
         let mut wrong = scenario.judge_events(&report.event_lines());

@@ -1,11 +1,10 @@
 //! The tutorials, `docs/guide.md` and `docs/from-ros-2.md`, as the tests read them.
 //!
-//! A tutorial that does not work is worse than none, so nothing in them goes
-//! unchecked:
+//! A broken tutorial is worse than none, so nothing in them goes unchecked:
 //!
 //! - their Rust is this crate's doctests (see `lib.rs`), each compiled and run;
-//! - their commands are parsed by the tables of the scripts that they name;
-//! - what the guide says a new app prints is compared with a boot of one;
+//! - the options' tables of the named scripts parse their commands;
+//! - a boot of a new app must print the output shown in the guide;
 //! - a block of any other kind is refused, as is Rust that would not be tested.
 
 use crate::markdown::{blocks, page};
@@ -13,7 +12,7 @@ use crate::markdown::{blocks, page};
 /// The tutorials.
 pub const PAGES: [&str; 2] = ["docs/guide.md", "docs/from-ros-2.md"];
 
-/// Returns the output that the guide shows under a name.
+/// Returns the output shown by the guide under a name.
 ///
 /// # Panics
 ///
@@ -25,7 +24,7 @@ pub fn documented_output(name: &str) -> String {
     found.expect("the guide shows it").text
 }
 
-/// Replaces each number by `N`: what stays the same when the code becomes faster.
+/// Replaces each number by `N`: the rest stays the same when the code becomes faster.
 pub fn without_numbers(line: &str) -> String {
     let mut text = String::new();
     for character in line.chars() {

@@ -1,4 +1,4 @@
-//! The guide holds what it promises; the index of pages is complete.
+//! The guide keeps its promises; the index of pages is complete.
 
 use std::ffi::OsString;
 use std::fs;
@@ -18,7 +18,7 @@ use tool::trace::{CHECK_TRACE, TRACE};
 #[allow(dead_code, reason = "its `main` prints what `run` returns")]
 mod vision;
 
-/// The scripts that the guide may name.
+/// The scripts the guide may name.
 const COMMANDS: [&Command; 5] = [&RUN, &TEST, &NEW_APP, &CHECK_TRACE, &TRACE];
 
 fn guide() -> Vec<Block> {
