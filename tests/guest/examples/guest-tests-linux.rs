@@ -1,5 +1,5 @@
-//! Boot tests as a program for Linux: those that also run there, and the suite of scenarios, for a
-//! mechanism that only a guest has.
+//! Boot tests as a Linux program: the tests able to run there, and the suite of scenarios for a
+//! mechanism found only in a guest.
 
 extern crate alloc;
 extern crate kernel_on_linux as kernel;

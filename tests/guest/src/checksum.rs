@@ -1,4 +1,4 @@
-//! Work whose result shows whether an interruption left a trace.
+//! Work with a known result: a different result shows a trace of an interruption.
 
 use core::hint::black_box;
 

@@ -1,7 +1,7 @@
-//! The same graph in each cluster: what an instance costs where there are more of them.
+//! The same graph in each cluster: the cost of an instance with more and more clusters.
 //!
-//! The clusters work one after the other. With counted time all cores share one clock, and those
-//! that compute take turns: while several did, waiting for a turn would be counted, too.
+//! The clusters work one after the other. With counted time all cores share a clock, and computing
+//! cores take turns: if several clusters worked together, waits for turns would be counted, too.
 
 use alloc::format;
 use alloc::vec::Vec;

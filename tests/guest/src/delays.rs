@@ -1,9 +1,9 @@
 //! Delays of an instance besides the model, provoked at all moments around its release.
 //!
-//! In each run a disturbance comes every 1.003 ms, next to two DAGs of 1 kHz with a bound: a more
-//! urgent and a less urgent one. So from job to job it comes 3 us later to them. All functions hold
-//! their cores, and the overheads are those that the kernel measures. Of each run the longest
-//! responses are printed next to the bounds.
+//! In each run a disturbance comes every 1.003 ms, next to two DAGs of 1 kHz with a bound, the
+//! first more urgent than the disturbance, the second less urgent. So from job to job the
+//! disturbance comes 3 us later to them. All functions hold their cores, and the overheads are the
+//! kernel's measurements. Each run prints the longest responses next to the bounds.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -17,21 +17,21 @@ use kernel::{AppError, Event, Lock, Machine, json, println};
 
 use crate::single::{named, single_every};
 
-/// How often a disturbance comes, and how often each DAG with a bound is released.
+/// The number of disturbances, and of the bounded DAGs' releases during them.
 const TIMES: u64 = 60;
 
-/// The text of a disturbance.
+/// The number of lines in the text of a disturbance.
 const LINES: u64 = 10;
 
-/// How often its section was entered.
+/// A lock of a counter: the number of sections entered.
 static LOCK: Lock<u64> = Lock::new("shared", 0).longest(us(25));
 
 type Work = Box<dyn FnMut() + Send>;
 
-/// A disturbance: its name, and what makes its DAGs.
+/// A disturbance: its name, and the function making its DAGs.
 type Cause = (&'static str, fn() -> Vec<Dag>);
 
-/// All of them.
+/// All disturbances.
 const CAUSES: [Cause; 10] = [
     ("none", Vec::new),
     ("releases", releases),
@@ -55,7 +55,7 @@ fn hold(time_us: u64) {
     execute_for(us(time_us), Occupation::Hold);
 }
 
-/// Runs them one after the other.
+/// Runs all disturbances one after the other.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.offer_overheads()?;
     machine.options().finish(&["test", "overheads"])?;
@@ -75,7 +75,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Runs DAGs where core 0 is busy for longer than its background may wait, and faults come.
+/// Runs DAGs keeping core 0 busy for longer than its background may wait, during faults.
 pub(crate) fn starved(machine: &Machine) -> Result<(), AppError> {
     // Heartbeats come at another moment of each period.
     let (jobs, period) = (900, us(1_007));
@@ -90,7 +90,7 @@ pub(crate) fn starved(machine: &Machine) -> Result<(), AppError> {
     run_one(machine, "starved", &dags)
 }
 
-/// Runs DAGs one of which waits for many events, which happen while others run.
+/// Runs a DAG waiting for many events, while another DAG notifies them and others run.
 pub(crate) fn events(machine: &Machine) -> Result<(), AppError> {
     static EVENTS: [Event; 1_000] = [const { Event::new() }; 1_000];
     let period = us(1_000);
@@ -117,7 +117,7 @@ fn run_one(machine: &Machine, cause: &str, dags: &[Dag]) -> Result<(), AppError>
     tell(machine, cause, dags, &["urgent"])
 }
 
-/// Runs DAGs, and prints the longest responses of some.
+/// Runs DAGs, and prints the longest responses of the DAGs in `names`.
 fn tell(machine: &Machine, cause: &str, dags: &[Dag], names: &[&str]) -> Result<(), AppError> {
     finish_create_dags(dags)?;
     let run = machine.run()?;
@@ -136,7 +136,7 @@ fn tell(machine: &Machine, cause: &str, dags: &[Dag], names: &[&str]) -> Result<
     Ok(())
 }
 
-/// Makes a DAG that disturbs.
+/// Makes a disturbing DAG, without subtasks yet.
 fn disturbance(name: &str) -> Dag {
     let dag = create_dag();
     (dag.name(name).jobs(TIMES).period(us(1_003))).relative_deadline(us(1_003));
@@ -144,7 +144,7 @@ fn disturbance(name: &str) -> Dag {
     dag
 }
 
-/// More of them are released than there are cores.
+/// Makes DAGs released together, more of them than cores.
 fn releases() -> Vec<Dag> {
     let single = |number| {
         let dag = disturbance(&format!("release-{number}"));
@@ -155,7 +155,7 @@ fn releases() -> Vec<Dag> {
     (0..9).map(single).collect()
 }
 
-/// Their waits end at once.
+/// Makes DAGs with waits ending at the same time.
 fn wakes() -> Vec<Dag> {
     let single = |number| {
         let dag = disturbance(&format!("wake-{number}"));
@@ -170,7 +170,7 @@ fn wakes() -> Vec<Dag> {
     (0..4).map(single).collect()
 }
 
-/// Each job is lost to a fault.
+/// Makes a DAG losing each job to a fault.
 fn faults(budget_us: u64, work: fn()) -> Vec<Dag> {
     let dag = disturbance("faulty");
     dag.survive_faults(FaultLimit::new(1, 1, 1_000));
@@ -180,7 +180,7 @@ fn faults(budget_us: u64, work: fn()) -> Vec<Dag> {
     alloc::vec![dag]
 }
 
-/// Says much in each job.
+/// Makes a DAG saying much in each job.
 fn lines(say: fn(u64)) -> Vec<Dag> {
     let dag = disturbance("talkative");
     let work: Work = Box::new(move || (0..LINES).for_each(say));
@@ -189,7 +189,7 @@ fn lines(say: fn(u64)) -> Vec<Dag> {
     alloc::vec![dag]
 }
 
-/// Thousands of jobs wait as their DAG is paused.
+/// Makes a DAG paused while thousands of its jobs wait, and the DAG pausing it.
 fn backlog() -> Vec<Dag> {
     let over = create_dag();
     (over.name("over").jobs(2 * TIMES * 50).period(us(20))).relative_deadline(us(100));
@@ -212,7 +212,8 @@ fn backlog() -> Vec<Dag> {
     alloc::vec![switch, over]
 }
 
-/// They enter sections of one lock, on each core; and so does the less urgent DAG with a bound.
+/// Makes DAGs entering sections of one lock, on each core; the less urgent DAG with a bound does
+/// the same.
 fn sections() -> Vec<Dag> {
     let entering = |dag: Dag, priority| {
         let enter = |entered: &mut u64| {

@@ -1,4 +1,4 @@
-//! The messages of QEMU's device `edu`, each of which releases a DAG on the core that it is sent to.
+//! The messages of QEMU's device `edu`: each releases a DAG on the core receiving the message.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -16,14 +16,15 @@ use crate::single::named;
 
 const MESSAGES: u64 = 500;
 
-/// Registers that say why the device has sent a message, have it send one, and acknowledge.
+/// Registers of the device: the reason of a message, the request to send a message, and the
+/// acknowledgement.
 const WHY: u64 = 0x24;
 const RAISE: u64 = 0x60;
 const ACKNOWLEDGE: u64 = 0x64;
 
-/// The messages that have come on each of two cores, and those without a reason.
+/// The numbers of messages received on each of two cores, and of messages without a reason.
 static CAME: [AtomicU64; 3] = [const { AtomicU64::new(0) }; 3];
-/// The timer interrupts while the messages came.
+/// The timer interrupts during the messages.
 static TIMER: AtomicU64 = AtomicU64::new(0);
 
 struct Driver(Registers, Signal);
@@ -38,7 +39,7 @@ impl DeviceLine for Driver {
     }
 }
 
-/// Has the messages sent to each core in turn, a run for each, and says what came.
+/// Sends the messages to each core in turn, with a run for each core, and prints the counts.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let edu = devices::find(0x1234, 0x11e8)?;
@@ -61,8 +62,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     refuse_more(&edu, registers)
 }
 
-/// Runs a DAG that has the messages sent while it runs, and the one that they release. Returns how
-/// often that ran.
+/// Runs a DAG requesting messages from the device, and the DAG released by them. Returns the number
+/// of completed jobs of the second DAG.
 fn run_on(
     machine: &Machine,
     edu: &Function<'_>,
@@ -101,7 +102,8 @@ fn run_on(
     }
 }
 
-/// Ties more messages than there are, sends them to a core that is none, and says why not.
+/// Ties a missing message, names a missing core, ties the only message too often, and prints the
+/// refusals.
 fn refuse_more(edu: &Function<'_>, registers: Registers) -> Result<(), AppError> {
     let signal = create_dag().sporadic(Duration::from_millis(1));
     let driver: &Driver = Box::leak(Box::new(Driver(registers, signal)));
@@ -117,7 +119,7 @@ fn refuse_more(edu: &Function<'_>, registers: Registers) -> Result<(), AppError>
     })
 }
 
-/// A driver that answers in the interrupt itself.
+/// A driver answering in the interrupt itself.
 struct Answerer(Registers, SpinLock<DeviceDriver<(), u32>>);
 
 impl DeviceLine for Answerer {
@@ -130,7 +132,8 @@ impl DeviceLine for Answerer {
     }
 }
 
-/// Asks the device, which a question has send a message, on each core in turn.
+/// Asks the device from a waiting subtask, on each core in turn. Each question makes the device
+/// send a message.
 pub(crate) fn ask(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let edu = devices::find(0x1234, 0x11e8)?;

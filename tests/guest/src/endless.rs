@@ -1,8 +1,8 @@
 //! DAGs without a limit of jobs, for a person at the console to look at, to set and to end.
 //!
-//! `left` is a fork-join each millisecond. Its source hands on how often it has run, and its sink
-//! checks that this only grows: a DAG may rest, and no value of before may come after. `loop` is
-//! a chain every 5 ms, whose source reads parameters. `ten` has ten jobs.
+//! `left` is a fork-join each millisecond. Its source passes on the number of its runs, and its
+//! sink checks that this number only grows: a DAG may rest, but no earlier value may come after.
+//! `loop` is a chain every 5 ms, and its source reads parameters. `ten` has ten jobs.
 
 use alloc::vec;
 use core::time::Duration;
@@ -15,7 +15,7 @@ use crate::single::{named, single};
 
 const EXECUTION: Duration = Duration::from_micros(100);
 
-/// Runs them until the console ends the run.
+/// Runs the DAGs until the console ends the run.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
     let steps = Parameter::new("steps", 3_u32, 1..=9);
@@ -57,7 +57,7 @@ fn left() -> Dag {
     dag
 }
 
-/// Prints each pair of values that a job has found for the first time.
+/// Makes the chain with parameters. It prints each new pair of values found by a job.
 fn tuned(gain: &Parameter<f64>, steps: &Parameter<u32>) -> Dag {
     let (dag, period) = (create_dag(), Duration::from_millis(5));
     dag.name("loop").record::<f64>("gain");

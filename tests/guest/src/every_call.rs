@@ -1,4 +1,4 @@
-//! Every call that an app's `main` can make of its machine: one source for the machine and Linux.
+//! Every call an app's `main` can make of its machine: a single source for the machine and Linux.
 
 use alloc::format;
 use core::time::Duration;

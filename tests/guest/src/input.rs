@@ -1,4 +1,4 @@
-//! Bytes from the serial port that release a DAG.
+//! Bytes from the serial port, releasing a DAG.
 //!
 //! With `later_ms=N` the releases count from N milliseconds later, and nothing may begin before.
 
@@ -10,13 +10,13 @@ use kernel::{AppError, Machine, json};
 
 use crate::single::{named, single};
 
-/// When the releases count from.
+/// The time from which the releases count.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(0);
 
 /// Time for the cores to get ready.
 const LEAD_NS: u64 = 100_000;
 
-/// Runs a periodic DAG and one that bytes release.
+/// Runs a periodic DAG and a DAG released by bytes.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let later_ms = machine.options().number("later_ms", 0..=10_000, 0)?;
     machine.options().finish(&["test", "later_ms"])?;

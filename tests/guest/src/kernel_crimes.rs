@@ -1,10 +1,10 @@
-//! Crimes that bring down the kernel itself, on purpose: it must end in a report.
+//! Crimes bringing down the kernel itself, on purpose: it must end in a report.
 
 use core::arch::asm;
 
 use faults::crimes::{Crime, Unpunished};
 
-/// Every one, by name.
+/// All crimes, by name.
 pub(crate) const CRIMES: [(&str, Crime); 5] = [
     ("avx", use_avx),
     ("nmi", raise_nmi),
@@ -13,14 +13,14 @@ pub(crate) const CRIMES: [(&str, Crime); 5] = [
     ("exit_port", end_the_machine),
 ];
 
-/// Uses a register of AVX, which the word `avx=off` has left off.
+/// Uses a register of AVX, after the word `avx=off` has left AVX off.
 fn use_avx() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).
     unsafe { asm!("vxorps ymm0, ymm0, ymm0", out("xmm0") _) };
     Unpunished
 }
 
-/// Raises the non-maskable interrupt that no core has sent.
+/// Raises a non-maskable interrupt sent by no core.
 fn raise_nmi() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).
     unsafe { asm!("int 2") };
@@ -34,7 +34,7 @@ fn raise_machine_check() -> Unpunished {
     Unpunished
 }
 
-/// Takes away the stack of exceptions, and causes one: delivering it faults, too.
+/// Takes away the exceptions' stack, and causes an exception: its delivery faults, too.
 fn fault_doubly() -> Unpunished {
     // The task state segment's base is spread over its descriptor, at offset
     // 0x18 of the table; its IST 2 is at offset 44 (Intel SDM 3, 7.2.3, 7.7).
@@ -62,14 +62,14 @@ fn fault_doubly() -> Unpunished {
     Unpunished
 }
 
-/// Ends QEMU as the kernel does after its verdict of success.
+/// Ends QEMU just as the kernel ends QEMU after its verdict of success.
 fn end_the_machine() -> Unpunished {
     // SAFETY: none; the host has to notice it (see the module).
     unsafe { asm!("out 0xf4, eax", in("eax") 0x10) };
     Unpunished
 }
 
-/// Disables interrupts and waits for one, again and again.
+/// Disables interrupts and waits for an interrupt, again and again.
 pub(crate) fn take_no_interrupts() -> Unpunished {
     // SAFETY: none; another core has to notice it (see the module).
     unsafe { asm!("cli", "2: hlt", "jmp 2b") };

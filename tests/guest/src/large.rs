@@ -1,8 +1,8 @@
-//! Values that a cancelled instance leaves behind, large ones and some that cannot be
-//! dropped, next to a DAG that must not notice.
+//! Values left behind by cancelled instances, large values and some with a failing `drop`, next to
+//! a DAG that must not notice.
 //!
-//! To give a value up must neither need its size on a handler's stack nor run its
-//! `drop` there. A value too large for a subtask's own stack is a fault like others.
+//! Giving up a value must neither need the value's size on a handler's stack nor run its `drop`
+//! there. A value too large for a subtask's own stack is a fault like others.
 
 use alloc::vec;
 use core::hint::spin_loop;
@@ -17,7 +17,7 @@ use kernel::{AppError, Machine};
 
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// Runs each DAG that ends by a fault, next to the healthy one.
+/// Runs each of the faulting DAGs, next to the healthy DAG.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();
@@ -54,7 +54,7 @@ fn dag() -> Dag {
     dag
 }
 
-/// A large value waits for a join whose other predecessor panics in its job 3.
+/// Makes a DAG with a large value waiting for a join; the join's other predecessor panics in job 3.
 fn fork<const BYTES: usize>() -> Dag {
     let dag = dag();
     let named = |name| SubtaskAttributes::named(name).priority(1);
@@ -83,8 +83,8 @@ impl Drop for Sharp {
     }
 }
 
-/// Job 0 takes too long and is aborted, and the value that waits for its sink is in
-/// the way of the value of job 1.
+/// Makes a DAG with a slow job 0, which is aborted. The value waiting for job 0's sink is then in
+/// the way of job 1's value.
 fn overloaded(on_drop: fn()) -> Dag {
     let dag = dag();
     dag.in_flight(1).overrun(OverrunPolicy::Abort);

@@ -1,4 +1,4 @@
-//! Runs one boot test in the guest: the one that `test=NAME` names.
+//! Runs one boot test in the guest, named by `test=NAME`.
 
 #![no_std]
 #![no_main]
@@ -38,7 +38,7 @@ use kernel::{AppError, Machine};
 
 kernel::entry!(main);
 
-/// A test: it prints its findings and fails by its ending, or by a panic.
+/// A test: it prints its findings. It fails by its result, or by a panic.
 type Test = fn(&Machine) -> Result<(), AppError>;
 
 const TESTS: &[(&str, Test)] = &[
@@ -87,7 +87,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     test(machine)
 }
 
-/// Commits the crime that the command line names, outside any subtask.
+/// Commits the crime named by the command line, outside any subtask.
 fn crime(machine: &Machine) -> Result<(), AppError> {
     let crimes: [&[(&str, Crime)]; 2] = [&faults::crimes::CRIMES, &kernel_crimes::CRIMES];
     let crime = machine.options().choice("crime", &crimes.concat())?;

@@ -1,6 +1,6 @@
-//! An echo next to a control loop, which says what it reads of the wire's link.
+//! An echo next to a control loop. The loop prints each change of the wire's link.
 //!
-//! With two clusters the loop is in the first one and the echo in the other.
+//! With two clusters the loop is in the first cluster and the echo in the second.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
@@ -11,10 +11,10 @@ use kernel::{AppError, Machine, json, println};
 
 use crate::single::named;
 
-/// How often memory had been allocated in the loop's first job, and in its latest one.
+/// The heap's number of allocations in the loop's first job, and in its latest job.
 static ALLOCATIONS: [AtomicU64; 2] = [const { AtomicU64::new(0) }; 2];
 
-/// Runs both until the run is ended.
+/// Runs both until the end of the run is requested.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let wire = echo::wire();
     machine.connect(&wire)?;

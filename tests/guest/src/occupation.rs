@@ -1,10 +1,10 @@
-//! Whether an instance that occupies its core for a time does so for all of it.
+//! Checks that an instance occupying its core for a time does so for all of this time.
 //!
-//! On one core a long instance is preempted again and again while it computes for a
-//! stated time. Its time in the record, without the times of those that preempted it,
-//! has to be the one that it asked for. Times differ a little from job to job,
-//! so that the preemptions come at all places of the loop that looks at the clock, and
-//! where instructions are counted, also at all places between its first two looks.
+//! On one core a long instance is preempted again and again while it computes for a stated time.
+//! Its time in the record, without the times of the preempting instances, must not be below the
+//! stated time. Times differ a little from job to job, so the preemptions come at all places of the
+//! loop reading the clock, and, where instructions are counted, also at all places between its
+//! first two readings.
 
 use core::hint::black_box;
 use core::time::Duration;
@@ -18,15 +18,15 @@ const LONG_NS: u64 = 1_200_000;
 const STEP_NS: u64 = 3_001;
 const JOBS: u64 = 150;
 
-/// How long before the next preemption it is released. Its first look at the clock is in job 0
-/// before that, and in the last job after it.
+/// The time from the long DAG's release to the next preemption. Its first reading of the clock is
+/// before the preemption in job 0, and after it in the last job.
 const BEFORE_NS: u64 = 2_000;
 
 const fn time_ns(job: u64) -> u64 {
     LONG_NS + job * STEP_NS
 }
 
-/// Runs both, and counts the jobs whose time was too short.
+/// Runs both DAGs, and counts the long jobs with too short a time.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let mut job = 0_u64;

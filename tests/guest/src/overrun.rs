@@ -1,4 +1,4 @@
-//! A closure that loops beyond its budget, for the host to find its line.
+//! A closure looping beyond its budget; the host finds the line of the loop.
 
 use core::hint::{black_box, spin_loop};
 use core::time::Duration;
@@ -8,7 +8,7 @@ use kernel::{AppError, Machine};
 
 use crate::single::{named, single};
 
-/// Runs it, inlined into the kernel's call of it, until its budget ends it.
+/// Runs the closure, inlined into the kernel's call, until its budget ends it.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();

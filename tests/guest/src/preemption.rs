@@ -1,15 +1,16 @@
-//! Many DAGs that preempt one another while every instance checks itself.
+//! Many DAGs preempting each other while every instance checks itself.
 //!
-//! Six fork-join DAGs of different rates share the cores, the faster ones with
-//! the higher priorities. Each instance repeats work whose result it knows: a
-//! register or a byte that an interrupt, a preemption, or a move to another core, does not
-//! restore shows as a difference. Where there is AVX, its registers are among them.
+//! Six fork-join DAGs of different rates share the cores, the faster DAGs with the higher
+//! priorities. Each instance repeats work with a known result: any register or byte not restored by
+//! an interrupt, a preemption, or a move to another core shows as a difference. With AVX, its
+//! registers are checked, too.
 //!
-//! With `budgets=yes` each of them has a budget of half as much again as it takes alone: it would
-//! not do if it had to answer for the time in which it is suspended, or others compute.
+//! With `budgets=yes` each instance has a budget of 1.5 times its time alone. It would exceed this
+//! budget if suspensions, or other instances' computing, counted as its own time.
 //!
 //! With `held=yes` some instance is preempted however late the host is: instances of the least
-//! urgent DAG hold all cores but one until two of the most urgent DAG have run at the same time.
+//! urgent DAG hold all cores but one until two instances of the most urgent DAG have run at the
+//! same time.
 
 use alloc::format;
 use alloc::string::String;
@@ -29,8 +30,7 @@ use crate::upper_halves;
 /// The periods in milliseconds; the shortest gets the highest priority.
 const PERIODS_MS: [u64; 6] = [2, 3, 5, 7, 11, 13];
 
-/// How often each instance repeats its work, if no word says so: about 0.15 ms, 70 % of one
-/// core in all.
+/// The default number of repetitions of an instance's work: about 0.15 ms, 70 % of one core in all.
 const ROUNDS: u64 = 12;
 
 /// The work of each instance.
@@ -136,7 +136,7 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
     dag
 }
 
-/// Builds the DAG that holds the cores, and the one that it calls for when it does.
+/// Builds the DAG holding the cores, and the DAG called for by it when the cores are held.
 fn holding(cores: u32, work: &Arc<Work>) -> [Dag; 2] {
     let [ms, longest] = [Duration::from_millis(2), Duration::from_secs(100)];
     // How many hold a core, and how many of those that preempt them have run.

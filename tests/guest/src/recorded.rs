@@ -1,4 +1,4 @@
-//! A DAG whose topics are recorded: honest, cheating, or too much for the buffer.
+//! DAGs with recorded topics: honest, cheating, or too much for the buffer.
 
 use alloc::string::ToString;
 use alloc::sync::Arc;
@@ -14,13 +14,13 @@ use kernel::{AppError, Machine, json};
 
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// The value that is recorded of a link of [`long`]: 2 KiB.
+/// The value recorded for a link of [`long`]: 2 KiB.
 type Block = [u64; 256];
 
-/// The links of [`long`].
+/// The number of links of [`long`].
 const LINKS: usize = 8;
 
-/// Runs a fork and a join, in which both branches ask for the time, or share a counter behind the
+/// Runs a fork and a join. Both branches ask for the time, or share a counter behind the
 /// scheduler's back.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
@@ -66,7 +66,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.run().map(drop)
 }
 
-/// Runs a source that reads the wall clock, and a sink that stamps its start, and says the last stamp.
+/// Runs a source reading the wall clock, and a sink stamping its start, and prints the last stamp.
 pub(crate) fn stamped(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let clock = WallClock::new();
@@ -102,7 +102,7 @@ pub(crate) fn stamped(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Runs a chain that leaves one core no pause, each link of which is recorded.
+/// Runs a chain leaving one core no pause, with each link recorded.
 pub(crate) fn long(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let dag = create_dag();

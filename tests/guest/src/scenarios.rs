@@ -1,4 +1,4 @@
-//! The suite of scenarios on the machine: those for as many cores as it has.
+//! The suite of scenarios on the machine: the scenarios for the machine's number of cores.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use kernel::{AppError, Machine, Run, json};
 use scenarios::Scenario;
 
-/// Runs the scenarios, and prints of each what is wrong.
+/// Runs the scenarios, and prints the faults of each.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let all = Scenario::suite().map_err(AppError::Failure)?.into_iter();
@@ -17,7 +17,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Runs a scenario, unless its commit is refused, and returns what is wrong.
+/// Runs a scenario, unless its commit is refused, and returns its faults.
 pub(crate) fn judged(
     machine: &Machine,
     scenario: &Scenario,

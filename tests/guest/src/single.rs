@@ -1,4 +1,4 @@
-//! DAGs of a single subtask, which does what the kernel has to notice, to outlast or to name.
+//! DAGs of a single subtask, with behaviour for the kernel to notice, to outlast or to name.
 
 use alloc::format;
 use alloc::vec;
@@ -20,7 +20,7 @@ pub(crate) fn named(name: &str) -> SubtaskAttributes {
     SubtaskAttributes::named(name)
 }
 
-/// Builds a DAG of one subtask, which is released each 10 ms.
+/// Builds a DAG of one subtask, released every 10 ms.
 pub(crate) fn single(
     name: &str,
     jobs: u64,
@@ -50,13 +50,13 @@ fn run(machine: &Machine, dags: &[Dag]) -> Result<(), AppError> {
     machine.run().map(drop)
 }
 
-/// Prints more in one job than may wait.
+/// Prints more text in one job than can wait for output.
 pub(crate) fn talkative(machine: &Machine) -> Result<(), AppError> {
     let talk = || (0..20).for_each(|_| println!("{:>1000}", "much"));
     run(machine, &[single("talkative", 1, named("talks"), talk)])
 }
 
-/// Panics in job 1, and the app does not look at faults. It says so in the log beforehand.
+/// Panics in job 1, and the app does not look at faults. A log line comes before the panic.
 pub(crate) fn unnoticed(machine: &Machine) -> Result<(), AppError> {
     let mut jobs = 0;
     let panics = move || {
@@ -68,8 +68,8 @@ pub(crate) fn unnoticed(machine: &Machine) -> Result<(), AppError> {
     run(machine, &[single("careless", 3, named("panics"), panics)])
 }
 
-/// Holds its core until the budget ends it, long after it has been noticed, next to a DAG that
-/// ends well.
+/// Holds its core until the budget ends the hold, long after the kernel has noticed, next to a DAG
+/// with a good end.
 pub(crate) fn stalled(machine: &Machine) -> Result<(), AppError> {
     machine.accept_faults();
     let good = single("good", 3, named("returns"), || ());
@@ -78,8 +78,8 @@ pub(crate) fn stalled(machine: &Machine) -> Result<(), AppError> {
     run(machine, &[good, single("endless", 3, holds, hold)])
 }
 
-/// Takes longer than its WCET says, in jobs 2 and 3 of 5, where a bound was demanded and proven.
-/// With `accept=yes` the app says so beforehand.
+/// Takes longer than its WCET in jobs 2 and 3 of 5, with a bound demanded and proven. With
+/// `accept=yes` the app announces this beforehand.
 pub(crate) fn exceeded(machine: &Machine) -> Result<(), AppError> {
     let accepts = (machine.options()).choice("accept", &[("no", false), ("yes", true)])?;
     machine.options().finish(&["test", "accept"])?;
@@ -98,8 +98,8 @@ pub(crate) fn exceeded(machine: &Machine) -> Result<(), AppError> {
     machine.run().map(drop)
 }
 
-/// Takes no interrupts any more, for another core to notice: on the first core that the
-/// scheduler gives, or on another one, while the first holds.
+/// Takes no interrupts any more, for another core to notice: on the first core given by the
+/// scheduler, or, if `is_beside`, on another core while the first holds.
 pub(crate) fn deaf(machine: &Machine, is_beside: bool) -> Result<(), AppError> {
     let deaf = single("deaf", 1, named("deaf"), || {
         kernel_crimes::take_no_interrupts();
@@ -111,7 +111,7 @@ pub(crate) fn deaf(machine: &Machine, is_beside: bool) -> Result<(), AppError> {
     }
 }
 
-/// Has each of three faults keep 1000 bytes, next to a DAG that keeps as much without a fault.
+/// Keeps 1000 bytes in each of three faults, next to a DAG keeping as much without a fault.
 pub(crate) fn keep(machine: &Machine) -> Result<(), AppError> {
     machine.accept_faults();
     let mut kept = Vec::new();
@@ -140,7 +140,7 @@ impl Drop for Stubborn {
     }
 }
 
-/// Has a function own what cannot be dropped, next to a DAG that ends well.
+/// Gives a function a value with a failing `drop`, next to a DAG with a good end.
 pub(crate) fn leave(machine: &Machine, loops: bool) -> Result<(), AppError> {
     let good = single("good", 3, named("return"), || ());
     let owned = Stubborn { loops };
@@ -150,8 +150,8 @@ pub(crate) fn leave(machine: &Machine, loops: bool) -> Result<(), AppError> {
     run(machine, &[good, single("stubborn", 3, named("own"), own)])
 }
 
-/// Makes many DAGs panic at once that no stack was made for, as they cannot be suspended: again
-/// and again. The stacks come back.
+/// Makes many DAGs panic at once, again and again. They cannot be suspended, so no stacks were made
+/// for them. The stacks come back.
 pub(crate) fn spend_stacks(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();

@@ -1,4 +1,4 @@
-//! Random rounds of scenarios on the machine, as `./scripts/soak` asks for them.
+//! Random rounds of scenarios on the machine, as requested by `./scripts/soak`.
 
 use alloc::format;
 use core::time::Duration;
@@ -8,12 +8,11 @@ use kernel::{AppError, Machine, MemoryInUse, Run};
 
 use crate::scenarios::{judged, print};
 
-/// How much of the heap a fault keeps for good, at most: its body, and what that owns.
+/// The most bytes of the heap a fault keeps for good: its body, and everything owned by the body.
 const KEPT_BYTES: usize = 1024;
 
-/// Runs `rounds` random rounds of `round_ms`, from round `first` of a `seed` on, each twice: what
-/// the first run makes the machine keep is what the second one finds. Prints of each run what is
-/// wrong.
+/// Runs `rounds` random rounds of `round_ms`, from round `first` of a `seed` on, each twice: the
+/// second run must reuse all memory kept after the first. Prints the faults of each run.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let seed = options.number("seed", 0..=u64::MAX, 1)?;

@@ -1,4 +1,4 @@
-//! Stacks that subtasks state, and how much of them is used.
+//! Stacks stated by subtasks, and the measured use of each.
 
 use alloc::format;
 use alloc::vec;
@@ -10,11 +10,11 @@ use kernel::{AppError, Machine, json};
 
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// More than a stack has without a word.
+/// An array larger than a stack of the default size.
 const ARRAY_BYTES: usize = 100 << 10;
 
-/// Runs a DAG whose second subtask has a large array, between two others that have none; then
-/// commits one that states a larger stack.
+/// Runs a DAG with a large array in its second subtask and none in the two others; then commits a
+/// DAG stating a larger stack.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     finish_create_dags(&[deep(256 << 10)])?;

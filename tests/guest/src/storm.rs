@@ -1,8 +1,8 @@
 //! A million timer interrupts while every core computes.
 //!
-//! There is a DAG for each core. Each repeats the same floating-point and memory work and
-//! compares the result with the first one's: a register or a byte that an interrupt does not
-//! restore shows as a difference.
+//! There is a DAG for each core. Each repeats the same floating-point and memory work and compares
+//! the result with the first result: any register or byte not restored by an interrupt shows as a
+//! difference.
 
 use alloc::format;
 use alloc::sync::Arc;
@@ -17,10 +17,10 @@ use kernel::{AppError, Machine, json};
 use crate::checksum::checksum;
 use crate::single::{named, single_every};
 
-/// The time between two interrupts of one core.
+/// The time between two interrupts of a core.
 const INTERRUPT_PERIOD_NS: u64 = 5_000;
 
-/// Longer than any storm, so that the one job is never late.
+/// Longer than any storm, so the only job is never late.
 const PERIOD: Duration = Duration::from_secs(3600);
 
 #[derive(Default)]

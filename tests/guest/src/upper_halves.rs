@@ -1,5 +1,5 @@
-//! Work that keeps values in the sixteen registers of AVX for a while. The compiler would
-//! spill them; here they stay, so that only an interruption can change them.
+//! Work keeping values in the sixteen registers of AVX for a while. The compiler would spill them;
+//! here they stay, so only an interruption can change them.
 
 use core::arch::asm;
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -8,11 +8,11 @@ use crate::checksum::checksum;
 
 type Registers = [[u64; 4]; 16];
 
-/// How often each call counts down with all registers in use: some 12 us.
+/// The number of counting steps in each call, with all registers in use: some 12 us.
 const STEPS: u64 = 6_000;
 
-/// Reports whether all registers have kept what was put into them, which no other call has
-/// put anywhere. Without AVX there are none, and nothing is lost.
+/// Reports whether all registers have kept their values, which are unique to each call. Without AVX
+/// there are no such registers, and nothing is lost.
 pub(crate) fn are_kept() -> bool {
     static CALLS: AtomicU64 = AtomicU64::new(1);
     if !kernel::has_avx() {
@@ -30,12 +30,12 @@ pub(crate) fn are_kept() -> bool {
     values == unsafe { keep(&values) }
 }
 
-/// Reports whether [`are_kept`] holds, and code without AVX is right as well.
+/// Reports whether [`are_kept`] holds, and code without AVX computes the right result as well.
 pub(crate) fn are_kept_besides_others(expected: u64) -> bool {
     are_kept() && checksum() == expected
 }
 
-/// Holds the values in registers for a while and returns what is there then.
+/// Holds the values in registers for a while and returns the registers' contents then.
 #[target_feature(enable = "avx")]
 fn keep(values: &Registers) -> Registers {
     let mut kept = [[0; 4]; 16];

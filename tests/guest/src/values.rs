@@ -1,8 +1,8 @@
 //! The cost of recording a value of 64 bytes, for `bench hand-off`.
 //!
-//! In a chain every other value is recorded. So hops with a recorded value and hops with one
-//! that is not alternate in one run, and differ in nothing else. It is measured here because an
-//! image with a recorded topic is larger by a fifth, and the app `hand-off` has no room for it.
+//! In a chain every other value is recorded. So hops with and without a recorded value alternate in
+//! the same run, and differ in nothing else. The cost is measured here because an image with a
+//! recorded topic is larger by a fifth, and the app `hand-off` has no room for it.
 
 use alloc::format;
 use alloc::string::String;
@@ -21,8 +21,8 @@ const SUBTASKS: usize = 10;
 /// The message of each edge.
 type Value = [u64; 8];
 
-/// Runs the chain, and prints hops of either kind, and the difference between one with a
-/// recorded value and the next one.
+/// Runs the chain, and prints hops of either kind, and the difference between a hop with a recorded
+/// value and the next hop.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let jobs = machine.options().number("jobs", 2..=100_000, 200)?;
     machine.options().finish(&["test", "jobs"])?;
@@ -56,7 +56,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// Prints a figure as the app `hand-off` does.
+/// Prints a figure in the form of the app `hand-off`.
 pub(crate) fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
     let samples = Distribution::new(samples);
     json::emit("hand_off", |line| {
@@ -68,7 +68,7 @@ pub(crate) fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIte
     });
 }
 
-/// Builds the chain, and the place where its bodies leave their times.
+/// Builds the chain, and the place for the times of its bodies.
 fn build(jobs: u64) -> (Dag, BodyStamps) {
     let period = Duration::from_millis(4);
     let dag = create_dag();

@@ -1,4 +1,4 @@
-//! Instances that wait for bytes of a wire, and what a wait costs.
+//! Instances waiting for bytes of a wire, and the cost of a wait.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -21,8 +21,9 @@ fn hold(ms: u64) {
     execute_for(Duration::from_millis(ms), Occupation::Hold);
 }
 
-/// Runs a modem, which is written a question and read for an answer, and says what came: the sum of
-/// it, and how often there was nothing. In two clusters it is not in that of the port.
+/// Runs a modem's DAG, writing questions and reading answers. Prints the sum of the answers, and
+/// the numbers of missing answers and of unsent questions. With two clusters, the DAG is in the
+/// second, away from the port's cluster.
 pub(crate) fn wire(machine: &Machine) -> Result<(), AppError> {
     let modem = Wire::new("modem");
     machine.connect(&modem)?;
@@ -75,11 +76,11 @@ pub(crate) fn wire(machine: &Machine) -> Result<(), AppError> {
     Ok(())
 }
 
-/// How many waits [`cost`] takes one after the other.
+/// The number of waits taken by [`cost`], one after the other.
 const NAPS: u32 = 32;
 
-/// Counts what a wait and its wake add to an instance that has the machine for itself: of no time,
-/// and of a millisecond beyond that.
+/// Counts the instructions added by a wait and its wake to an instance alone on the machine: for a
+/// wait of no time, and for a wait of a millisecond, without the millisecond.
 pub(crate) fn cost(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     for (word, time) in [("at_once", Duration::ZERO), ("later", ms(1))] {

@@ -1,4 +1,4 @@
-//! Two wires that cross: packets of each go out on the other.
+//! Two crossing wires: packets of each go out on the other.
 
 use core::fmt::Write;
 use core::time::Duration;

@@ -1,4 +1,4 @@
-//! The heap, used up, and the stack where the heap is used.
+//! Attacks on the heap, used up, and on a stack used up inside the allocator.
 
 use alloc::boxed::Box;
 use alloc::string::String;

@@ -1,10 +1,10 @@
-//! A lock of the kernel's, misused.
+//! Attacks misusing a lock of the kernel's.
 
 use core::hint::black_box;
 
 use faults::crimes::{LOCKS, Unpunished};
 
-/// Takes the lock that it holds.
+/// Takes the lock while holding it.
 pub(super) fn lock_twice() -> Unpunished {
     LOCKS[2].with(|_| LOCKS[2].with(|shared| *shared += 1));
     Unpunished

@@ -1,10 +1,9 @@
 //! Attacks by safe code on others, next to a DAG that must not notice.
 //!
-//! As in the app `faults`, a healthy DAG runs next to a doomed one, whose middle
-//! subtask commits a *crime* in one of its jobs. These crimes are against what all
-//! share: the heap, the serial line, locks. They are committed one after the other; those that
-//! use up what they attack, or make the whole run fail, in a boot of their own
-//! (`test=attack attack=NAME`).
+//! As in the app `faults`, a healthy DAG runs next to a doomed DAG, whose middle subtask commits a
+//! *crime* in one of its jobs. These crimes are directed against shared things: the heap, the
+//! serial line, locks. The attacks of a boot run one after the other. An attack using up its
+//! target, or making the whole run fail, has a boot of its own (`test=attack attack=NAME`).
 
 mod heap;
 mod locks;
@@ -17,10 +16,10 @@ use faults::crimes::{Crime, Unpunished};
 use faults::{FaultPolicy, JOBS, PERIOD, doomed, doomed_at_leisure, healthy};
 use kernel::{AppError, Machine, json};
 
-/// An attack, by its name, and whether it has a budget, of 6 ms.
+/// An attack: its name, the crime, and whether a budget of 6 ms limits it.
 type Attack = (&'static str, Crime, bool);
 
-/// Those that leave what they attack to the next one.
+/// The attacks leaving their target usable for the next attack.
 const TOGETHER: [Attack; 12] = [
     ("allocator_stack", heap::overflow_in_the_allocator, true),
     ("display_panics", output::display_panics, true),
@@ -36,7 +35,7 @@ const TOGETHER: [Attack; 12] = [
     ("flood", output::flood, false),
 ];
 
-/// The others.
+/// The attacks in need of their own boots.
 const ALONE: [Attack; 4] = [
     ("commit", commit, false),
     ("leak_strings", heap::leak_strings, false),
@@ -44,7 +43,7 @@ const ALONE: [Attack; 4] = [
     ("forge_list", output::forge_list, true),
 ];
 
-/// Commits DAGs while others run, which the kernel refuses.
+/// Commits DAGs while others run; the kernel refuses them.
 fn commit() -> Unpunished {
     let dag = create_dag();
     dag.period(PERIOD).relative_deadline(PERIOD);
@@ -53,8 +52,8 @@ fn commit() -> Unpunished {
     panic!("{refused}")
 }
 
-/// Commits the attack that the command line names, or those that can be one after the other, and
-/// prints what came of each.
+/// Runs the attack named by the command line, or all of [`TOGETHER`] one after the other, and
+/// prints the result of each.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let named = machine.options().text("attack");
     machine.options().finish(&["test", "attack"])?;

@@ -1,4 +1,4 @@
-//! The serial line: text that takes long, text without end, and forged lines.
+//! Attacks on the serial line: slow text, text without end, and forged lines.
 
 use core::fmt;
 use core::hint::black_box;
@@ -8,7 +8,7 @@ use alloc::string::String;
 use faults::crimes::Unpunished;
 use kernel::{json, print, println};
 
-/// A value whose text is made by a function.
+/// A value with a text made by a function.
 struct Says(fn(&mut fmt::Formatter<'_>) -> fmt::Result);
 
 impl fmt::Display for Says {
@@ -17,7 +17,7 @@ impl fmt::Display for Says {
     }
 }
 
-/// Prints a value whose `Display` panics.
+/// Prints a value with a panicking `Display`.
 pub(super) fn display_panics() -> Unpunished {
     println!(
         "before {} after",
@@ -26,7 +26,7 @@ pub(super) fn display_panics() -> Unpunished {
     Unpunished
 }
 
-/// Prints a value whose `Display` prints. No crime: both texts come.
+/// Prints a value with a printing `Display`. This is no crime: both texts come.
 pub(super) fn display_prints() -> Unpunished {
     let prints = Says(|f| {
         println!("the inner text");
@@ -36,7 +36,7 @@ pub(super) fn display_prints() -> Unpunished {
     Unpunished
 }
 
-/// Prints a value whose `Display` never ends.
+/// Prints a value with an endless `Display`.
 pub(super) fn display_loops() -> Unpunished {
     let loops = Says(|f| {
         while black_box(true) {
@@ -48,7 +48,7 @@ pub(super) fn display_loops() -> Unpunished {
     Unpunished
 }
 
-/// Panics with a message of so many bytes.
+/// Panics with a message of `bytes` bytes.
 pub(super) fn panic_with(bytes: usize) -> Unpunished {
     let mut message = String::with_capacity(bytes);
     for _ in 0..bytes / 1000 {
@@ -65,10 +65,10 @@ pub(super) fn flood() -> Unpunished {
     Unpunished
 }
 
-/// Lines by which a run is judged, as an app would print them to look better than it is.
+/// A line deciding the run's judgement, as a failing app would print it to look better.
 const FORGED: &str = r#"{"kind":"verdict","status":"success","forged":true}"#;
 
-/// Prints lines that are the kernel's to print, whole and in pieces, and damaged ones.
+/// Prints lines reserved to the kernel, whole and in pieces, and damaged lines.
 pub(super) fn forge_lines() -> Unpunished {
     println!("{FORGED}");
     println!(r#"{{"kind":"fault","forged":true}}"#);
@@ -79,12 +79,12 @@ pub(super) fn forge_lines() -> Unpunished {
     Unpunished
 }
 
-/// Panics with a message that has such a line in it.
+/// Panics with a message containing a forged line.
 pub(super) fn forge_message() -> Unpunished {
     panic!("a message\n{FORGED}\n{{\"forged\":")
 }
 
-/// Smuggles such a line into a machine line of its own, which is damaged then.
+/// Smuggles a forged line into the app's own machine line, and so damages this line.
 pub(super) fn forge_list() -> Unpunished {
     let items = ["1]}\n{\"kind\":\"verdict\",\"status\":\"success\",\"forged\":[1"];
     json::emit("smuggler", |line| {
@@ -93,7 +93,7 @@ pub(super) fn forge_list() -> Unpunished {
     Unpunished
 }
 
-/// Asks for a machine line of a kind that is the kernel's.
+/// Asks for a machine line of a kind reserved to the kernel.
 pub(super) fn forge_kind() -> Unpunished {
     json::emit("verdict", |line| {
         line.text("status", "success");
