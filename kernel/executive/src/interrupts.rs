@@ -22,6 +22,7 @@ pub fn timer_interrupt(interrupted: &mut Interrupted) {
     if timer::take_due(Alarm::Schedule, now_ns) {
         execution::interrupt(interrupted, now_ns, true);
     }
+    // After the schedule's step: an instance suspended there at its budget's end has not overrun.
     if timer::take_due(Alarm::Budget, now_ns) {
         containment::end_overrun(interrupted, now_ns);
     }
@@ -38,6 +39,7 @@ pub fn wake_interrupt(interrupted: &mut Interrupted) {
     let core = this_core::get();
     let now_ns = clock::now_ns();
     core.interrupted_ns.store(now_ns, Ordering::Relaxed);
+    // The waker may have an earlier event for this core, whose timer only this core can write.
     if execution::keeps_time(core) {
         execution::arm_next_event();
     }

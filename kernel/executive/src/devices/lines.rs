@@ -99,6 +99,7 @@ pub fn tie(
     driver: &'static dyn DeviceLine,
     core: u32,
 ) -> Result<Line, LineError> {
+    // Before a line is taken: lines are never given back.
     reached(core)?;
     let vector = take(driver)?;
     let mut line = Line {
@@ -121,6 +122,7 @@ fn take(driver: &'static dyn DeviceLine) -> Result<u8, LineError> {
     interrupt::install_devices(device_interrupt);
     let free = (vector::DEVICE..)
         .zip(&LINES)
+        // Each place is set once, so two cores cannot take the same line.
         .find(|(_, place)| place.set(driver));
     free.map(|(vector, _)| vector).ok_or(LineError::NoLine)
 }
@@ -149,6 +151,7 @@ impl Bell {
 fn reached(core: u32) -> Result<u8, LineError> {
     let core = (this_core::all().get(core as usize)).ok_or(LineError::NoCore(core))?;
     let id = u8::try_from(core.apic_id()).ok();
+    // 255 would address all cores.
     let id = id.filter(|id| *id < u8::MAX);
     id.ok_or(LineError::Unreachable(core.apic_id()))
 }

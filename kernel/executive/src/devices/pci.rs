@@ -149,6 +149,7 @@ pub fn find<'c>(configuration: &'c dyn Configuration, each: &mut dyn FnMut(Funct
                     }
                 }
                 each(function);
+                // A device with one function may answer to all eight numbers.
                 if place.0 == first && header & 0x80 == 0 {
                     break;
                 }
@@ -190,6 +191,7 @@ impl<'c> Function<'c> {
         let next = |at: &u8| Some(self.byte(u16::from(*at) + 1) & 0xfc);
         core::iter::successors(first, next)
             .take(CAPABILITIES)
+            // Below lies the header; 0 ends the chain.
             .take_while(|at| *at >= 0x40)
             .filter(move |at| self.byte(u16::from(*at)) == kind)
             .map(u16::from)
@@ -260,6 +262,7 @@ impl<'c> Function<'c> {
         if start == 0 || low_mask == 0 && !is_wide {
             return Err(PciError::NoRange(bar));
         }
+        // The bits that stay 0 are those within the range, so its size is the mask's negative.
         let length = mask.wrapping_neg();
         let is_right = length.is_power_of_two()
             && length <= LARGEST

@@ -68,6 +68,7 @@ impl LatestReading {
     /// Compares a counter, read by `read`, with the stamp, and returns how many ticks the counter
     /// is behind. If not behind, its reading becomes the stamp.
     fn meet(&self, read: impl FnOnce() -> u64) -> u64 {
+        // The stamp first: a counter read before a stamp may be smaller without being behind.
         let seen = self.0.load(Ordering::Acquire);
         let own = read();
         if own > seen {

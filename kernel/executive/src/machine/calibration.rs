@@ -132,6 +132,7 @@ impl<'c> TickCounter<'c> {
         let elapsed = ElapsedTicks {
             ns: self.clock.ns(end.ticks - start.ticks),
             counter: end.counter.wrapping_sub(start.counter),
+            // The local APIC's timer counts down.
             apic: u64::from(start.apic.wrapping_sub(end.apic)),
         };
         let judge_ns = self.judge.map_or(0, |judge| {
@@ -269,6 +270,7 @@ impl KnownClock {
         let period = (base + 4) as *const u32;
         // SAFETY: the caller vouches for the register.
         let tick_fs = unsafe { period.read_volatile() };
+        // Without an HPET at the address, reads give 0 or all ones.
         (1..=LONGEST_TICK_FS).contains(&tick_fs).then_some(Self {
             name: "hpet",
             tick_fs: u64::from(tick_fs),
@@ -320,6 +322,7 @@ impl KnownClock {
             ClockSource::PmTimer(port) => unsafe { port::read_u32(port) },
             // SAFETY: the register is the count of the HPET that `hpet` was told of.
             ClockSource::Hpet(base) => unsafe { ((base + 0xf0) as *const u32).read_volatile() },
+            // Counts down; its complement counts up like the other clocks.
             ClockSource::LocalApic => !local_apic::timer_count(),
             ClockSource::Pit => {
                 const LATCH_2: u8 = 0x80;
@@ -327,6 +330,7 @@ impl KnownClock {
                 unsafe { port::write_u8(0x43, LATCH_2) };
                 // SAFETY: likewise. The low byte comes first.
                 let [low, high] = [(); 2].map(|()| unsafe { port::read_u8(0x42) });
+                // Counts down, likewise.
                 !u32::from(u16::from_le_bytes([low, high]))
             }
         }

@@ -33,6 +33,7 @@ pub fn apic_ticks(ns: u64) -> u32 {
         ns.min(LONGEST_NS),
         APIC_TICKS_PER_NS.load(Ordering::Relaxed),
     );
+    // A count of 0 would stop the timer.
     u32::try_from(ticks).unwrap_or(u32::MAX).max(1)
 }
 

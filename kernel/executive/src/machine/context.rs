@@ -324,6 +324,7 @@ impl Parked {
 
     /// Notes the context's resumption at `now_ns`.
     pub fn note_resumed(&self, now_ns: u64) {
+        // Saturating: `now_ns` may be an interrupt's time, from before the suspension was noted.
         let since_ns = now_ns.saturating_sub(self.0.suspended_at_ns.load(Ordering::Relaxed));
         self.0.note_waited(since_ns);
     }

@@ -126,6 +126,7 @@ extern "C" fn handle_interrupt(registers: *mut SavedRegisters) -> *mut SavedRegi
         // Raised by an instruction (`cpu::ask_for_end`), so the local APIC expects no
         // acknowledgement.
         (Ok(vector::END), Some(handlers)) => (handlers.end)(&mut Interrupted(())),
+        // Never in service, so an acknowledgement would end another interrupt (Intel SDM 3, 11.9).
         (Ok(vector::SPURIOUS), _) => {}
         (Ok(line @ vector::DEVICE..vector::OTHER), _) => {
             local_apic::acknowledge();
@@ -192,6 +193,7 @@ pub extern "C" fn work() -> ! {
         .get()
         .expect("handlers are installed before any context begins");
     let next = (handlers.work)();
+    // Disabled already by the contract of `Handlers::work`; `leave_context` must be sure of it.
     interrupt_flag::disable();
     if let Some(spare) = this_core::take_spare_context() {
         (handlers.release)(spare);

@@ -28,6 +28,7 @@ pub fn stays_awake() -> bool {
 pub fn disable() -> bool {
     let were_enabled = cpu::is_interrupt_flag_set();
     if were_enabled {
+        // While interrupts are enabled: an overflow found here is still the app's, and contained.
         cpu::probe_stack();
         cpu::clear_interrupt_flag();
         interrupts_off::note_disabled(Location::caller());

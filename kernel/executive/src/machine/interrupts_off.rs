@@ -51,6 +51,7 @@ fn measure_from(place: &'static Location<'static>) {
 #[inline(never)]
 fn measure_to_here() {
     let meter = this_core::get().meter();
+    // 0 if interrupts were disabled before the measurement began.
     let began = meter.began.swap(0, Ordering::Relaxed);
     let ticks = cpu::time_stamp().saturating_sub(began);
     if began != 0 && ticks > meter.longest.load(Ordering::Relaxed) {

@@ -228,6 +228,7 @@ fn command(apic_id: u32, low: u32) {
     while read_mapped(base, ApicRegister::CommandLow) & PENDING != 0 {
         cpu::relax();
     }
+    // The destination first: writing the low half sends the interrupt.
     write_mapped(base, ApicRegister::CommandHigh, apic_id << 24);
     write_mapped(base, ApicRegister::CommandLow, low);
     if was_set {

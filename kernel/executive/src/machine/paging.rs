@@ -117,6 +117,8 @@ impl PageTable {
                 false => (PAGE, 0, 0),
             };
             let slot = self.entry(address, level, new_frame)?;
+            // A present entry never changes: no core can hold a stale translation, so none is
+            // flushed.
             if read_entry(slot) & PRESENT != 0 {
                 return Err(MapError::AlreadyMapped);
             }
@@ -142,6 +144,7 @@ impl PageTable {
             let slot = TableEntry::of(table, address, above);
             let mut entry = read_entry(slot);
             if entry & PRESENT == 0 {
+                // With all rights: the last level alone restricts them.
                 entry = new_frame().ok_or(MapError::OutOfFrames)? | PRESENT | WRITABLE;
                 write_entry(slot, entry);
             } else if entry & LARGE != 0 {

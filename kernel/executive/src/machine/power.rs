@@ -128,6 +128,7 @@ pub fn exit(told: AppExit) -> ! {
     if this_core::is_ready() {
         non_maskable::stop_others();
     }
+    // Power off or reset would lose the bytes still in the port's FIFO.
     serial::FIRST.drain();
     reset_or_power_off();
     cpu::halt_forever()

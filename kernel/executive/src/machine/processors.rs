@@ -23,6 +23,7 @@ pub fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
     let is_efficient = is_efficiency_core();
     core.is_efficient.store(is_efficient, Ordering::Relaxed);
+    // Before the table: its handlers may save by `xsaveopt64`, which needs AVX enabled.
     avx::enable();
     interrupt::load_table();
     machine_check::enable();

@@ -34,6 +34,7 @@ pub fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     if with_core(|core| is_in_section(core.context())) {
         return None;
     }
+    // Each try reads the core anew: between two tries the context may be preempted, and move.
     while !with_core(|core| enter(lock, core)) {
         cpu::relax();
     }
@@ -62,6 +63,7 @@ fn enter(lock: &LockWords, core: &Core) -> bool {
     let here = core.index + 1;
     let state = lock.state.load(Relaxed);
     let turn = state >> 1;
+    // The turn of a core that waits no more is void: `stop_waiting` leaves the word as it is.
     let is_anothers = turn != 0 && turn != here && waits(lock, turn - 1);
     let taken = state | IS_HELD;
     // The turn is in the word, so that no release comes in between.
@@ -146,6 +148,7 @@ pub fn puts_off(core: &Core, now_ns: u64) -> bool {
     let put_off_ns = &note.put_off_ns;
     let first_ns = match put_off_ns.load(Relaxed) {
         0 => {
+            // 0 is taken: it says that nothing was postponed.
             put_off_ns.store(now_ns.max(1), Relaxed);
             now_ns
         }

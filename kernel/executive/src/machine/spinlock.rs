@@ -49,6 +49,7 @@ impl<T> SpinLock<T> {
     /// Must not be called by the holder, who would wait forever.
     #[track_caller]
     pub fn lock(&self) -> SpinLockGuard<'_, T> {
+        // Before a ticket is drawn: a handler waiting behind this ticket would wait forever.
         let interrupts_were_enabled = interrupt_flag::disable();
         let mut guard = self.lock_uninterrupted();
         guard.interrupts_were_enabled = interrupts_were_enabled;
@@ -58,6 +59,7 @@ impl<T> SpinLock<T> {
     /// Takes the data like [`lock`](Self::lock), with interrupts already disabled, and leaves them
     /// so.
     pub fn lock_uninterrupted(&self) -> SpinLockGuard<'_, T> {
+        // Relaxed: the ticket orders nothing but the queue; the acquire load below orders the data.
         let ticket = self.next.fetch_add(1, Ordering::Relaxed);
         while self.serving.load(Ordering::Acquire) != ticket {
             cpu::relax();
@@ -70,6 +72,7 @@ impl<T> SpinLock<T> {
     pub fn try_lock(&self) -> Option<SpinLockGuard<'_, T>> {
         let interrupts_were_enabled = interrupt_flag::disable();
         let serving = self.serving.load(Ordering::Acquire);
+        // Takes a ticket only if it is served at once: a ticket once drawn has to be waited for.
         let taken = self
             .next
             .compare_exchange(
@@ -119,6 +122,7 @@ impl<T> DerefMut for SpinLockGuard<'_, T> {
 
 impl<T> Drop for SpinLockGuard<'_, T> {
     fn drop(&mut self) {
+        // Relaxed: only the holder changes the number served.
         let serving = self.lock.serving.load(Ordering::Relaxed);
         self.lock
             .serving

@@ -274,6 +274,7 @@ fn end_interrupt_in_slice() {
             }
             return;
         }
+        // A worker that comes enters the slices by itself, before it calls a function.
         TimeSlicePart::None | TimeSlicePart::Comes => return,
         // With the alarm still set, the slice has not ended: another interrupt came.
         TimeSlicePart::Computes if timer::is_set(Alarm::Hold) => return,
@@ -324,6 +325,8 @@ fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
     }
     let length_ns = length_of_slice(core)?;
     let (mine, order) = (core.index, Ordering::Relaxed);
+    // QEMU may have ended this core's turn since the look: then another core may have begun a
+    // slice.
     let begun = SLICE_HOLDER.compare_exchange(holder, mine, order, order);
     begun.is_ok().then_some(length_ns)
 }

@@ -52,6 +52,8 @@ pub fn take_due(alarm: Alarm, now_ns: u64) -> bool {
     let slot = &this_core::get().alarms[alarm as usize];
     let due = slot.load(Ordering::Relaxed) <= now_ns;
     if due {
+        // The timer is left alone here: several alarms may be due, and one write at the end is
+        // enough.
         slot.store(u64::MAX, Ordering::Relaxed);
     }
     due

@@ -44,6 +44,7 @@ impl FreeFrames {
     fn add(&mut self, start: u64, end: u64) {
         let (start, end) = (start.next_multiple_of(FRAME), end / FRAME * FRAME);
         if start < end {
+            // Never full: its size counts every cut.
             let _ = self.free.push((start, end));
         }
     }

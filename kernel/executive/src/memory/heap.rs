@@ -109,6 +109,7 @@ unsafe impl GlobalAlloc for KernelHeap {
                 return block;
             }
         }
+        // `allocate` takes the lock itself.
         drop(heap);
         let moved = Layout::from_size_align(new_size, layout.align())
             .ok()

@@ -207,6 +207,7 @@ fn take_zeroed(frames: &mut FreeFrames) -> Option<u64> {
 pub fn map_registers(range: Range<u64>) -> Result<(), MapError> {
     let end = range.end.checked_next_multiple_of(PAGE);
     let pages = range.start / PAGE * PAGE..end.unwrap_or(u64::MAX);
+    // Page 0 stays absent for null pointers, and the windows above are not the devices'.
     if pages.start == 0 || pages.end > STACK_WINDOW {
         return Err(MapError::AlreadyMapped);
     }

@@ -100,8 +100,11 @@ static HAS_WAITING: AtomicBool = AtomicBool::new(false);
 /// Ends the panicking instance, if a subtask panics; otherwise returns.
 pub fn end_panicked(info: &PanicInfo<'_>) {
     if !this_core::is_ready() || !interrupt_flag::are_enabled() {
+        // With interrupts disabled, the panic is the kernel's own: a lock may be held.
         return;
     }
+    // Instance and context are read together: between the two, a preemption could move this code to
+    // another core.
     interrupt_flag::disable();
     let core = this_core::get();
     let Some(instance) = execution::running(core) else {
@@ -228,10 +231,12 @@ fn keep(note: FaultNote) {
 /// Prints the report of the oldest contained fault, and reports whether there was one. Allocates
 /// nothing.
 pub fn tell_fault() -> bool {
+    // A hint only: the lock orders the notes, and a note missed now is seen at the next look.
     if !HAS_WAITING.load(Ordering::Relaxed) {
         return false;
     }
     let (note, left_out) = WAITING.lock().take();
+    // Printed with the lock free, since the next fault's handler waits for it.
     if let Some(note) = &note {
         note.tell();
     }
@@ -325,6 +330,7 @@ impl FaultNote {
             })),
             address,
             core: core.index,
+            // A faulty function may leave any stack pointer, also one above its stack.
             stack_used: context.stack_top().saturating_sub(location.stack_pointer),
             stack_bytes: context.stack_bytes(),
             calls: location.backtrace(),

@@ -70,6 +70,7 @@ pub fn settle(bytes: u64) -> Result<u64, MapError> {
     if settled > 0 {
         return Ok(settled);
     }
+    // The stock is still empty, so the cores' own contexts are the only ones to grow.
     for core in this_core::all() {
         let (context, own) = (core.context(), core.context().stack_bytes());
         if own < bytes {
@@ -86,6 +87,7 @@ pub fn settle(bytes: u64) -> Result<u64, MapError> {
 pub fn provide(total: usize) -> Result<(), MapError> {
     let stock = STOCK.lock();
     let (existing, bytes) = (stock.total, stock.stack_bytes);
+    // Unlocked meanwhile: `create` takes `MEMORY`, and no lock but the heap's is taken inside this.
     drop(stock);
     let missing = total.saturating_sub(existing);
     if missing == 0 {
@@ -122,6 +124,7 @@ fn take_spare() -> Parked {
 /// Prepares a working context, in place of a suspended or abandoned context. Interrupts are
 /// disabled.
 pub fn new_worker() -> Parked {
+    // The core's own spare first: that one takes no lock.
     let mut context = this_core::take_spare_context().unwrap_or_else(take_spare);
     context.restart(interrupt::work);
     context

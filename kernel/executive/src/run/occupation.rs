@@ -12,6 +12,7 @@ pub(crate) fn hold(ns: u64) {
         let left_ns = ns.saturating_sub(executed.ns());
         let core = this_core::get();
         if left_ns == 0 {
+            // Before `enter`, which sets the same alarm for the end of a slice.
             timer::set(Alarm::Hold, u64::MAX);
             time_slice::enter();
             interrupt_flag::enable();
@@ -29,6 +30,7 @@ pub(crate) fn hold(ns: u64) {
 pub(crate) fn spin(ns: u64) {
     let executed = ExecutionTimer::from_now();
     while executed.ns() < ns {
+        // In each round: a resumption after a preemption has made the core join the slices again.
         time_slice::stand_back();
         cpu::relax();
     }

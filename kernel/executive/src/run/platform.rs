@@ -59,6 +59,7 @@ impl Platform for Kernel {
         let mut terms = self.terms.lock().clone();
         terms.scheduler.cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
         if self.calibrates.load(Ordering::Relaxed) {
+            // WCETs and limits on the command line are stated for the app's DAGs.
             (terms.wcets, terms.most_events) = (None, u64::MAX);
         }
         terms
@@ -123,6 +124,7 @@ impl Platform for Kernel {
         }
         let number = plan.number;
         execution::prepare(plan, &terms, coincidence_ns)?;
+        // Last: a refused plan never runs, and the plan before keeps its number.
         self.plan.store(number, Ordering::Relaxed);
         Ok(())
     }

@@ -62,12 +62,12 @@ pub fn step(outgoing: &mut Outgoing) -> bool {
     with(|mut record| {
         let to = record
             .as_deref_mut()
-            // Without a port the values wait for the end of the run: the console has little room
-            // before.
+            // Without a port the values wait: during a run the console has little room.
             .filter(|_| has_port)
             .map(BootRecord::file);
         let is_sent = (outgoing.as_mut()).is_some_and(|drain| drain.step(to));
         let has_room = IS_LIVE.load(Ordering::Relaxed) && (has_port || !console::has_pending());
+        // `|`, not `||`: a long recording must not hold back the events, nor the reverse.
         is_sent | record.is_some_and(|record| has_room && take_events(record))
     })
 }
@@ -89,6 +89,7 @@ pub fn end_recording(outgoing: Outgoing, is_over: bool) {
         report::replayed(&outcome);
     }
     if before_fault.is_some() && RECORD.lock().is_none() {
+        // Nobody has asked for a record, but the latest jobs were kept for just this fault.
         start(false);
     }
     with(|record| {

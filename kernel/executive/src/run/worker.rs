@@ -83,6 +83,7 @@ fn run(mut runner: RunnerLoan) -> CoreWork {
     interrupt_flag::enable();
     runner.run();
     interrupt_flag::disable_enabled();
+    // Stamped before the lock is waited for: the finish is the function's return (decision 19).
     let finish_ns = clock::now_ns();
     execution::complete(runner, finish_ns)
 }
@@ -108,6 +109,8 @@ fn rest(core: &Core) {
             interrupt_flag::enable();
             console::send_pending_byte();
         } else {
+            // No wake-up is lost: its interrupt is pending since `wake` was looked at, and ends the
+            // halt.
             interrupt_flag::enable_and_halt();
         }
         interrupt_flag::disable();
@@ -125,6 +128,7 @@ fn watch(core: &Core) {
         }
     }
     interrupt_flag::disable();
+    // Before `rest` looks at `wake` again: a core that still sees the watch sends no interrupt.
     core.end_watch();
     heartbeat::keep_beating(core);
     // A core that became a cluster's first core while watching got no interrupt to arm its timer.

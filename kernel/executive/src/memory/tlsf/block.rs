@@ -151,6 +151,7 @@ impl Block {
             previous: Some(self),
         });
         self.write(Header {
+            // A difference, not a new size: the owner in the upper bits stays.
             size_and_free: whole.size_and_free - (self.size() - size),
             ..whole
         });
@@ -164,6 +165,7 @@ impl Block {
         let header = self.read();
         let after = next.next();
         self.write(Header {
+            // A sum, likewise.
             size_and_free: header.size_and_free + next.size(),
             ..header
         });

@@ -213,6 +213,7 @@ impl Tlsf {
         let size_before = block.size();
         if needed > size_before {
             let next = block.next();
+            // An end marker counts as used, so growth never leaves the region.
             if !next.is_free() || size_before + next.size() < needed {
                 return false;
             }

@@ -57,6 +57,8 @@ impl ClusterState {
     /// Reports whether letters may be waiting.
     #[inline]
     pub(super) fn may_have_letters(&self) -> bool {
+        // Only a sign: before a letter is read, `take_letters` swaps the flag with acquire
+        // ordering.
         self.has_letters.load(Ordering::Relaxed)
     }
 
@@ -128,7 +130,8 @@ pub fn first_core(number: usize) -> u32 {
 /// restored afterwards. The new seat is counted from the other cluster's first core.
 pub(super) fn visit(cluster: &ClusterState) -> u32 {
     let core = this_core::get();
-    // In 16 bits, as in journals; adding the first core's number gives this core's number again.
+    // Wraps below 0 for a core before that cluster's first: the journal keeps 16 bits of the seat,
+    // and adding the first core's number to those gives this core's number again.
     let seat = (core.index.wrapping_sub(cluster.core(FIRST_SEAT))) & u32::from(u16::MAX);
     core.place.swap(seat, Ordering::Relaxed)
 }
@@ -145,7 +148,7 @@ impl CoreSet {
     /// Makes each core of the set look for work.
     #[inline]
     pub(super) fn wake(&self) {
-        // Mostly the set is empty.
+        // Mostly the set is empty, and four words tell so without a look at each core.
         if self.0.iter().fold(0, |all, word| all | word) != 0 {
             self.wake_some();
         }

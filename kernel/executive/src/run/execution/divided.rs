@@ -46,6 +46,7 @@ pub(super) fn divide(
         }
     }
     let none = u32::try_from(count).unwrap_or(u32::MAX);
+    // The number after the last cluster's: its state never has a run, so these cores find no work.
     rest.for_each(|core| core.group.store(none, Ordering::Relaxed));
     Ok(parts)
 }
@@ -84,8 +85,8 @@ fn rest(place: usize) -> bool {
     if place == cluster::count() {
         return true;
     }
-    // The lock stays held during the recursion, so all clusters stand still at once. Ascending
-    // order, and nobody else holds two clusters' locks: no deadlock.
+    // Held through the recursion, so all clusters stand still at once. No deadlock: the order is
+    // ascending, and nobody else holds the locks of two clusters.
     let cluster = nth(place);
     let execution = cluster.execution.lock();
     let scheduler = execution

@@ -91,6 +91,7 @@ pub fn refuse_another() -> Result<(), LaunchError> {
 /// instant. Takes all memory for the run.
 pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result<(), LaunchError> {
     let options = terms.scheduler;
+    // First, since it may be refused: so far nothing has changed but the stock of contexts.
     port::provide(&plan.task_set, options)?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
@@ -134,6 +135,7 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
 /// or `None` if nothing is prepared.
 pub fn set_epoch(epoch_ns: u64) -> Option<u64> {
     let task_set = task_set()?;
+    // Before any `publish` below, which places the first event on the clock by this epoch.
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
     for cluster in cluster::all() {
         cluster.jobs_ended.store(0, Ordering::Relaxed);
@@ -148,6 +150,7 @@ pub fn set_epoch(epoch_ns: u64) -> Option<u64> {
 
 /// Takes out the ended run, and drops the remaining bodies and values.
 pub fn take_run() -> Option<Run> {
+    // Out of the locks before anything is dropped: a drop is the app's code, and may take long.
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
     let mut parts: Vec<ClusterRun> = parts.collect();
     let (first, others) = parts.split_first_mut()?;

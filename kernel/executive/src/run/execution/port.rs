@@ -56,6 +56,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
         let ended_ns = self.on_clock(ended_ns);
         loan.budget_left_ns = match this_core::get().context().budget_end_ns() {
             u64::MAX => u64::MAX,
+            // 0 if the budget ran out while its alarm was pending: the next turn then ends at once.
             end_ns => end_ns.saturating_sub(ended_ns),
         };
     }
@@ -76,12 +77,15 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 
     fn take_letters(&mut self) -> Option<&lifecycle::Mailboxes> {
+        // Cleared before the letters are read: a letter sent meanwhile sets the flag again, and
+        // costs a step at worst. Cleared afterwards, the flag could hide that letter.
         self.cluster.has_letters.swap(false, Ordering::AcqRel);
         self.letters.as_deref()
     }
 
     #[inline]
     fn retarget(&mut self, core: CoreId) {
+        // This core needs no wake-up: it looks for its target once its own step is done.
         if core != here() {
             self.woken.insert(self.cluster.core(core));
         }
@@ -236,6 +240,7 @@ pub fn arm_next_event() {
 /// Sets the alarms of all clusters. Called on core 0, before a run.
 pub fn arm_all() {
     arm_next_event();
+    // Only the core itself can write its timer: the first cores arm theirs in `wake_interrupt`.
     for cluster in cluster::all().skip(1) {
         this_core::all()[cluster.core(FIRST_SEAT) as usize].wake_up();
     }

@@ -98,6 +98,7 @@ pub fn has_bound() -> bool {
 
 /// Looks briefly at a cluster's scheduler, if there is a run.
 pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+    // Before the lock: the cores visited meanwhile would only wait for its holder.
     time_slice::look_up();
     let mut place = cluster::nth(cluster).execution.lock();
     (place.as_mut()).map(|execution| look(&mut execution.engine.scheduler))
@@ -106,6 +107,7 @@ pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T)
 /// Looks at the journal of this core's cluster, if there is a journal and its lock is free. The
 /// journal counts cores from the second argument of `look`.
 pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
+    // A panic during the boot asks before any core has its data.
     let cluster = match this_core::is_ready() {
         true => cluster::cluster_of(this_core::get()),
         false => cluster::nth(0),
@@ -193,6 +195,8 @@ pub(super) fn clear(executions: &mut [ClusterRun]) {
         let engine = &mut executions[dag.cluster().index()].engine;
         *CLEARING.lock() = Some((Arc::clone(&task_set), id, clock::now_ns()));
         let of_dag = |lost: &mut RunnerLoan| lost.instance.dag == id;
+        // These bodies are forgotten, not dropped: a fault has left their functions in the middle
+        // of their work, and a destructor would run on whatever they left behind.
         let lost = engine.lost.extract_if(.., of_dag);
         lost.for_each(|lost| lost.give_back().inner.body.forget());
         for subtask in (0..).map(SubtaskId).take(dag.subtasks().len()) {

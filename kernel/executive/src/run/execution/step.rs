@@ -152,6 +152,8 @@ impl ClusterRun {
         let here = seat(core);
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
+        // The step's instant, not the clock: taking work decides nothing new, and a start stamps
+        // itself.
         let instant_ns = engine.scheduler.now_ns();
         match engine.next((instant_ns, here), &mut port) {
             NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => CoreWork::Run(runner),
@@ -180,11 +182,15 @@ impl ClusterRun {
     pub(super) fn follow(&mut self, interrupted: &mut Interrupted, now_ns: u64) -> Option<CoreId> {
         let core = this_core::get();
         let here = seat(core).index();
+        // The background is no instance, so the placement never suspends it: an assigned instance
+        // does.
         let is_background = core.context().is_background();
         let leaves_background = is_background && self.engine.placement.is_wanted(here);
         if !self.engine.placement.must_suspend(here) && !leaves_background {
             // Idle cores other than core 0 have no background context to leave: wake them.
             if self.engine.placement.is_wanted(here) {
+                // No `wake_up`: this core reads its own flag as soon as the handler returns and
+                // ends its halt.
                 core.wake.store(true, Ordering::Relaxed);
             }
             return None;
@@ -203,6 +209,8 @@ impl ClusterRun {
             // The hold, or the time slice, was the instance's.
             time_slice::leave(core);
             section::stop_waiting(core.context());
+            // The budget's alarm may stay: `end_overrun` looks at the budget of the context then
+            // running.
             timer::set(Alarm::Hold, u64::MAX);
         }
         let next = match self.engine.placement.take_suspended(here) {
@@ -286,6 +294,8 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     let mut woken = CoreSet::default();
     let (engine, mut port) = execution.parts(&mut woken);
     match engine.complete((here, vertex), finished, run_ns, is_alone, &mut port) {
+        // The short way concerns no other core, so nobody is to be woken, and the time slice goes
+        // on.
         NextAction::Run(successor) => return CoreWork::Run(successor),
         NextAction::Look {
             is_rescheduled: false,
@@ -294,10 +304,13 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
             is_rescheduled: true,
         } => execution.announce(&mut woken),
         NextAction::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
+            // None if the scheduler has taken the completion already, and only the rest is to be
+            // decided.
             ended.into_iter().for_each(|turn| moment.end_turn(turn));
         }),
     }
     let core = this_core::get();
+    // In the same critical section, so each completion takes the lock once.
     let work = execution.find_work(core);
     drop(place);
     woken.wake();
@@ -340,6 +353,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
         return;
     };
     let mut woken = CoreSet::default();
+    // Without an event this core only follows: another core's step has changed its target.
     if (is_event || cluster.may_have_letters()) && !execution.wake(now_ns, &mut woken) {
         execution.step(now_ns, &mut woken, |_| ());
     }
@@ -403,13 +417,14 @@ impl ClusterRun {
 pub fn raise(plan: u64, dag: DagId) {
     let were_enabled = interrupt_flag::disable();
     let core = this_core::get();
-    // A driver may, whichever instance its message has interrupted.
+    // A driver may raise signals, whichever instance its device's message has interrupted.
     let is_driver = core.follows.load(Ordering::Relaxed);
     let is_instance = !is_driver && status::running(core).is_some();
     if !is_instance {
         raise_in_interrupt(plan, dag);
     }
     interrupt_flag::restore(were_enabled);
+    // Only now: with interrupts enabled again, the panic is contained as the app's own.
     assert!(
         !is_instance,
         "a subtask raises a signal that it was not registered with; register it by \
