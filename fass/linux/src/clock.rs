@@ -91,6 +91,8 @@ impl Bases {
     /// Replaces the older base. Called by one thread at a time.
     fn put(&self, base: Base) {
         let made = self.made.load(Ordering::Relaxed) + 1;
+        // Pairs with the fence in `latest`: a reader of a word written below sees the number move
+        // on.
         fence(Ordering::Release);
         let words = [base.ticks, base.ns, base.rate];
         for (place, word) in self.places[(made & 1) as usize].iter().zip(words) {
@@ -128,9 +130,12 @@ fn renew(latest: Base, since: u64) -> u64 {
     if is_prompt
         && has_counter()
         && let Ok(mut rate) = RATE.try_lock()
+        // Another thread may have made a base since.
         && BASES.latest().0.ticks == latest.ticks
         && let Some(rate) = rate.learn(ticks, system_ns)
     {
+        // A base ahead of the system's clock runs slower by as much, though not below half the
+        // rate. The limit keeps the shift in 64 bits.
         let slower = ((ns - system_ns).min(1 << 20) << 32) / FRESH;
         let rate = rate - slower.min(rate / 2);
         BASES.put(Base { ticks, ns, rate });

@@ -69,6 +69,7 @@ impl Levels {
             sys::set_level(me, top)?;
             sys::set_normal(me)
         };
+        // In a thread of its own: the caller keeps its level, whatever comes of the probe.
         let answer = std::thread::spawn(probe).join();
         answer
             .expect("the probe does not panic")
@@ -82,6 +83,7 @@ impl Levels {
         // The probe has succeeded before, and a thread that has ended needs no level.
         let _ = match self {
             Self::Fifo(_) if rank == 0 => sys::set_normal(thread),
+            // `Release`, rank 4, has the top.
             Self::Fifo(top) => sys::set_level(thread, top - 4 + i32::from(rank)),
             Self::SchedExt(seats) => {
                 seats.put(thread, rank);
@@ -164,6 +166,7 @@ impl Seats {
         let Ok(number) = usize::try_from(thread.0) else {
             return;
         };
+        // The remainder keeps a number beyond the table off the owner's word.
         let (word, shift) = (&self.0[number / 4 % Self::OWNER], number % 4 * 8);
         // Another thread's byte in the same word may be changed at the same time.
         let _ = word.fetch_update(Ordering::AcqRel, Ordering::Relaxed, |word| {

@@ -93,6 +93,8 @@ impl<T> Lock<T> {
         if !self.is_wanted.load(Ordering::Acquire) {
             return self.guard(false);
         }
+        // Out again before waiting: the thread that wants the lock waits until the owner is
+        // outside.
         self.is_inside.store(false, Ordering::Release);
         self.take_word();
         self.guard(true)
@@ -151,6 +153,8 @@ impl<T> Lock<T> {
         let mut taken = TAKEN;
         loop {
             for _ in 0..looks {
+                // A look before each try: a failing exchange, too, would take the cache line from
+                // the holder.
                 if self.word.load(Ordering::Relaxed) == FREE && self.try_word(taken) {
                     return;
                 }
@@ -179,6 +183,7 @@ impl<T> Drop for Guard<'_, T> {
             return lock.is_inside.store(false, Ordering::Release);
         }
         if lock.is_owned {
+            // Before the word is given back: afterwards, this could undo the next thread's wish.
             lock.is_wanted.store(false, Ordering::Release);
         }
         if lock.polls {

@@ -66,6 +66,7 @@ impl LookOut {
             true => self.next_ns.store(next_ns, Ordering::Release),
             false => self.next_ns.store(next_ns, Ordering::SeqCst),
         }
+        // A claim was for the event before this one.
         self.claimed_until_ns.store(0, Ordering::Release);
     }
 

@@ -39,6 +39,7 @@ pub(crate) fn make_room(threads: usize) {
 /// Gives a thread up: nobody waits for its present section, and it enters no further one.
 pub(crate) fn give_up(thread: u32) {
     given_up().push(thread);
+    // All, as the waiting threads may want different locks.
     RELEASED.notify_all();
 }
 

@@ -142,6 +142,8 @@ impl Worker {
 
     /// Hands a watching worker the runner of an instance started for the worker.
     pub(crate) fn give(&self, runner: Box<SubtaskRunner>) {
+        // Before the call, which makes the worker look here. No wake-up: a watching worker is
+        // awake.
         *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(runner);
         self.call.store(1, Ordering::Release);
     }
@@ -164,6 +166,7 @@ impl Worker {
                 return self.watch(until_ns);
             }
             sys::wait(&self.call, 0, alarm_ns);
+            // After a call, the wake-up says nothing about the timer's delay.
             if let Some(alarm_ns) = alarm_ns
                 && self.call.load(Ordering::Relaxed) == 0
             {
@@ -186,6 +189,7 @@ impl Worker {
     /// so the caller sees other changes.
     fn poll(&self, until_ns: u64) -> bool {
         for _ in 0..PATIENCE {
+            // A load in each round, not a swap: a swap would take the cache line from the caller.
             if self.call.load(Ordering::Relaxed) != 0 {
                 return self.call.swap(0, Ordering::Acquire) != 0;
             }
@@ -218,6 +222,8 @@ impl Worker {
     /// itself. Reports whether the worker has raised itself; then it has to lower itself under the
     /// lock.
     pub(crate) fn report(&self, levels: Option<Levels>) -> bool {
+        // One exchange tells both sides: a demotion before it is seen here, a later one finds
+        // `REPORTS`.
         let was_demoted = self.mode.swap(REPORTS, Ordering::AcqRel) == DEMOTED;
         if was_demoted {
             self.bring(levels, Role::Report);

@@ -86,6 +86,7 @@ fn start(registers: Registers) -> Result<[LegacyRing; 2], Fault> {
     registers.write32(register::AUTO_CLEAR, RECEIVED);
     let queue = |first| LegacyRing::new(registers, first);
     let queues = [queue(register::RECEIVE)?, queue(register::TRANSMIT)?];
+    // Last: from now on the card reads the rings.
     registers.write32(register::RECEIVE_CONTROL, RECEIVE_ON);
     registers.write32(register::TRANSMIT_CONTROL, TRANSMIT_ON);
     Ok(queues)
@@ -145,6 +146,8 @@ impl Ring for LegacyRing {
         if is_filled && !self.given.is_multiple_of(BATCH) {
             return;
         }
+        // One less of the buffers to fill: all 64 are given, and a tail at the head means an empty
+        // ring.
         let tail = self.given.wrapping_sub(is_filled.into()) % RING;
         // The card may read the descriptors as soon as it sees the new tail.
         fence(Ordering::Release);

@@ -73,6 +73,8 @@ impl<R: Ring> Half<R> {
     /// Gives the card a buffer to be filled. A buffer that is too short kills the half.
     fn fill(&mut self, id: u16) {
         let bytes = self.buffers[usize::from(id)].whole();
+        // `receive` lets its caller swap buffers: the card would write beyond one that is too
+        // short.
         if bytes.len() < FILLED.into() {
             self.is_dead = true;
             return;

@@ -110,6 +110,7 @@ impl Interface {
             common.write32(common::CHOICE, features);
         }
         common.write8(common::STATUS, CHOSEN);
+        // A card that needs other features takes the bit back (3.1.1).
         if common.read8(common::STATUS) != CHOSEN {
             return Err(Fault::Lacks(
                 "way to do without its features; turn these off",
@@ -158,6 +159,7 @@ impl SplitRing {
         parts.for_each(|(register, part)| {
             tell_address(common, register, memory.address() + part as u64);
         });
+        // No message before one is asked for.
         memory.write16(GIVEN, 1);
         common.write16(common::QUEUE_ON, 1);
         Ok(Self {
@@ -224,6 +226,7 @@ impl Ring for SplitRing {
         fence(Ordering::Acquire);
         let element = self.memory.read64(self.place(DONE, 8, self.taken));
         let (id, end) = (element & 0xffff_ffff, element >> 32);
+        // The first comparison also guards the shift: the card may state any number.
         let is_out = id < 64 && self.out >> id & 1 == 1;
         // A descriptor not held by the card, or more than it was given? Then the ring ends.
         if !is_out || self.done() > self.given.wrapping_sub(self.taken) {

@@ -68,6 +68,7 @@ fn die(
     place: &dyn Display,
     registers: Option<&SavedRegisters>,
 ) -> ! {
+    // First of all: no preemption may move the report to another core, and no handler may join in.
     interrupt_flag::disable();
     let core = this_core::is_ready().then(this_core::get);
     let index = core.map_or(0, |core| core.index);
@@ -86,6 +87,7 @@ fn die(
         // Another core is reporting, and is about to stop this one.
         Err(_) => cpu::halt_forever(),
     }
+    // Before the cores have their data, no other core runs.
     if core.is_some() {
         non_maskable::stop_others();
     }
@@ -103,6 +105,7 @@ fn die(
     write_in_emergency(format_args!(
         "\nkernel {what} on core {index}\n  at {place}\n"
     ));
+    // Only now: formatting may fail, and by now core and place are told.
     let message = Excerpt::<MESSAGE_BYTES>::of(message);
     write_in_emergency(format_args!("  {message}\n"));
     if let Some(instance) = instance {

@@ -344,6 +344,7 @@ impl State {
         end_ns: u64,
         workers: &[Worker],
     ) -> NextAction<Box<SubtaskRunner>> {
+        // No hand-off while an end is left: only the longer way reports such ends.
         let is_alone = self.left.is_empty();
         let (engine, mut port) = self.parts(workers);
         let ended = (core, runner.vertex);
@@ -416,6 +417,7 @@ impl State {
                 self.suspend(core, workers);
             }
         }
+        // Only now: a core is wanted once it has lost its instance.
         for place in 0..self.engine.decisions().len() {
             self.call_if_wanted(self.engine.decisions()[place].core);
         }
@@ -532,6 +534,7 @@ impl State {
         now_ns: u64,
     ) -> Option<Box<SubtaskRunner>> {
         let Some(core) = self.seats[me] else {
+            // The worker has lost its core while its instance ran.
             self.spare.push(me);
             return None;
         };
@@ -550,7 +553,11 @@ impl State {
                 self.seats[me] = None;
                 self.spare.push(me);
                 self.seat(parked, core, workers);
+                // Pinned before it is raised: on its former processor it would compete with that
+                // core's worker.
                 workers[parked].promote(self.levels);
+                // Its function has returned, and it sleeps: it reports the end on the core it has
+                // now.
                 if self.has_left(parked) {
                     workers[parked].call();
                 }

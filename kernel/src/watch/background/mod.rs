@@ -174,6 +174,7 @@ impl Background {
         if let Some(listener) = &self.listener {
             listener.step();
         }
+        // A fold without a shortcut, unlike `any`: each endpoint gets its turn.
         let steps = CONNECTED.iter().map(|endpoint| endpoint.step());
         let has_more = steps.fold(false, |has_more, more| has_more | more);
         if !self.is_sliced {
@@ -189,6 +190,7 @@ impl Background {
         CONNECTED.iter().for_each(|endpoint| endpoint.end_run());
         tell_log(execution::task_set);
         containment::take_last_faults(containment::tell_fault);
+        // From now on the heartbeat takes no slice: the time since then saturates to 0.
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;
@@ -211,6 +213,7 @@ fn look_for_end() {
     /// The size of the port's FIFO.
     const MOST_BYTES: usize = 16;
     let is_watched = IS_WATCHED.load(Ordering::Relaxed);
+    // Lazy: where nobody watches for the end, no byte is taken from the console.
     let mut bytes = (0..MOST_BYTES).map_while(|_| serial::FIRST.receive());
     if is_watched && bytes.any(|byte| byte == END) {
         shut_down::<KernelRun>();

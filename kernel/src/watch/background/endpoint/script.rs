@@ -173,6 +173,7 @@ impl ScriptEndpoint {
         match entry.from {
             _ if !is_own || room.end > packet.whole().len() => {}
             None => {
+                // Before a signal is raised, which takes the scheduler's lock.
                 drop(playing);
                 arrive(&self.end, entry.bytes, now_ns);
             }

@@ -60,6 +60,7 @@ pub(super) fn step(end: &DeviceEnd) -> bool {
         return false;
     }
     if SECOND.is_ready() {
+        // A port that is ready has an empty FIFO, so these bytes fit without further questions.
         let bytes = core::iter::from_fn(|| end.depart()).take(FIFO_BYTES);
         bytes.for_each(|byte| SECOND.write(byte));
     }

@@ -346,8 +346,10 @@ impl Network {
         if now_ns < until_ns {
             return timer::set_no_later(core, Alarm::Heartbeat, until_ns);
         }
+        // Before the card may interrupt: `receive` takes any other value for a masked card.
         self.unmask_ns.store(u64::MAX, Ordering::Relaxed);
         let has_frames = self.receiver.lock().set_interrupt(true);
+        // No message comes about the frames received while the card was masked.
         if has_frames {
             self.receive(now_ns);
         }
@@ -372,6 +374,7 @@ impl Network {
                 if datagram.port == Client::PORT {
                     return sender.hear_server(frame, now_ns);
                 }
+                // Dropped before any protocol's lock is taken: that lock comes outside this one.
                 drop(sender);
                 let mut wires = self.wires.iter();
                 let heard = wires.find(|wire| wire.hears(datagram.port, datagram.from));
@@ -400,6 +403,7 @@ impl Network {
         }
         let has_gone = left < most;
         if has_gone {
+            // Once for all packets: each call may be a write to the card's registers.
             self.sender.lock().transmitter.ring();
             self.wires.iter().for_each(UdpWire::tell_gone);
         }
@@ -454,7 +458,7 @@ impl Endpoint for &'static Network {
         let is_up = self.is_linked.load(Ordering::Relaxed);
         PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
         self.is_run.store(true, Ordering::Relaxed);
-        // Frames may be there already, without any message for them.
+        // Due at once, by the bell: frames may be there already, without any message for them.
         self.unmask_ns.store(0, Ordering::Relaxed);
         if let (Some(bell), Some(core)) = (BELL.get(), this_core::all().get(core as usize)) {
             bell.ring(core);
@@ -473,12 +477,13 @@ impl Endpoint for &'static Network {
         drop(sender);
         let is_up = is_linked && has_address;
         if self.is_linked.swap(is_up, Ordering::Relaxed) != is_up {
+            // Behind a new link, or with a new address, other neighbours may answer.
             self.sender.lock().interface.forget_neighbours();
             self.wires.iter().for_each(|wire| wire.end.set_link(is_up));
             PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
         }
-        // Sends packets that found no room or no address, packets beyond a bell's limit, and
-        // packets due to a protocol's peer.
+        // Packets without room or address so far, beyond a bell's limit, or due to a protocol's
+        // peer. Not behind a message of DHCP: a heartbeat is charged for one packet.
         if !has_asked {
             self.send(1, now_ns);
         }
@@ -497,6 +502,7 @@ impl Endpoint for &'static Network {
         self.receiver.lock().set_interrupt(false);
         let send_rest = || while self.send(self.law.most, clock::now_ns()) {};
         send_rest();
+        // In between: closing leaves a goodbye to be sent, behind everything else.
         PROTOCOLS.iter().for_each(|place| place.close());
         send_rest();
     }
