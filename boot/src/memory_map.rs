@@ -84,6 +84,7 @@ impl MemoryMap {
         let ends = |region: &MemoryRegion| [region.start, region.end];
         while let Some(end) = told.iter().flat_map(ends).filter(|at| *at > start).min() {
             let here = told.iter().filter(|it| it.start <= start && start < it.end);
+            // Where ranges overlap, the reserved one counts: `false` is the smaller.
             if let Some(usable) = here.map(|region| region.usable).min() {
                 self.is_cut |= !self.push(MemoryRegion { start, end, usable });
             }

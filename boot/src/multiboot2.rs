@@ -70,6 +70,7 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
         tag::OLD_RSDP if memory.u8(start + REVISION) == Some(0) => {
             info.rsdp.get_or_insert(start);
         }
+        // The newer form counts, in whichever order the loader gives them.
         tag::NEW_RSDP => info.rsdp = Some(start),
         _ => {}
     }

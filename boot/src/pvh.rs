@@ -30,6 +30,7 @@ pub fn read(memory: &impl PhysicalMemory, address: u64, info: &mut BootInfo) -> 
         info.take_command_line(memory, start);
     }
     read_modules(memory, address, info);
+    // Version 0 ends before the fields of a memory map.
     if memory
         .u32(address + offset::VERSION)
         .is_some_and(|version| version >= 1)

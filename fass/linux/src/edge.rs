@@ -131,6 +131,7 @@ pub(crate) fn begin_run(
     let work = move || {
         begun.wait();
         for look in 0_u64.. {
+            // Asked before the data is sent: so a last round sends everything left by the run.
             let was_over = seen.load(Ordering::Acquire);
             let step = |drain: &mut Box<dyn Drain>| {
                 drain.step(unpoisoned(&FILE).as_mut().map(BootRecord::file))

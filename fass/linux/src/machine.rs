@@ -196,6 +196,8 @@ impl Linux {
             skips_idle: false,
             allocations: || 0,
         });
+        // `with` takes the lock, too. Its change is empty, for its effect: without levels it turns
+        // preemption off.
         drop(threads);
         Ok(Self { warnings: found }.with(|_| ()))
     }
@@ -580,6 +582,7 @@ fn receive(wire: &DeviceEnd, mut input: impl Read, has_ended: &AtomicBool) {
 fn send(wire: &DeviceEnd, mut output: impl Write, has_ended: &AtomicBool) {
     let mut bytes = Vec::new();
     loop {
+        // Asked before the bytes are taken: those sent before the end are all found below.
         let is_last = has_ended.load(Ordering::Acquire);
         bytes.extend(std::iter::from_fn(|| wire.depart()));
         if bytes.is_empty() {

@@ -95,6 +95,7 @@ impl Office {
     /// could lose its core while holding the lock.
     pub(crate) fn send(&self, from: Option<ClusterId>, request: Request) -> bool {
         self.letters.send(from, request, |cluster| {
+            // Before the letter: settled without a reason of its own, it could end the run early.
             self.reasons.fetch_add(1, Ordering::AcqRel);
             let letters = &self.doors[cluster.index()].letters;
             letters.fetch_add(1, Ordering::AcqRel);
@@ -106,6 +107,8 @@ impl Office {
     /// reasons to go on.
     pub(crate) fn open(&self, cluster: ClusterId) -> u64 {
         let letters = &self.doors[cluster.index()].letters;
+        // A load first: mostly there are none, and a swap would take the cache line from the
+        // senders.
         match letters.load(Ordering::Relaxed) {
             0 => 0,
             _ => letters.swap(0, Ordering::AcqRel),

@@ -83,6 +83,7 @@ impl Platform for Host {
         if how == Occupation::Hold && with_own_worker(|worker| worker.hold(ns)).is_some() {
             return;
         }
+        // Processor time, not the clock: the time of a preemption is no execution.
         let end_ns = sys::own_processor_time_ns().saturating_add(ns);
         while sys::own_processor_time_ns() < end_ns {
             std::hint::spin_loop();
@@ -146,6 +147,7 @@ impl Platform for Host {
         let mut file = unpoisoned(&FILE).take();
         let is_launched = at_edge::launch(self, &mut plan, file.as_mut());
         *unpoisoned(&FILE) = file;
+        // Only now, so that the file is back even if the launch is refused.
         is_launched?;
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
@@ -253,6 +255,7 @@ impl Deref for Run {
 /// results. Releases count from `epoch_ns`, or from 1 ms after the threads are ready.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
+    // Giving a thread up must not allocate in the run.
     section::make_room(teams.iter().map(|team| team.workers.len()).sum());
     let workers = teams.iter().map(|team| {
         let numbers = 0..team.lock().later.start;
@@ -269,6 +272,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     }
     let epoch_ns = epoch_ns.unwrap_or_else(|| clock::now_ns() + LEAD_NS);
     let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
+    // Counted from here: beginning the threads has allocated.
     let allocations = (threads.allocations)();
     teams.iter().for_each(|team| team.begin(epoch_ns));
     office.wait_until_over();
@@ -290,6 +294,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
         counts.preemptions += state.preemptions;
         faults.append(&mut state.faults);
     }
+    // Before the threads are joined: on their way out, workers may still take the lock.
     drop(states);
     for (workers, abandoned) in workers.into_iter().zip(abandoned) {
         for (number, thread) in workers.into_iter().enumerate() {

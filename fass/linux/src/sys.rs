@@ -207,6 +207,7 @@ pub(crate) fn pinned_table(place: &CStr, bytes: usize) -> io::Result<&'static [A
     let none = std::ptr::null_mut();
     // SAFETY: the kernel chooses an unused address, and refuses more bytes than the table has.
     let table = unsafe { mmap(none, bytes, READ_AND_WRITE, SHARED, file.as_raw_fd(), 0) };
+    // `MAP_FAILED` is all ones, not null.
     if table.addr() == usize::MAX {
         return Err(io::Error::last_os_error());
     }
@@ -223,6 +224,7 @@ impl Arrivals {
     pub(crate) fn of(file: &impl AsFd) -> io::Result<Self> {
         const CLOSE_ON_EXEC: i32 = 0o200_0000;
         const ADD: i32 = 1;
+        // Edge-triggered (EPOLLET): input not read yet must not count again and again.
         const INPUT_ARRIVES: u32 = 1 | 1 << 31;
         // SAFETY: the call takes flags.
         let epoll = unsafe { epoll_create1(CLOSE_ON_EXEC) };

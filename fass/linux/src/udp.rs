@@ -152,6 +152,7 @@ fn connect(
         last: Mutex::new(None),
         has_ended: AtomicBool::new(false),
     });
+    // Held until the place is in: two connections must not both begin the sending thread.
     let mut places = unpoisoned(&PLACES);
     if SENDER.get().is_none() {
         let sender = thread::Builder::new().name("fass-udp".into()).spawn(send)?;
@@ -274,6 +275,8 @@ impl UdpConnection {
         };
         let place = &self.place;
         let mut places = unpoisoned(&PLACES);
+        // Under the lock that the sending thread holds while it sends: from here on, only this
+        // thread sends for the place.
         places.retain(|other| !Arc::ptr_eq(other, place));
         place.send();
         if let Some(protocol) = &place.protocol {
@@ -283,6 +286,7 @@ impl UdpConnection {
         drop(places);
         place.set_link(false);
         place.has_ended.store(true, Ordering::Release);
+        // Wakes the receiver, which then sees the end.
         let _ = (place.socket).send_to(&[], (Ipv4Addr::LOCALHOST, self.port()));
         // After the join the port is free. The thread does not panic.
         let _ = receiver.join();

@@ -215,6 +215,7 @@ impl Worker {
 
     /// Notes that the worker runs an instance from now on. Called under the lock.
     pub(crate) fn run(&self) {
+        // Relaxed: a demotion comes under the same lock, and so after this.
         self.mode.store(RUNS, Ordering::Relaxed);
     }
 

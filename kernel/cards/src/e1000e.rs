@@ -155,6 +155,7 @@ impl Ring for LegacyRing {
     }
 
     fn is_done(&self) -> bool {
+        // A descriptor that the card was not given still shows the state of its last use.
         self.taken != self.given && self.memory.read32(self.next() + STATE) & DONE != 0
     }
 

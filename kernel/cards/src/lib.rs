@@ -130,6 +130,7 @@ fn open_by(function: &Function<'_>, map: Map<'_>) -> Option<Result<Card, CardErr
 
 /// Makes a card from its address and its rings.
 fn card<R: Ring>(mac: [u8; 6], [receive, transmit]: [R; 2]) -> Result<Card, Fault> {
+    // The lowest bit marks the address of a group.
     let is_one = mac[0] & 1 == 0 && mac != [0; 6];
     let lacks = Fault::Lacks("address of one card; give it one");
     let mac = is_one.then_some(Mac(mac)).ok_or(lacks)?;

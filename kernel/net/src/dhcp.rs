@@ -112,6 +112,7 @@ impl Client {
         self.write(payload);
         self.due_ns = now_ns.saturating_add(self.patience_ns);
         if let State::Bound { end_ns, .. } = self.state {
+            // At the end of the lease the address has to go, however patient the client is.
             self.due_ns = self.due_ns.min(end_ns);
         }
         self.patience_ns = (2 * self.patience_ns).min(64 * NS_PER_S);
@@ -120,6 +121,7 @@ impl Client {
 
     fn begin(&mut self, now_ns: u64) {
         self.enter(State::Discovering, now_ns);
+        // Late answers to the former search are then another client's.
         self.transaction = self.transaction.wrapping_add(1);
     }
 
@@ -178,6 +180,7 @@ impl Client {
                 };
                 let end_ns = now_ns.saturating_add(length_ns);
                 let before = self.lease();
+                // T1 of RFC 2131, 4.4.5.
                 let renewal_ns = now_ns.saturating_add(length_ns / 2);
                 self.enter(State::Bound { lease, end_ns }, renewal_ns);
                 before != Some(lease)

@@ -288,6 +288,7 @@ impl<B: AsMut<[u8]>> Interface<B> {
         let addresses = (self.address.ip, ip);
         let header = HEADERS - udp::LENGTH;
         udp::write(&mut frame[header..], (port, to_port), addresses);
+        // Whatever the route: a kept frame lacks nothing but its neighbour's address.
         self.write_ipv4(frame, ipv4::UDP, ip);
         if self.address.is_for_all(ip) {
             self.write_ethernet(frame, Mac::BROADCAST, TYPE_IPV4);

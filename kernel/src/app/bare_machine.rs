@@ -81,6 +81,7 @@ impl System for BareMachine {
         let mut background = Background::begin(self.wishes, input.and_then(Signal::target), total);
         // Forget sections measured while booting and printing: only the run counts.
         let _ = interrupts_off::take_longest();
+        // `|`, not `||`: each gets its turn in each round.
         worker::wait_in_background(|| record::step(&mut outgoing) | background.step());
         self.is_shut_down.set(background.end());
         let longest = interrupts_off::take_longest();
@@ -91,6 +92,7 @@ impl System for BareMachine {
             // The cut has most likely removed the end of a line.
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
+        // Before the run is taken out, and with it the journals.
         record::end_recording(outgoing, !self.is_shut_down());
         let run = execution::take_run().ok_or_else(nothing)?;
         let run = run.with_counts(RunCounts {

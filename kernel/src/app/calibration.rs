@@ -90,6 +90,7 @@ pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
 fn run() -> Result<MeasuredCosts, AppError> {
     KERNEL.set_calibration(true);
     let committed = finish_create_dags_with(&dags(), ConstructionPolicy::any_graph());
+    // Before the error is returned: the commits to come are the app's in any case.
     KERNEL.set_calibration(false);
     committed?;
     let failure =

@@ -73,6 +73,8 @@ impl Event {
         for (word, first) in self.waiting.iter().zip((0..).step_by(64)) {
             let mut left = word.swap(0, Ordering::SeqCst);
             while left != 0 {
+                // For one waiter at a time: `wake_up` must stay on one core, and no section be
+                // long.
                 let were_enabled = interrupt_flag::disable();
                 let core = &this_core::all()[first + left.trailing_zeros() as usize];
                 // A core may have gone on to another context by now; leave that undisturbed.

@@ -48,6 +48,7 @@ const HANDLER_STACK: u64 = 16 * 1024;
 /// has no guard page.
 #[allow(clippy::too_many_lines, reason = "it states the order of the steps")]
 pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! {
+    // First of all: any later step may have something to report.
     serial::FIRST.initialize();
     // From now on, the port's FIFO holds bytes that arrive for an app's wire.
     serial::SECOND.initialize();
@@ -58,6 +59,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     if is_early {
         show_text(info, &screen);
     }
+    // Before anything that may panic: a panic, too, ends the machine in this way.
     match info.value("end") {
         Some("off") => power::set_end(PowerAction::Off),
         Some("reset") => power::set_end(PowerAction::Reset),
@@ -226,6 +228,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
         interrupt_flag::stay_awake();
     }
     interrupt_flag::enable();
+    // The probe's timer handler takes no heartbeats: a due one would interrupt again and again.
     if !*probes {
         heartbeat::set_heartbeats(0);
     }
@@ -351,6 +354,7 @@ fn run_app(
         .map_err(|_| usage("the command line is not UTF-8"))?;
     let options = CommandLine::parse(line)?;
     let settings = settings::apply(&options, processors)?;
+    // In the order of the module's parts: WCETs, a recording, the app's own bytes.
     let (wcets, module) = terms::split_wcets(&options, module_bytes(info))?;
     KERNEL.change(|terms| terms.wcets = wcets.map(Cow::Borrowed));
     let module = settings::set_wish(&options, name, module)?;

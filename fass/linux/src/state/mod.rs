@@ -479,6 +479,7 @@ impl State {
     /// the workers need not look at the state.
     pub(crate) fn give(&mut self, workers: &[Worker]) {
         let now_ns = self.engine.scheduler.now_ns();
+        // What stays is called as ever: only watching workers are served here.
         let mut called = std::mem::take(&mut self.called);
         called.retain(|core| {
             let number = self.port.active[core.index()];
@@ -640,6 +641,7 @@ impl State {
         while let Some(place) = (self.left.iter()).position(|left| is_due(self, left.worker)) {
             let left = self.left.remove(place);
             self.end_parked(left.worker, left.runner, left.finish_ns, workers);
+            // Spare only after the step, as the module's head counts the workers.
             self.spare.push(left.worker);
         }
     }

@@ -48,6 +48,7 @@ pub fn is_behind() -> bool {
 /// Takes a cell for [`draw`], unless another core draws.
 #[inline(never)]
 pub fn take_cell() -> Option<(usize, u8)> {
+    // One core draws at a time: of two letters for a cell, the later one must stay.
     if IS_DRAWING.swap(true, Ordering::Acquire) {
         return None;
     }

@@ -60,6 +60,7 @@ fn is_in_section(context: &Context) -> bool {
 /// Enters a section, or queues the core for its turn. Interrupts are disabled. Reports whether the
 /// section was entered.
 fn enter(lock: &LockWords, core: &Core) -> bool {
+    // Counted from 1, as the turn in the lock's word is: 0 is no core.
     let here = core.index + 1;
     let state = lock.state.load(Relaxed);
     let turn = state >> 1;
@@ -100,6 +101,7 @@ fn release(lock: &LockWords, here: u32) {
     let mut others = (here + 1..cores).chain(0..here);
     let next = others.find(|&core| waits(lock, core));
     let turn = next.map_or(0, |core| core + 1);
+    // One store for both: were the lock free before its turn is known, any core could enter.
     lock.state.store(turn << 1, Release);
 }
 

@@ -13,6 +13,7 @@ impl Core {
         // up, or the caller sees here that the core does not watch yet.
         self.wake.store(true, Ordering::SeqCst);
         if self.index != this_core::get().index && !self.watches.load(Ordering::SeqCst) {
+            // No slice may begin before the woken core has had the chance to become fresh.
             time_slice::begin_urgent();
             local_apic::send(self.apic_id(), vector::WAKE);
             time_slice::end_urgent();

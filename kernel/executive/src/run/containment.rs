@@ -114,6 +114,7 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
     let context = core.context();
     interrupt_flag::enable();
     keep_panic((instance, context), info, CodeLocation::here());
+    // By an interrupt: only its handler, on another stack, can leave this context for good.
     cpu::ask_for_end();
 }
 

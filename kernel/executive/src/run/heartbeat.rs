@@ -48,6 +48,7 @@ pub fn set_own_heartbeat(period_ns: u64) {
 
 /// Begins the core's heartbeat if the core has a period and no alarm set yet.
 pub fn keep_beating(core: &Core) {
+    // Each wake-up comes here: setting the alarm anew would put the heartbeat off for ever.
     if !timer::is_set(Alarm::Heartbeat) {
         beat(core, clock::now_ns());
     }

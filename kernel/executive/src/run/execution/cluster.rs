@@ -105,6 +105,7 @@ pub(super) fn are_divided() -> bool {
 pub(super) fn nth(number: usize) -> &'static ClusterState {
     match number {
         0 => &FIRST,
+        // Out of line: undivided cores, the usual case, pay a comparison only.
         _ => another(number),
     }
 }

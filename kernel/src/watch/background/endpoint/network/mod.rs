@@ -178,6 +178,7 @@ pub(super) fn open(
     };
     let card = card.map_err(|why| AppError::Failure(format!("{why}")))?;
     let message = card.message;
+    // Before any line is tied: its handler finds the network here.
     NETWORK.set(Network::new(card, address, law));
     let network = NETWORK.get();
     let network = network.ok_or_else(|| failure(who, "finds the network being opened"))?;
@@ -311,6 +312,7 @@ impl Network {
         }
         let until_ns = now_ns.saturating_add(self.law.distance_ns);
         self.unmask_ns.store(until_ns, Ordering::Relaxed);
+        // The heartbeat looks at the clock before it unmasks, so its alarm may come early.
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, until_ns);
         let mut receiver = self.receiver.lock();
         receiver.set_interrupt(false);
@@ -457,6 +459,7 @@ impl Endpoint for &'static Network {
         self.core.store(core, Ordering::Relaxed);
         let is_up = self.is_linked.load(Ordering::Relaxed);
         PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
+        // Before the card may interrupt: outside a run, `receive` takes no frame.
         self.is_run.store(true, Ordering::Relaxed);
         // Due at once, by the bell: frames may be there already, without any message for them.
         self.unmask_ns.store(0, Ordering::Relaxed);

@@ -94,6 +94,7 @@ pub(crate) fn connect(
     let heard_ns = most * MESSAGES * (MESSAGE_NS + topics * TOPIC_NS) + COPIED_NS;
     let released_ns = topics.saturating_sub(1) * WIRE_NS;
     let put_ns = PUT_NS + topics * TOPIC_NS;
+    // Charged before it gets its place: a refused charge leaves no protocol behind.
     (network.law).charge_more(heard_ns + put_ns + released_ns, most * put_ns)?;
     PROTOCOLS.add(Box::new(ProtocolPlace {
         protocol: SpinLock::new(protocol),

@@ -60,6 +60,7 @@ impl UdpWire {
 
     /// Takes a datagram whose payload is the buffer's content.
     pub(super) fn take(&self, payload: &mut Buffer, from: Peer, now_ns: u64) {
+        // In one word, so that a reader never gets one sender's address with another's port.
         let bits = u64::from(from.ip().to_bits()) << 16 | u64::from(from.port());
         self.last.store(bits, Ordering::Relaxed);
         if self.end.swap_in(payload, from, now_ns) {
