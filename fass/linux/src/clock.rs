@@ -80,7 +80,7 @@ impl Bases {
             let place = &self.places[(made & 1) as usize];
             let [ticks, ns, rate] = [0, 1, 2].map(|word| place[word].load(Ordering::Relaxed));
             let since = counter().wrapping_sub(ticks);
-            // If any word belongs to a later base, so does the number.
+            // If any word is of a later base, the number has moved on, too.
             fence(Ordering::Acquire);
             if self.made.load(Ordering::Relaxed) == made {
                 return (Base { ticks, ns, rate }, since);
@@ -117,14 +117,14 @@ pub(crate) fn now_ns() -> u64 {
 #[inline(never)]
 fn renew(latest: Base, since: u64) -> u64 {
     static RATE: Mutex<Rate> = Mutex::new(Rate(Base::NONE));
-    // The counter was read before the load of a base made just then.
+    // A negative age: the base was made while this thread was about to read the counter.
     if since > FRESH.wrapping_neg() && latest.rate > 0 {
         return latest.ns;
     }
     let ticks = counter();
     let system_ns = sys::monotonic_ns();
     let is_prompt = counter().wrapping_sub(ticks) < PROMPT;
-    // No reading of the latest base was above this.
+    // Time never goes back: by the latest base, no thread has read more than this.
     let ns = system_ns.max(latest.after(FRESH));
     // A slow system call blurs the instant of its reading, so no base is made of that.
     if is_prompt

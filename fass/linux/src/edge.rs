@@ -152,7 +152,7 @@ pub(crate) fn begin_run(
     };
     let thread = thread::Builder::new().name("fass-recording".into());
     let thread = thread.spawn(work).expect("the system has a thread to send");
-    // By now the thread has allocated its memory.
+    // Until the thread has allocated its memory: the count of the run's allocations begins later.
     has_begun.wait();
     Some(Sending { is_over, thread })
 }

@@ -78,7 +78,7 @@ impl Levels {
 
     /// Brings a thread to its role's level.
     pub(crate) fn bring(self, thread: ThreadId, role: Role) {
-        // Its place above the threads without a level.
+        // 0 for threads without a level.
         let rank = role as u8;
         // The probe has succeeded before, and a thread that has ended needs no level.
         let _ = match self {

@@ -87,7 +87,8 @@ impl<T> Lock<T> {
     #[inline]
     pub(crate) fn enter_as_owner(&self) -> Guard<'_, T> {
         self.is_inside.store(true, Ordering::Relaxed);
-        // The processor may still look first; the other thread's barrier prevents harm.
+        // For the compiler alone. The processor may still load first: that is what the other
+        // thread's barrier is for.
         compiler_fence(Ordering::SeqCst);
         // Acquires the writes of a thread that wanted the lock.
         if !self.is_wanted.load(Ordering::Acquire) {

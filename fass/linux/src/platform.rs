@@ -116,7 +116,7 @@ impl Platform for Host {
 
     fn is_in_run(&self) -> bool {
         let launched = self.launched.lock();
-        // After the commit the run is still to come.
+        // While a plan is still to be taken, its run is to come.
         control::latest().is_some() && launched.is_ok_and(|launched| launched.is_none())
     }
 

@@ -236,7 +236,7 @@ impl Team {
                 Woken::ByTime => {
                     let mut state = self.lock_as(me);
                     let core = state.seats[me];
-                    // The other cores' workers may still sleep.
+                    // This core first: the workers of other idle cores may still sleep.
                     state.step(&self.workers, |moment| {
                         core.into_iter().for_each(|core| moment.prefer(core));
                     });
@@ -651,7 +651,7 @@ impl Team {
         let opened = std::mem::take(&mut state.port.opened);
         if !self.office.settle(rests, is_finished, opened) {
             if is_finished {
-                // This cluster rests.
+                // `announce` has said that all is over; so far only this cluster rests.
                 self.look_out.announce(u64::MAX);
             }
             return Some(look_ns);

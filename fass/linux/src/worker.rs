@@ -246,7 +246,7 @@ impl Worker {
         }
         self.bring(levels, role);
         if self.mode.load(Ordering::Acquire) != DEMOTED {
-            // The worker has raised itself, perhaps before we lowered it.
+            // The worker has raised itself, perhaps before it was lowered here.
             self.bring(levels, Role::Report);
         }
         self.tell_holder();
@@ -282,7 +282,7 @@ impl Worker {
     pub(crate) fn hold(&self, mut left_ns: u64) {
         self.holds.store(true, Ordering::SeqCst);
         while left_ns > 0 {
-            // Where workers are never demoted, nobody maintains the mode.
+            // The mode need not be `RUNS`: where workers are never demoted, nobody maintains it.
             let mode = self.mode.load(Ordering::SeqCst);
             if mode == DEMOTED {
                 sys::wait(&self.mode, DEMOTED, None);

@@ -135,7 +135,7 @@ impl Ring for LegacyRing {
     fn post(&mut self, id: u16, address: u64, length: u16) {
         let place = DESCRIPTOR * usize::from(id);
         self.memory.write64(place, address);
-        // The state, in the word's upper half, becomes 0.
+        // Clears the state, too, in the word's upper half: `is_done` must not see the last use's.
         let word = u64::from(SEND | u32::from(length));
         self.memory.write64(place + LENGTH, word);
         self.given = self.given.wrapping_add(1);

@@ -113,8 +113,8 @@ impl<R: Ring> Receive for Half<R> {
     fn set_interrupt(&mut self, is_on: bool) -> bool {
         // A dead half takes no frame, so its messages would never end.
         self.ring.set_interrupt(is_on && !self.is_dead);
-        // This sees everything the card had done before the fence; the card's message tells about
-        // the rest.
+        // After the fence: frames finished before messages were on are seen here, later ones bring
+        // a message.
         fence(Ordering::SeqCst);
         self.is_done()
     }

@@ -211,7 +211,7 @@ impl Ring for SplitRing {
         // The index must be visible before the flag is read: otherwise the card could go to sleep
         // without a call.
         fence(Ordering::SeqCst);
-        // The card may not want to be called.
+        // A card that looks at the ring anyway asks not to be called.
         if self.memory.read16(DONE) & 1 == 0 {
             self.bell.write16(0, self.number);
         }
@@ -228,7 +228,8 @@ impl Ring for SplitRing {
         let (id, end) = (element & 0xffff_ffff, element >> 32);
         // The first comparison also guards the shift: the card may state any number.
         let is_out = id < 64 && self.out >> id & 1 == 1;
-        // A descriptor not held by the card, or more than it was given? Then the ring ends.
+        // A card that returns a descriptor it does not hold, or more than it was given, is not
+        // trusted any more: the ring ends.
         if !is_out || self.done() > self.given.wrapping_sub(self.taken) {
             return None;
         }

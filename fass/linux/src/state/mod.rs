@@ -513,7 +513,7 @@ impl State {
         let (active, placement) = (&self.port.active, &self.engine.placement);
         let left = self.called.len().saturating_sub(most);
         let called = self.called.drain(left..);
-        // The thread making the step has looked already.
+        // The thread that made the step may have taken its own core's work already.
         let called = called.filter(|core| placement.is_wanted(core.index()));
         let calls = &mut self.calls;
         called

@@ -179,7 +179,7 @@ impl Line {
             let sent = sent.and_then(|function| function.send(self.number, message));
             return sent.map(drop).map_err(LineError::Function);
         };
-        // Masked while its parts do not match each other.
+        // Masked meanwhile: between the writes, address and data belong to different messages.
         table.write32(offset + 12, 1);
         table.write32(offset, message.address);
         table.write32(offset + 4, 0);

@@ -295,7 +295,7 @@ impl<'c> Function<'c> {
         }
         let data = if is_wide { at + 12 } else { at + 8 };
         self.write(data, self.read(data) & !0xffff | u32::from(message.data));
-        // On, with a single message out of those the function could send.
+        // Turned on for a single message, however many the function could send.
         self.write(at, control & !(7 << 20) | 1 << 16);
         Ok(None)
     }
@@ -312,7 +312,7 @@ impl<'c> Function<'c> {
         if u32::from(number) >= count || offset + 16 > range.end - range.start {
             return Err(PciError::MalformedTable);
         }
-        // Each entry stays masked by itself until written.
+        // Turned on as a whole: each entry stays masked by itself until it is written.
         self.write(at, control & !MASKED | ON);
         Ok(MessageEntry { bar, offset })
     }

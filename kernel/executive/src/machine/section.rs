@@ -158,7 +158,8 @@ pub fn puts_off(core: &Core, now_ns: u64) -> bool {
     };
     let end_ns = first_ns.saturating_add(LONGEST_NS);
     if now_ns < end_ns {
-        // Any alarm whose handler looks at the clock again will do.
+        // The budget's alarm will do: its handler looks at the clock again, and the timer's
+        // interrupt then retries every postponed preemption.
         timer::set_no_later(core, Alarm::Budget, end_ns);
     }
     now_ns < end_ns

@@ -348,7 +348,7 @@ fn length_of_slice(core: &Core) -> Option<u64> {
 fn set_part(core: &Core, part: TimeSlicePart) {
     let before = core.part();
     if before == TimeSlicePart::Computes && part != TimeSlicePart::Computes {
-        // Unless another core has taken over the slice.
+        // Fails, as it should, if another core has taken over the slice.
         let (mine, order) = (core.index, Ordering::Relaxed);
         let _ = SLICE_HOLDER.compare_exchange(mine, NONE, order, order);
     }

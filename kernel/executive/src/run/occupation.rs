@@ -59,8 +59,8 @@ impl ExecutionTimer {
     }
 
     fn ns(&self) -> u64 {
-        // The clock first: a suspension in between then counts too much in the next line, corrected
-        // by the next reading, and not too little, as execution.
+        // The clock first: a suspension between the readings then makes this result too small,
+        // until the next reading. In the other order it would count as execution.
         let elapsed_ns = clock::now_ns().saturating_sub(self.start_ns);
         let suspended_ns = self.context.suspended_ns() - self.suspended_before_ns;
         elapsed_ns.saturating_sub(suspended_ns)

@@ -79,7 +79,8 @@ impl RunnerTable {
         _left: &AbandonedContext,
     ) -> Option<RunnerLoan> {
         let vertex = placement.lose(core)?;
-        // By the loan invariant the other loan lies on the stack that nothing runs on any more.
+        // The other loan lies on a stack that nothing runs on any more, and is never used (loan
+        // invariant).
         self.0[vertex.index()].map(RunnerLoan)
     }
 }

@@ -171,7 +171,8 @@ pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: 
     // Outside the lock, so that no woken core finds the lock taken by this one.
     drop(place);
     woken.wake();
-    // The step may want this core, too, which follows at its next interrupt.
+    // The step may want this core, too, which can switch in an interrupt only: an alarm due at once
+    // makes one.
     if !this_core::get().follows.load(Ordering::Relaxed) {
         timer::set(Alarm::Schedule, clock::now_ns());
     }

@@ -197,7 +197,8 @@ impl ClusterRun {
         }
         let suspended = self.engine.placement.detach(here);
         if let Some(vertex) = suspended {
-            // Not the interrupt's time: its step has left events since then.
+            // Not the interrupt's time: its step has written later events, and the journal keeps
+            // order.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.engine.scheduler.instance_of(vertex);
             self.engine.scheduler.log.journal.write(
@@ -327,8 +328,8 @@ pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     let here = seat(core);
     let placement = &mut execution.engine.placement;
     let lost = (execution.loans).recover(placement, here.index(), left)?;
-    // Not the interrupt's time: a step may have left events since then. Nor may later events
-    // precede this one.
+    // Not the interrupt's time: a step may have written events since then, and a later event must
+    // not come before this one.
     let clock_ns = clock::now_ns();
     let ended_ns = since_epoch(clock_ns);
     note_running(core, None);

@@ -199,7 +199,7 @@ impl ScriptEndpoint {
             line.clear();
             gone = 0;
             let has_gone = self.end.swap_out(|packet, to| {
-                // Writing to a text succeeds.
+                // Writing to a `String` cannot fail.
                 let _ = write!(line, "wire.{} ", self.end.wire().name());
                 let _ = to.map(|to| write!(line, "{to} "));
                 let _ = writeln!(line, "\"{}\"", packet.content().escape_ascii());

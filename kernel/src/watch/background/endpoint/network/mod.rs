@@ -237,7 +237,7 @@ impl DeviceLine for CardLine {
 impl DeviceLine for SendLine {
     fn interrupt(&self, now_ns: u64) {
         if let Some(network) = NETWORK.get() {
-            // At the beginning of a run there may be frames already.
+            // A run begins by this bell, which unmasks the card: frames may be there already.
             network.unmask(this_core::get(), now_ns);
             network.send(network.law.most, now_ns);
         }
@@ -306,7 +306,7 @@ impl Network {
 
     /// Takes the frames of an interrupt, and masks the card until the next one.
     fn receive(&self, now_ns: u64) {
-        // The interrupt was on its way when the card was masked, or the run ended.
+        // The interrupt was on its way when the card was masked.
         if self.unmask_ns.load(Ordering::Relaxed) != u64::MAX {
             return;
         }

@@ -73,7 +73,7 @@ impl UdpWire {
     pub(super) fn send(&self, mut send: impl FnMut(&mut Buffer, u16, Peer) -> Sent) -> bool {
         let has_gone = self.end.swap_out(|packet, to| {
             let Some(to) = to.or(self.peer).or_else(|| self.last()) else {
-                // Nobody has sent anything yet, so the packet has no receiver.
+                // Nobody has sent anything yet, so the packet has no receiver, and is dropped.
                 return true;
             };
             with_headers(packet, |packet| send(packet, self.port, to))
