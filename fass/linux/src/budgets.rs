@@ -59,6 +59,8 @@ impl Budgets {
         if self.shortest_ns == u64::MAX {
             return Ok(u64::MAX);
         }
+        // An instance may start right after this look: the next one comes within the shortest
+        // budget.
         let mut next_ns = now_ns.saturating_add(self.shortest_ns);
         for (core, seen) in (0..).map(CoreId).zip(&mut self.seen) {
             let Some(vertex) = state.engine.placement.current(core.index()) else {

@@ -55,6 +55,7 @@ pub(crate) fn note_place(place: &Location<'_>) {
 /// Takes the place at which an instance of this thread has panicked, if there is one.
 pub(crate) fn place_of(instance: Instance) -> Option<String> {
     let (panicked, place) = PANICKED.take()?;
+    // A panic caught by the app itself may have left the place of an earlier instance.
     (panicked == instance).then_some(place)
 }
 

@@ -76,6 +76,7 @@ impl LookOut {
         let until_ns = now_ns.saturating_add(PATIENCE_NS);
         let (won, lost) = (Ordering::AcqRel, Ordering::Relaxed);
         let word = &self.claimed_until_ns;
+        // An older claim counts for a while only: its thread may have lost its processor.
         before_ns <= now_ns
             && word
                 .compare_exchange(before_ns, until_ns, won, lost)
@@ -91,6 +92,7 @@ impl LookOut {
     /// Marks a core as idle: its worker has nothing to do. Called under the scheduler's lock.
     pub(crate) fn rest(&self, core: CoreId) {
         if let Some(bit) = bit(core) {
+            // Relaxed: a thread that sees an older state looks a little early or late, no more.
             self.idle.fetch_or(bit, Ordering::Relaxed);
             self.last.store(core.0, Ordering::Relaxed);
         }
@@ -138,6 +140,7 @@ impl LookOut {
         // At the end of the run the release thread has to look in any case.
         let is_needed = !self.polls || next_ns == 0;
         let latest_ns = next_ns.saturating_add(2 * PATIENCE_NS);
+        // In one order with `announce` and `Team::settle_look`, which store first and then read.
         is_needed && latest_ns < looks_at_ns.load(Ordering::SeqCst)
     }
 }

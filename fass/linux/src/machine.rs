@@ -161,6 +161,7 @@ impl Linux {
 
     /// Makes a machine with one core for each entry of `processors`.
     fn on(processors: Vec<u32>, mechanism: Mechanism) -> Result<Self, StartError> {
+        // Levels first: where they are refused, nothing has been installed yet.
         let (mut levels, mut found) = (None, Vec::new());
         match mechanism {
             Mechanism::Fifo => match Levels::of_fifo(USUAL_TOP) {
@@ -176,6 +177,7 @@ impl Linux {
             let is_throttled = mechanism == Mechanism::Fifo;
             found.extend(look(&processors, is_throttled));
         }
+        // Once a program: a machine made after another was dropped finds the platform installed.
         static IS_OURS: OnceLock<bool> = OnceLock::new();
         assert!(
             IS_OURS.get_or_init(|| fass::platform::install(&HOST).is_ok()),

@@ -38,6 +38,7 @@ pub(crate) fn contain(strand: fn(&str) -> bool) {
             if let Some(text) = text.filter(|text| LAST.contains(text))
                 && strand(text)
             {
+                // A hook that returned here would have the program aborted.
                 loop {
                     thread::park();
                 }

@@ -120,6 +120,7 @@ impl Interface {
             SplitRing::new(self, 0, MESSAGE)?,
             SplitRing::new(self, 1, NONE)?,
         ];
+        // Last: from now on the card serves its queues (3.1.1).
         common.write8(common::STATUS, AT_WORK);
         Ok(queues)
     }
@@ -161,6 +162,7 @@ impl SplitRing {
         });
         // No message before one is asked for.
         memory.write16(GIVEN, 1);
+        // After the queue's other registers (4.1.4.3).
         common.write16(common::QUEUE_ON, 1);
         Ok(Self {
             memory,

@@ -213,6 +213,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
         layout,
         probes,
     } = start;
+    // Time first: starting the other cores waits by the clock.
     let rate = measure_time(info, platform);
     let cores = this_core::all().len();
     // The host chooses the meaning of time.

@@ -75,6 +75,7 @@ pub unsafe fn initialize(
     // SAFETY: image, data (so the boot stack) and all usable memory are mapped
     // to where they were.
     unsafe { crate::machine::cpu::set_page_table(root_table) };
+    // Only under the new table: the heap may lie beyond the 4 GiB of the boot table.
     // SAFETY: the range was taken from the frames and is mapped as data; by
     // condition 2 the heap has no memory yet.
     unsafe { heap::add_memory(heap) };

@@ -84,6 +84,7 @@ pub fn end_recording(outgoing: Outgoing, is_over: bool) {
     let mut edge = edge::get();
     let outcome = edge.end_run(is_over);
     let before_fault = edge.before_fault();
+    // Before anything is printed: this lock keeps interrupts disabled.
     drop(edge);
     if let Some(outcome) = outcome {
         report::replayed(&outcome);

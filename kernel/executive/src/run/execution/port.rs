@@ -182,6 +182,7 @@ pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(
     let total = cores.saturating_mul(2).saturating_add(suspended);
     let needed = contexts::stack_bytes(task_set);
     let kib = needed / 1024;
+    // The size first: the contexts made next have it for good.
     let settled = contexts::settle(needed).and_then(|settled| {
         contexts::provide(total)?;
         Ok(settled)

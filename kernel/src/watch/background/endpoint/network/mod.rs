@@ -478,6 +478,7 @@ impl Endpoint for &'static Network {
         let has_asked = sender.ask_server(now_ns);
         let has_address = !sender.interface.address().ip.is_unspecified();
         drop(sender);
+        // An address counts like a link: without either, nothing that is sent can arrive.
         let is_up = is_linked && has_address;
         if self.is_linked.swap(is_up, Ordering::Relaxed) != is_up {
             // Behind a new link, or with a new address, other neighbours may answer.
