@@ -147,6 +147,7 @@ pub fn read(memory: &dyn PhysicalMemory, rsdp: Option<u64>) -> Result<Platform, 
 
 fn is_root_pointer(memory: &dyn PhysicalMemory, address: u64) -> bool {
     memory
+        // The part common to all revisions, which has a checksum of its own (5.2.5.3).
         .bytes(address, 20)
         .is_some_and(|bytes| bytes.starts_with(b"RSD PTR ") && sums_to_0(bytes))
 }

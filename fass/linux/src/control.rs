@@ -137,6 +137,7 @@ impl Control {
     /// has passed. Instances must not wait in this way.
     pub fn wait_for_letters(&self, dag: DagId) {
         let cluster = self.office.task_set.dag(dag).cluster();
+        // Polled: no step knows that anybody waits for it.
         for _ in 0..20_000 {
             if !self.office.has_letters(cluster) || self.office.is_over() {
                 break;

@@ -125,7 +125,8 @@ impl Office {
     pub(crate) fn settle(&self, rests: &mut bool, is_finished: bool, opened: u64) -> bool {
         let mut lost = opened;
         match (*rests, is_finished) {
-            // A signal has set the resting cluster going again.
+            // A signal has set the resting cluster going again. Added before the letters' reasons
+            // are subtracted: the sum must not pass 0 in between.
             (true, false) => _ = self.reasons.fetch_add(1, Ordering::AcqRel),
             (false, true) => lost += 1,
             _ => {}

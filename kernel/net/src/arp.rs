@@ -112,6 +112,7 @@ impl<B> Neighbours<B> {
 
     /// Forgets all Ethernet addresses, so that each neighbour is asked anew.
     pub(crate) fn forget(&mut self) {
+        // Frames stay: the answers to come send them.
         self.table.iter_mut().for_each(|known| known.mac = None);
     }
 

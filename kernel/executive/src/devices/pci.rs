@@ -256,6 +256,7 @@ impl<'c> Function<'c> {
         } else {
             u32::MAX
         };
+        // Before anything is judged: the function answers as before, even if its range is refused.
         self.write(offset::COMMAND, command);
         let join = |high, low| u64::from(high) << 32 | u64::from(low);
         let (start, mask) = (join(high, low & !0xf), join(high_mask, low_mask));

@@ -59,9 +59,11 @@ pub unsafe fn start_others(root_table: u64, page: u8, entry: boot_entry::process
         return 0;
     }
     for core in others() {
+        // To all before the wait: so its 10 ms pass once.
         local_apic::send_init(core.apic_id());
     }
     wait(10_000_000, expected);
+    // A processor that has begun ignores the second startup interrupt.
     for attempt_ns in [200_000, PATIENCE_NS] {
         for core in others() {
             local_apic::start_timer(clock::apic_ticks(LONGEST_JUMP_NS));

@@ -126,6 +126,7 @@ pub fn begin_background() {
 pub fn end_background() {
     if is_enabled() {
         BACKGROUND.store(false, Ordering::Relaxed);
+        // A background that halts gives way without an alarm.
         timer::set(Alarm::Hold, u64::MAX);
     }
 }
@@ -268,6 +269,7 @@ fn end_interrupt_in_slice() {
     URGENT.fetch_sub(1, Ordering::Relaxed);
     let core = this_core::get();
     match core.part() {
+        // The alarm that ends the background's visit has fired.
         TimeSlicePart::None if core.context().is_background() && !timer::is_set(Alarm::Hold) => {
             if BACKGROUND.load(Ordering::Relaxed) {
                 give_way(core);
@@ -335,9 +337,11 @@ fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
 fn length_of_slice(core: &Core) -> Option<u64> {
     let fresh = FRESH.load(Ordering::Relaxed);
     let next = this_core::all().get(NEXT.load(Ordering::Relaxed) as usize);
+    // A next core that waits no more must not keep the slice from all others.
     let is_next =
         next.is_none_or(|next| next.index == core.index || next.part() != TimeSlicePart::Waits);
     match core.part() {
+        // This core itself is one of the fresh ones.
         TimeSlicePart::Fresh if fresh > 1 => Some(FIRST_SLICE_NS),
         TimeSlicePart::Fresh => Some(SLICE_NS),
         _ => (fresh == 0 && is_next).then_some(SLICE_NS),

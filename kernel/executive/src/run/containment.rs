@@ -293,6 +293,8 @@ impl NoteQueue {
     /// Takes the oldest note, once its instance has ended, and how many faults found no place.
     fn take(&mut self) -> (Option<FaultNote>, u64) {
         let place = &mut self.places[self.oldest];
+        // A note without its cost holds up those behind it: reports come in the order of the
+        // faults.
         let taken = match place {
             NotePlace::Full(FaultNote { cost: Some(_), .. }) => {
                 core::mem::replace(place, NotePlace::Empty)

@@ -166,6 +166,7 @@ impl ScriptEndpoint {
             timer::set_no_later(this_core::get(), Alarm::Heartbeat, due_ns);
             return false;
         }
+        // Taken even if it is another wire's: each wire plays the whole script for itself.
         *rest = after;
         let wire = self.end.wire().name().as_bytes();
         let is_own = entry.wire == wire || entry.wire.is_empty() && self.is_first;
@@ -225,6 +226,7 @@ impl ScriptEndpoint {
 impl Endpoint for ScriptEndpoint {
     fn begin_run(&self, now_ns: u64) {
         self.playing.lock().rest = self.script.entries;
+        // Due at once: the first look sets the alarm for the first entry.
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, now_ns);
     }
 

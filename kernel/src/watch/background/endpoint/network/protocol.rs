@@ -121,6 +121,7 @@ impl Station for ProtocolPlace {
     }
 
     fn tell_come(&self) {
+        // Taken before the announcements: a packet that comes meanwhile sets its bit again.
         let mut come = self.come.swap(0, Ordering::Relaxed);
         while come != 0 {
             let end = self.ends.get(come.trailing_zeros() as usize);
