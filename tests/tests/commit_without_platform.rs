@@ -1,6 +1,5 @@
-//! The one fault that needs a program without a platform, as the page `docs/errors.md` has
-//! it. The only test of its program, because an installed
-//! platform cannot be removed.
+//! The only fault of a program without a platform, with its text in the page `docs/errors.md`. It
+//! is the only test of its program, because an installed platform cannot be removed.
 
 use std::panic::catch_unwind;
 use std::time::Duration;

@@ -1,7 +1,6 @@
-//! Attacks by safe code, which harm no others: it cannot use up what all share, keep the serial
-//! line, forge
-//! what a run is judged by, misuse a lock. The guest is the image `guest-tests`, which
-//! commits attacks next to a healthy DAG that must meet every deadline.
+//! Attacks by safe code: they cannot use up shared things, keep the serial line, forge the lines
+//! judging a run, or misuse a lock. The guest is the image `guest-tests`, which commits attacks
+//! next to a healthy DAG. This DAG must meet every deadline.
 
 use harness::{Guest, Members, Said, lawful_runs};
 use tool::Outcome;
@@ -9,13 +8,13 @@ use tool::places;
 use views::protocol::{MachineLine, Status};
 use views::record::COUNTED_TOLERANCE_NS;
 
-/// Boots one attack, or those that can be one after the other, on so many cores.
+/// Boots one attack, or all attacks possible one after the other, on a number of cores.
 fn attacks(word: &str, cores: u64) -> Guest {
     Guest::test("attack").word(word).cores(cores)
 }
 
-/// Holds each attack to its number of faults, 0 or 1, and each fault to what it says: an attack's
-/// name, the fault's cause and a part of its message.
+/// Checks each attack's number of faults, 0 or 1, and each fault's line. `expected` has the
+/// attacks' names, the faults' causes and parts of their messages.
 #[track_caller]
 fn harm_nobody(outcome: &Outcome, expected: &[(&str, &str, &str)]) {
     let attacks = outcome.lines("attack");
@@ -87,8 +86,8 @@ fn attacks_harm_their_own_dag_alone() {
     }
 }
 
-/// No machine line is forged: what was to be one is there as text, four times of one attack and
-/// twice of a message. A line of the kernel's own quotes that, which is how it should be.
+/// Checks that no machine line is forged: each attempt is there as text, four times of one attack
+/// and twice of a message. A genuine line of the kernel quotes the text, as it should.
 fn forged_is_text(outcome: &Outcome) {
     let is_forged = |line: &&MachineLine| line.text.contains("forged") && line.kind != "fault";
     assert_eq!(outcome.transcript.machine.iter().find(is_forged), None);
@@ -97,7 +96,7 @@ fn forged_is_text(outcome: &Outcome) {
     assert_eq!(found, 6, "{}", outcome.tail());
 }
 
-/// Returns the calls that led to the faults, with names.
+/// Returns the calls leading to the faults, with names.
 fn calls_told(outcome: &Outcome) -> Vec<String> {
     let lines = outcome.lines("backtrace").into_iter();
     let told = lines.map(|line| places::explain(&outcome.image, &line.text).expect("names"));

@@ -1,4 +1,4 @@
-//! The image boots from a stick, as on a PC: by GRUB, under a BIOS and under UEFI.
+//! The image boots from a stick, like on a PC: by GRUB, under a BIOS and under UEFI.
 
 use std::time::Duration;
 
@@ -20,14 +20,14 @@ fn two_and_four_processors_by_a_bios_and_by_uefi() {
     }
 }
 
-/// Under UEFI it lies below 1 MiB, and never at 0, where the firmware reads nothing to.
+/// Under UEFI the file lies below 1 MiB, and never at 0, because the firmware reads no file there.
 #[test]
 fn a_file_on_the_stick_reaches_the_app_by_both() {
     stick::hands_over_a_file(Loader::Bios);
     stick::hands_over_a_file(Loader::Uefi);
 }
 
-/// GRUB stays with its line, so the run ends by its limit, which a busy host may need more of.
+/// GRUB stays with its line, so the run ends by its limit. A busy host may need a longer limit.
 #[test]
 fn a_processor_without_64_bits_is_refused_by_grub() {
     // Without a screen the BIOS shows letters at the serial port.
@@ -43,7 +43,8 @@ fn a_processor_without_64_bits_is_refused_by_grub() {
     assert!(waited, "{}\n{}", outcome.ending, outcome.tail());
 }
 
-/// Returns what is shown, without what moves the cursor: the BIOS may do that in mid-word.
+/// Returns the visible text, without sequences moving the cursor: the BIOS may move the cursor in
+/// mid-word.
 fn letters(serial: &str) -> String {
     let mut pieces = serial.split("\x1b[");
     let mut letters = String::from(pieces.next().unwrap_or_default());

@@ -1,5 +1,5 @@
-//! A camera that asks an accelerator, recorded on the machine and on Linux: the same values wherever
-//! that is replayed, without the accelerator.
+//! A camera asking an accelerator, recorded on the machine and on Linux: every replay has the same
+//! values, without the accelerator.
 
 use std::fs;
 use std::sync::atomic::Ordering::Relaxed;
@@ -11,8 +11,8 @@ use virtual_time::VirtualTime;
 
 const FRAMES: u64 = 20;
 
-/// Runs it with these words, and returns how many frames were answered and how many were not, and
-/// how many values were compared.
+/// Runs the camera with words. Returns the numbers of answered and of late frames, and the number
+/// of compared values.
 fn run(words: &str, app: &str) -> ([u64; 2], Option<u64>) {
     // However long the host lets an instance wait, it is within its budget.
     let own = format!("budget_factor=0 {app}");

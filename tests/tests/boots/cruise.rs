@@ -1,4 +1,4 @@
-//! The car on the machine: it sends what it sends in virtual time, byte for byte.
+//! The car on the machine: it sends the same bytes as in virtual time.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ const JOBS: u64 = 30;
 /// The output of a radar. The times are away from the releases.
 const INPUT: &str = include_str!("../../../apps/cruise/gaps.txt");
 
-/// Returns the bytes that are sent in virtual time, and the wire's counts.
+/// Returns the bytes sent in virtual time, and the wire's counts.
 fn in_virtual_time(input: &str, releases: ReleaseSource) -> (Vec<u8>, WireCounts) {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
@@ -34,7 +34,7 @@ fn guest(input: &str) -> Guest {
         .input(input)
 }
 
-/// Returns what the line of kind `wire` counts.
+/// Returns the counts in the line of kind `wire`.
 fn counted(outcome: &Outcome) -> WireCounts {
     let line = outcome.transcript.of_kind("wire").next();
     let line = line.expect("the kernel prints it");

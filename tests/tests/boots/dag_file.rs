@@ -1,5 +1,5 @@
-//! DAG files on the machine: generated ones run by the rules, and what is wrong with
-//! a file the guest finds out itself.
+//! DAG files on the machine: generated files run by the rules, and the guest itself finds the
+//! faults of a wrong file.
 
 use std::fs;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ fn is_refused(content: &[u8], words: &str, why: &str) {
     assert!(reason.contains(why), "{words}: {reason}\n  not: {why}");
 }
 
-/// A generated file as the guest gets it: a copy in our format, which the converter has made.
+/// Returns a generated file as the guest gets it: a copy in our format, made by the converter.
 fn generated(name: &str) -> String {
     page(&format!("apps/dag-file/examples/converted/{name}"))
 }
@@ -198,8 +198,8 @@ fn what_an_owner_leaves_is_lent_on_the_machine_and_on_linux() {
     }
 }
 
-/// Faults of a file are in the tests of `dag-file`, those of a word in the tests of the kernel's
-/// options: here is what comes of both.
+/// The tests of `dag-file` have the faults of a file, the tests of the kernel's options those of a
+/// word: here are the results of both.
 #[test]
 fn what_is_wrong_is_said_by_the_guest_with_its_line() {
     let cycle = GOOD.replace("end", "edge b -> a\nend");
@@ -310,7 +310,7 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
     assert!(said.lines().any(hint), "{said}");
 }
 
-/// Draws a page's pictures by the commands that stand there, of which a run comes before each.
+/// Draws a page's pictures by the page's commands; before each drawing command comes a run.
 fn assert_drawn(document: &str, pictures: usize) {
     let trace = File::new("picture", "trace");
     let shown = blocks(&page(document)).into_iter();

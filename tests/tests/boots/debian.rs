@@ -7,10 +7,11 @@ use tool::debian::{Guest, GuestOrder};
 use tool::qemu::Mode;
 use tool::{image, program, system};
 
-/// Linux starts in half of it.
+/// The most time for a guest; Linux starts in half of this time.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// Runs those tests of a program there that have `only` in their names, with our policy, and returns what it has printed.
+/// Runs a program's tests with `only` in their names in the guest, with our policy, and returns the
+/// output.
 fn run(test: &Path, only: &str) -> String {
     let log = system::new_log("debian-tests").expect("a folder for logs");
     let order = GuestOrder {

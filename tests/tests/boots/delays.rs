@@ -1,13 +1,13 @@
-//! All that delays an instance is charged: with the overheads that the kernel measures, bounds hold
-//! next to everything that takes time besides the model (`docs/proving.md`).
+//! Every delay of an instance is charged: with the kernel's measured overheads, bounds hold next to
+//! everything that takes time besides the model (`docs/proving.md`).
 
 use harness::{Guest, Members, Said};
 use tool::Outcome;
 
-/// The causes of delays that the guest provokes.
+/// The number of causes of delays provoked by the guest.
 const CAUSES: usize = 10;
 
-/// Where a bound is exceeded the guest's own verdict is a failure, too.
+/// If a bound is exceeded, the guest's own verdict is a failure, too.
 #[test]
 fn whatever_delays_an_instance_is_charged() {
     for cores in [1, 2, 4] {
@@ -37,7 +37,7 @@ fn whatever_delays_an_instance_is_charged() {
     }
 }
 
-/// Boots a test that prints the row of one DAG with a bound, and holds that to it.
+/// Boots a test printing the row of one DAG with a bound, and checks the bound.
 #[track_caller]
 fn keep_the_bound(test: &str, cores: u64, jobs: u64, least_ns: u64) -> Outcome {
     let guest = Guest::test(test).cores(cores).word("overheads=measured");

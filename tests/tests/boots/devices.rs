@@ -1,4 +1,4 @@
-//! Devices of PCI, whose messages come to a core.
+//! Devices of PCI, with messages to a core.
 
 use harness::{Guest, Members, Said};
 use tool::qemu::Machine;

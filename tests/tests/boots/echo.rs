@@ -1,4 +1,4 @@
-//! Packets that go back to their peers: by a script on the machine, over loopback on Linux.
+//! Packets going back to their peers: by a script on the machine, over loopback on Linux.
 
 use std::io::Write;
 use std::net::{Ipv4Addr, UdpSocket};
@@ -9,8 +9,8 @@ use harness::{Guest, Members, Said};
 use tool::image;
 use views::protocol::Transcript;
 
-/// Several packets at once and more than a job takes, the last as long as can be; half of the lines
-/// name their wire.
+/// Several packets at once, more than a job takes, the last of the greatest length; half of the
+/// lines name their wire.
 #[test]
 fn the_packets_of_a_script_go_back_as_the_same_bytes_in_every_run_on_any_cores() {
     let (mut script, mut wanted) = (String::new(), String::new());
@@ -68,7 +68,7 @@ fn two_wires_of_a_script_have_their_own_packets_and_lines() {
     assert_eq!(refused, "`wire.echo=file` has no file; give --input FILE");
 }
 
-/// Linux' program, with these words.
+/// Returns a command for the app's Linux program, with more words.
 fn on_linux(words: &str) -> Command {
     let mut command = Command::new(image::build_linux("echo", None).expect("it is built"));
     command.args(["cores=1", "mechanism=normal", "budget_factor=0"]);

@@ -1,4 +1,4 @@
-//! A `main` that makes every call of its machine is one source for the machine and for Linux.
+//! A `main` making every call of its machine is a single source for the machine and for Linux.
 
 use harness::Guest;
 use harness::markdown::page;

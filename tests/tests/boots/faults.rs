@@ -1,9 +1,9 @@
-//! Faults cost nothing that lasts, and what a run leaves behind has a name.
+//! Faults have no lasting cost, and everything a run leaves behind has a name.
 
 use harness::{Guest, Members, Said};
 use views::protocol::Status;
 
-/// One DAG survives a thousand faults, next to one that must not notice.
+/// A DAG survives a thousand faults, next to a DAG that must not notice.
 #[test]
 fn a_thousand_faults_cost_no_more_than_a_hundred() {
     const FAULTS: u64 = 1000;
@@ -31,7 +31,7 @@ fn a_thousand_faults_cost_no_more_than_a_hundred() {
     }
 }
 
-/// Each crime is that of a device's driver, whose DAG the questions of another one release.
+/// A device's driver commits each crime; another DAG's questions release the driver's DAG.
 #[test]
 fn the_faults_of_a_driver_end_its_dag_alone() {
     for (cores, words) in [(1, ""), (2, ""), (4, ""), (2, " clusters=1,1")] {

@@ -74,7 +74,7 @@ fn two_deterministic_runs_print_the_same_bytes_and_another_seed_is_another_run()
     assert_ne!(responses(&first), responses(&other));
 }
 
-/// Other faults of words are in the tests of the kernel's options.
+/// The tests of the kernel's options have other faults of words.
 #[test]
 fn how_a_computation_occupies_a_core_is_not_said() {
     let reason = demo(1, "work=compute occupy=spin").refusal();

@@ -1,5 +1,5 @@
-//! The evaluation on the machine: what joins every job does, what matches stamps does
-//! what its rules say of the same execution times, and a run is the same every time.
+//! The evaluation on the machine: a DAG and a join of equal stamps join every job, a join of close
+//! stamps follows its rules for the same execution times, and a run is the same every time.
 
 use std::thread;
 
@@ -15,7 +15,7 @@ fn guest(words: &str) -> Guest {
     guest.word(words)
 }
 
-/// Boots it for so many jobs, and returns its summary.
+/// Boots the evaluation for a number of jobs, and returns its summary.
 fn summary(words: &str) -> MachineLine {
     let outcome = guest(&format!("jobs={JOBS} {words}")).succeed();
     let line = outcome.line("join_latency").clone();
@@ -84,11 +84,11 @@ fn lost_inputs_make_a_condition_worthless() {
     assert!(reason.contains("`depth`"), "{reason}");
 }
 
-/// Long runs, and several boots, since what the host does to a boot is rare: without
-/// `kernel/executive/src/machine/counted_time.rs` one boot in ten is another, one in four where
-/// the host is busy. One of some 150 differed with it, probably for one of two
-/// reasons that were found and are gone now (docs/paper.md). Too few boots have been seen since to claim that none
-/// is left, so one of four is let pass.
+/// Compares long runs of several boots, since the host rarely changes a boot. Without
+/// `kernel/executive/src/machine/counted_time.rs` one boot in ten differs, one in four on a busy
+/// host. With it, one of some 150 boots differed, probably for one of two reasons found and removed
+/// since (docs/paper.md). Too few boots have been seen since to claim that no other reason is left,
+/// so the test tolerates one different boot of four.
 #[test]
 fn long_runs_print_the_same_bytes() {
     let boot = |policy| {

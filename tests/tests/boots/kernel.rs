@@ -1,6 +1,5 @@
-//! The kernel when things go wrong or come thick and fast. The
-//! guest is the image `guest-tests`, which runs the test named by the word
-//! `test=NAME` on its command line.
+//! The kernel when things go wrong or come thick and fast. The guest is the image `guest-tests`,
+//! which runs the test named by the word `test=NAME` on its command line.
 
 use harness::markdown::page;
 use harness::{Guest, Members, Said};
@@ -35,8 +34,8 @@ fn output_that_does_not_fit_is_counted() {
     assert_eq!(counted, Some((20 - shown.count()) * 1001));
 }
 
-/// Every fault that a subtask commits costs its DAG what its policy says, and no other
-/// anything.
+/// Checks the cost of every fault committed by a subtask: its DAG pays as its policy states, and no
+/// other DAG pays anything.
 fn faults_are_contained(guest: &Guest) {
     let outcome = guest.succeed();
     let (verdicts, faults) = (outcome.lines("containment"), outcome.lines("fault"));

@@ -1,4 +1,4 @@
-//! Tests that need a booted guest: the kernel, the apps, the media that a PC boots from.
+//! Tests in need of a booted guest: the kernel, the apps, the media that boot a PC.
 
 mod attacks;
 mod autoware;

@@ -1,4 +1,4 @@
-//! A file that the loader leaves in memory reaches the app, whatever its size.
+//! A file left in memory by the loader reaches the app, whatever its size.
 
 use harness::file::File;
 use harness::{Guest, Members, Said};
@@ -7,8 +7,8 @@ use views::protocol::Status;
 
 const MIB: usize = 1 << 20;
 
-/// Boots the app `dag-file` with a file of so many bytes, which it refuses by quoting
-/// how it begins.
+/// Boots the app `dag-file` with a file of `bytes` bytes. The app refuses the file, and quotes its
+/// beginning.
 fn refused(guest: Guest, bytes: usize) -> Outcome {
     let mut content = vec![b'z'; bytes];
     content[..2].copy_from_slice(b"xy");
@@ -19,7 +19,7 @@ fn refused(guest: Guest, bytes: usize) -> Outcome {
     outcome
 }
 
-/// From the kernel's entry to its first line.
+/// Compares the times from the kernel's entry to its first line.
 #[test]
 fn the_boot_takes_no_longer_with_a_large_file() {
     let [small, large] = [3, 20 * MIB + 1].map(|bytes| {

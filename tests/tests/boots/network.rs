@@ -1,4 +1,5 @@
-//! Network cards and what goes by them, with a live peer: judged by what arrives, and by counts.
+//! Network cards and their traffic, with a live peer: judged by the arriving packets, and by
+//! counts.
 
 #[path = "../../../kernel/net/tests/it/mutation.rs"]
 mod mutation;
@@ -23,16 +24,16 @@ const E1000E: &str = "e1000e,romfile=";
 /// The most bytes of a datagram.
 const MOST: usize = 1472;
 
-/// The longest interrupt that is charged, of those parts that its driver sees.
+/// The longest charged interrupt, without the parts unseen by its driver.
 const LONGEST_NS: u64 = 8_300;
 
-/// How long a peer asks for what must come.
+/// The most time a peer asks for an answer.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// How long it waits for an answer before it asks again.
+/// The time a peer waits for an answer before asking again.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// Returns a socket of this host, and a port that is free.
+/// Returns a socket of this host, and a free port, to which the socket is connected.
 fn socket() -> (UdpSocket, u16) {
     let new = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a port");
     let (socket, other) = (new(), new());
@@ -42,7 +43,7 @@ fn socket() -> (UdpSocket, u16) {
     (socket, port)
 }
 
-/// Sends packets, again and again until `is_answer` is what comes.
+/// Sends packets, again and again until an answer comes for which `is_answer` holds.
 #[track_caller]
 fn ask(socket: &UdpSocket, packets: &[&[u8]], is_answer: impl Fn(&[u8]) -> bool) {
     let (start, mut bytes) = (Instant::now(), [0; 2048]);
@@ -61,7 +62,7 @@ fn ask(socket: &UdpSocket, packets: &[&[u8]], is_answer: impl Fn(&[u8]) -> bool)
     panic!("no answer to {packets:02x?}");
 }
 
-/// Has packets of all lengths go and come back.
+/// Sends packets of all lengths, and waits for each to come back.
 fn exchange(socket: &UdpSocket) {
     ask(socket, &[b"hello"], |answer| answer == b"hello");
     for number in 0..200_usize {
@@ -124,7 +125,7 @@ fn a_machine_without_a_card_and_wrong_words_are_refused_with_a_remedy() {
     );
 }
 
-/// Boots the echo on port 7 next to a control loop, on a cable whose other end is the socket.
+/// Boots the echo on port 7 next to a control loop, on a cable ending at the socket.
 fn cabled(card: &'static str, to: &UdpSocket, port: u16) -> Guest {
     let own = to.local_addr().expect("an address").port();
     let words = format!(
@@ -135,7 +136,7 @@ fn cabled(card: &'static str, to: &UdpSocket, port: u16) -> Guest {
     guest.word("wire.echo=udp://:7 net=10.0.2.15/24,10.0.2.2")
 }
 
-/// Returns the number of the control loop's jobs, which nothing has disturbed.
+/// Returns the number of the control loop's jobs, after checking that nothing has disturbed them.
 fn undisturbed(outcome: &Outcome) -> u64 {
     outcome.only("control").has([("allocations", 0)]);
     let loops = outcome.line("dag_status");
@@ -144,7 +145,7 @@ fn undisturbed(outcome: &Outcome) -> u64 {
     loops.number("completed")
 }
 
-/// Asks for an echo by a frame, with a payload of its own, until it comes.
+/// Asks for an echo by a frame, with a payload of its own, until the echo comes.
 fn probe(socket: &UdpSocket, number: u64) {
     let payload = [&[0xa5; 24], &number.to_le_bytes()[..]].concat();
     // By the question for it the guest learns where the answer goes.
@@ -152,8 +153,9 @@ fn probe(socket: &UdpSocket, number: u64) {
     ask(socket, &packets, |answer| answer.ends_with(&payload));
 }
 
-/// So many frames with wrong bytes, and a flood of as many right ones, whose longest ones take the
-/// longest: as they are summed, and as they are answered. After each 64 one must be answered.
+/// Sends `count` frames with wrong bytes, and a flood of as many right frames. The longest right
+/// frames take the longest interrupts, while they are summed and answered. After each 64 frames an
+/// echo must be answered.
 fn storm(socket: &UdpSocket, count: u64) {
     let (mut random, frames) = (Random::new(wanted("SEED", 1)), vectors());
     let mut summed = datagram(7, &[1; MOST]);

@@ -1,10 +1,10 @@
 //! A new app as a person gets it, in a repository of its own and under `apps/`: it passes its own
-//! test and the linters, boots, says what the guide shows, and is told what its repository
-//! lacks. So does the README's first app, when the README is followed.
+//! test and the linters, boots, prints the guide's output, and learns of anything its repository
+//! lacks. The README's first app does the same for a reader of the README.
 //!
-//! All of them share a target folder and the profiles of a new repository, so that each crate is
-//! compiled once; the folder stays from one run of this test to the next. An app's image stands there
-//! under the app's name, so no two that boot have the same.
+//! All apps share a target folder and the profiles of a new repository, so each crate is compiled
+//! once; the folder stays from one run of this test to the next. An app's image is there under the
+//! app's name, so booting apps need different names.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -21,7 +21,7 @@ use tool::system::{self, workspace};
 /// The guide's app.
 const NAME: &str = "first-steps";
 
-/// Our folder, in which nothing but `target` is from before.
+/// Returns our folder, emptied except for `target`.
 fn ours() -> &'static Path {
     static OURS: OnceLock<PathBuf> = OnceLock::new();
     OURS.get_or_init(|| {
@@ -45,14 +45,14 @@ fn repository(name: &str) -> PathBuf {
     out
 }
 
-/// Has all that is built in a folder land in ours, whoever builds there.
+/// Makes all builds in a folder land in our target folder, whoever builds there.
 fn share_target(folder: &Path) {
     let target = ours().join("target");
     fs::create_dir_all(&target).expect("a folder of ours");
     symlink(target, folder.join("target")).expect("there is none yet");
 }
 
-/// Runs cargo in a folder, and returns its exit code, what it prints, and of what it complains.
+/// Runs cargo in a folder, and returns its exit code, its output, and its complaints.
 fn try_cargo(folder: &Path, words: &str) -> (Option<i32>, String, String) {
     let (command, options) = words.split_once(' ').unwrap_or((words, ""));
     let output = system::cargo()
@@ -66,7 +66,7 @@ fn try_cargo(folder: &Path, words: &str) -> (Option<i32>, String, String) {
     (code, text(&output.stdout), text(&output.stderr))
 }
 
-/// Runs cargo in a folder, where it must succeed, and returns what it prints.
+/// Runs cargo in a folder, where cargo must succeed, and returns the output.
 #[track_caller]
 fn cargo(folder: &Path, words: &str) -> String {
     let (code, printed, complaints) = try_cargo(folder, words);
@@ -74,7 +74,7 @@ fn cargo(folder: &Path, words: &str) -> String {
     printed
 }
 
-/// Runs cargo in a folder, where it must end with this code, and say this.
+/// Runs cargo in a folder, where cargo must end with the exit code `code` and print `says`.
 #[track_caller]
 fn cargo_refuses(folder: &Path, words: &str, code: i32, says: &str) {
     let (found, printed, complaints) = try_cargo(folder, words);
@@ -83,17 +83,17 @@ fn cargo_refuses(folder: &Path, words: &str, code: i32, says: &str) {
     assert!(said.contains(says), "cargo {words}:\n{said}");
 }
 
-/// Boots the app of a repository, as a person does.
+/// Boots the app of a repository as a person does.
 fn boot(repository: &Path) -> String {
     cargo(repository, "run -- --cores 2 --mode deterministic")
 }
 
-/// Cargo's line about the test that each new app has, when it passes.
+/// Cargo's line about the test of each new app, when the test passes.
 const PASSES: &str = "test every_job_is_in_time_and_within_its_bound ... ok";
 
-/// Returns an excerpt of an output. A line of `kept` that the output still has stays; otherwise it
-/// becomes the line of the output with the longest common beginning. `shown` decides which lines
-/// are equal.
+/// Returns an excerpt of an output. A line of `kept` stays if the output still has an equal line;
+/// otherwise the output's line with the longest common beginning replaces it. Lines are equal if
+/// `shown` makes the same text of both.
 fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
     let common = |a: &str, b: &str| a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
     let line = |kept| {

@@ -1,6 +1,6 @@
-//! A machine without a serial port shows on its screen what it has to say. The test reads it
-//! there, by the kernel's own letters, as QEMU gives the picture. So does one that cannot
-//! run, and then it halts.
+//! A machine without a serial port shows its output on its screen. The test reads the screen in
+//! QEMU's picture, by the kernel's own letters. A machine unable to run shows its reason, too, and
+//! then halts.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -17,7 +17,7 @@ use tool::system;
 
 const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"";
 
-/// Returns the rows of a picture in the format PPM that has letters as the kernel draws them.
+/// Returns the rows of text in a picture of the format PPM, with letters as drawn by the kernel.
 fn rows(picture: &[u8]) -> Vec<String> {
     let mut fields = picture.splitn(4, |byte| byte.is_ascii_whitespace());
     let mut number = || {
@@ -57,7 +57,7 @@ fn rows(picture: &[u8]) -> Vec<String> {
         .collect()
 }
 
-/// Says something to QEMU's monitor and returns what it answers within half a second.
+/// Gives QEMU's monitor a command and returns the answer of the next half second.
 fn ask(monitor: &Path, command: &str) -> String {
     let mut answer = Vec::new();
     if let Ok(mut stream) = UnixStream::connect(monitor) {
@@ -68,8 +68,8 @@ fn ask(monitor: &Path, command: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// Looks at the screen until a verdict is there and all cores halt, ends QEMU and returns the
-/// rows, and how pages are mapped.
+/// Looks at the screen until it has a verdict and all cores halt, ends QEMU and returns the rows,
+/// and the mapping of pages.
 fn watch(monitor: &Path, cores: u64) -> (Vec<String>, String) {
     let picture = File::new("screen", "ppm");
     let begun = Instant::now();
@@ -89,9 +89,9 @@ fn watch(monitor: &Path, cores: u64) -> (Vec<String>, String) {
     (rows, pages)
 }
 
-/// Boots the demo from a stick on so many cores, with a screen, without a serial port and without
-/// an end, on a processor of this model, and returns the rows of the screen, and how pages are
-/// mapped.
+/// Boots the demo from a stick on a number of cores, with a screen, without a serial port and
+/// without an end, on a processor of a model. Returns the rows of the screen, and the mapping of
+/// pages.
 fn rows_of(guest: &Guest, cores: u64, model: &str) -> (Vec<String>, String) {
     let monitor = system::new_log("monitor").expect("a folder for logs");
     let changes = [

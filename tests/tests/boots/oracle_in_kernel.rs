@@ -1,7 +1,7 @@
-//! The kernel against reference schedules: the public cases for up to four
-//! cores run on the bare machine as the reference says. Cases in which no two completions, and no
-//! completion and release, fall on the same instant run so without a window,
-//! too: with each event decided at once, as in apps.
+//! The kernel against reference schedules: on the bare machine the public cases for up to four
+//! cores run exactly as in the reference. Cases without two completions, or a completion and a
+//! release, at the same instant run so without a window, too: with each event decided at once, as
+//! in apps.
 
 use lab::oracle::in_kernel::{Settings, run};
 use lab::oracle::schedules::{Case, check, parse};
@@ -15,14 +15,14 @@ const DISTINCT: &str = include_str!("../../oracle/distinct.txt");
 /// Ten milliseconds: idle time is skipped, so a long unit costs nothing.
 const UNIT_US: u64 = 10_000;
 
-/// Returns the public cases that `keep` keeps.
+/// Returns the public cases for which `keep` holds.
 fn cases(keep: impl Fn(&Case) -> bool) -> Vec<Case> {
     let mut cases = parse(PUBLIC).expect("the file is well formed");
     cases.retain(keep);
     cases
 }
 
-/// Runs cases on the machine, and holds each to its schedule.
+/// Runs cases on the machine, and compares each with its schedule.
 #[track_caller]
 fn are_reproduced(cases: &[Case], settings: &Settings) {
     let judged = run(cases, settings).expect("QEMU and an image");

@@ -1,4 +1,4 @@
-//! Parameters on the machine: set by a word at boot, and by a person while it runs.
+//! Parameters on the machine: set by a word at boot, and by a person during the run.
 
 use harness::{Guest, Members, Said};
 

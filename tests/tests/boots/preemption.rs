@@ -1,6 +1,6 @@
-//! Functions that compute and are preempted: they lose nothing, nothing waits long for them, and
-//! none answers for the time in which it is suspended or others compute. Where the processor has
-//! AVX they use it; where it is off they are told so, by the same image.
+//! Preempted functions: they lose nothing, nothing waits long for them, and the time of
+//! suspensions, or of other instances' computing, never counts as theirs. With AVX they use it;
+//! with AVX off the same image tells them so.
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::{Event, EventKind};
@@ -8,18 +8,18 @@ use tool::{Mode, Outcome};
 use views::protocol::{MachineLine, Status};
 use views::record::Run;
 
-/// For how long a core waits for others' turns, and for what the kernel executes meanwhile
+/// The longest wait of a core for the other cores' turns, and for the kernel's work meanwhile
 /// (`docs/decisions/0008-deterministic-by-default.md`).
 const TURN_NS: u64 = 20_000;
 
-/// Describes DAGs that preempt one another, of instances that keep values in all registers and
-/// compare them.
+/// Describes DAGs preempting each other; their instances keep values in all registers and compare
+/// them.
 fn preemption(mode: Mode, cores: u64) -> Guest {
     let guest = Guest::test("preemption").mode(mode).cores(cores);
     guest.memory_mib(64)
 }
 
-/// Holds what it says to it that nothing is lost, though there are so many preemptions.
+/// Checks that the output shows no losses, with at least `least_preemptions` preemptions.
 #[track_caller]
 fn keeps_all(outcome: &Outcome, has_avx: bool, least_preemptions: u64) {
     let line = outcome.line("preemption");
@@ -31,8 +31,8 @@ fn keeps_all(outcome: &Outcome, has_avx: bool, least_preemptions: u64) {
     assert!(is_told(line) && is_told(outcome.line("boot")), "{flag}");
 }
 
-/// Returns the longest time from an instance's start to its end, of the most urgent DAG's source,
-/// which has next to nothing to do, and which no other preempts by static priorities.
+/// Returns the longest time from an instance's start to its end, of the most urgent DAG's source.
+/// This source has next to nothing to do, and no other preempts it by static priorities.
 fn longest_of_the_source(run: &Run) -> u64 {
     let dag = run.task_set.find("every-2-ms");
     let source = run.task_set.dag(dag).find("source");
@@ -49,8 +49,8 @@ fn longest_of_the_source(run: &Run) -> u64 {
     longest_ns
 }
 
-/// With budgets that an instance would not keep if it were suspended by another one and had to
-/// answer for that, or for others' turns.
+/// The budgets are so short that an instance would exceed its budget if suspensions, or others'
+/// turns, counted as its own time.
 #[test]
 fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
     for cores in [1, 2, 4, 8] {
@@ -92,7 +92,7 @@ fn preempted_instances_lose_nothing_in_real_time() {
     }
 }
 
-/// One has no AVX, the next not the instruction that leaves out what is not in use.
+/// The first processor has no AVX, the next no instruction for saving only the registers in use.
 #[test]
 fn the_same_image_runs_where_avx_is_missing_or_off() {
     for (model, words) in [

@@ -15,7 +15,7 @@ fn demo(cores: u64) -> Guest {
     guest.word("jobs=2 subtasks=2")
 }
 
-/// Boots it, and returns what it says of the machine.
+/// Boots a guest, and returns its `boot` line about the machine.
 #[track_caller]
 fn booted(guest: &Guest) -> MachineLine {
     guest.succeed().only("boot").clone()
@@ -41,12 +41,12 @@ fn one_to_sixty_four_processors_on_both_boards() {
     }
 }
 
-/// Describes a machine where nothing takes the status, as on a PC.
+/// Describes a machine without a device for the exit status, like a PC.
 fn endless(cores: u64) -> Guest {
     demo(cores).altered(&[("iobase=0xf4", "iobase=0xf8")], "")
 }
 
-/// Checks what the guest says at its end, where its status tells nothing.
+/// Checks the guest's verdict; its exit status tells nothing here.
 #[track_caller]
 fn succeeds(outcome: &Outcome) {
     let verdict = outcome.transcript.verdict();
@@ -54,8 +54,8 @@ fn succeeds(outcome: &Outcome) {
     assert_eq!(status, Ok(Status::Success), "{}", outcome.tail());
 }
 
-/// Idle time is skipped until the limit: a core that still looked after the others would have
-/// said so by then. A host too busy for the verdict is given more time.
+/// Idle time is skipped until the limit: a core still looking after the others would have printed
+/// by then. A host too busy for the verdict gets more time.
 #[test]
 fn a_machine_that_cannot_be_ended_stays_silent_after_its_verdict() {
     let limits = [8, 60, 600].map(Duration::from_secs).into_iter();
@@ -67,7 +67,7 @@ fn a_machine_that_cannot_be_ended_stays_silent_after_its_verdict() {
     succeeds(&outcome);
 }
 
-/// From the first of 64 bits to those of today, of both makers.
+/// The models reach from the first 64-bit processors to today's, of both makers.
 #[test]
 fn nine_models_of_processors() {
     for model in [
@@ -94,7 +94,8 @@ fn a_processor_without_64_bits_is_refused() {
     assert_eq!(outcome.ending, RunEnd::Guest(Status::Failure));
 }
 
-/// The hardware of one core fails, by a word to QEMU's monitor, which has the way in.
+/// The hardware of one core fails on request, by a word to QEMU's monitor. The monitor has the way
+/// into the guest.
 #[test]
 fn a_machine_check_is_reported() {
     let port = (
@@ -128,8 +129,8 @@ fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
     }
 }
 
-/// Output goes nowhere, at once. The absent port is never ready here, and two
-/// devices in its place show what is sent all the same: in counted time, without a wait.
+/// Output goes nowhere, at once. The absent port is never ready here, and two devices in its place
+/// show all sent bytes: in counted time, without a wait.
 #[test]
 fn a_machine_without_a_serial_port_runs() {
     let bytes = File::new("bytes", "out");
@@ -152,7 +153,7 @@ fn a_machine_without_a_serial_port_runs() {
     assert!(first_ns - ready_ns < 10_000_000, "{ready_ns}, {first_ns}");
 }
 
-/// Here all clocks follow one count, so that all must find the same rate.
+/// Here all clocks follow the same count, so all must find the same rate.
 #[test]
 fn time_is_measured_by_the_clock_that_is_asked_for() {
     for (clock, check) in [
@@ -172,7 +173,7 @@ fn time_is_measured_by_the_clock_that_is_asked_for() {
     }
 }
 
-/// The board has no ACPI timer, and the processor does not say that it is QEMU's.
+/// The board has no ACPI timer, and the processor hides that it is QEMU's.
 #[test]
 fn a_machine_with_no_clock_but_the_first_pcs_runs() {
     let boot = booted(&demo(2).model("max,-hypervisor"));
@@ -254,8 +255,8 @@ fn a_list_of_cores_that_are_not_there_is_refused() {
     }
 }
 
-/// On no hypervisor the processor is believed. Where it does not say that its timer goes on while
-/// it halts, no core halts, and still all goes on.
+/// Without a hypervisor the kernel believes the processor. If the processor does not promise that
+/// its timer goes on during halts, no core halts, and still all goes on.
 #[test]
 fn what_a_processor_does_not_promise_is_said() {
     let guest = demo(2).in_real_time().machine(Machine::Q35);

@@ -1,4 +1,4 @@
-//! Runs of the machine that are recorded, and replayed on other cores.
+//! Runs recorded on the machine, and replayed on other cores.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,7 +9,7 @@ use recording::{Entry, EntryKind, Recordable, Recording};
 use tool::{Machine, Outcome, recordings};
 use views::protocol::Status;
 
-/// Returns what the guest has sent to a file.
+/// Returns the bytes sent by the guest to a file.
 fn bytes(file: &File) -> Vec<u8> {
     recordings::received(&file.0).expect("the guest has sent it")
 }
@@ -18,7 +18,7 @@ fn guest(words: &str) -> Guest {
     Guest::test("recorded").word(words)
 }
 
-/// Records the fork and join, and returns how many entries there are. None is lost.
+/// Records the fork and join, checks that no entry is lost, and returns the number of entries.
 fn record(guest: Guest, file: &File) -> u64 {
     let outcome = guest.records(&file.0, 64).succeed();
     // A PC's firmware has said something there, too.
@@ -28,8 +28,9 @@ fn record(guest: Guest, file: &File) -> u64 {
     line.number("entries")
 }
 
-/// Replays it on so many cores, and returns how many values were compared, and how many were not
-/// computed. The step is another one: sources are not called, or all values would be others.
+/// Replays the recording on a number of cores. Returns the number of compared values, and the
+/// number of values not computed. The step differs from the recording's: if sources were called,
+/// all values would differ.
 fn replay(cores: u64, words: &str, file: &File) -> [u64; 2] {
     let guest = guest("step=7").word(words).cores(cores);
     let outcome = guest.replays(&file.0).succeed();
@@ -37,7 +38,7 @@ fn replay(cores: u64, words: &str, file: &File) -> [u64; 2] {
     ["compared", "uncompared"].map(|member| line.number(member))
 }
 
-/// Cores and policies that are not those of the recording.
+/// Cores and policies different from the recording's.
 const OTHERS: [(u64, &str); 3] = [(1, "policy=static"), (2, "policy=edf"), (4, "policy=slack")];
 
 #[test]

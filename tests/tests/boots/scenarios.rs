@@ -1,4 +1,5 @@
-//! The suite of scenarios on the machine, and by what only a guest's Linux has: by counts.
+//! The suite of scenarios on the machine, and by mechanisms found only on a guest's Linux: by
+//! counts.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +9,7 @@ use tool::image;
 use views::protocol::Transcript;
 use views::record::COUNTED_TOLERANCE_NS;
 
-/// Runs those for 1 to 5 cores, which are all.
+/// Runs the scenarios for 1 to 5 cores: there are no others.
 fn run(mut run: impl FnMut(u64) -> Transcript) {
     let mut ran = BTreeSet::new();
     for cores in 1..=5 {
@@ -23,7 +24,7 @@ fn run(mut run: impl FnMut(u64) -> Transcript) {
     assert_eq!(ran, stated);
 }
 
-/// By their traces, too, no instance waits for longer than cores take turns.
+/// By their traces, too, no instance waits for longer than the cores' turns.
 #[test]
 fn each_scenario_is_as_it_says() {
     run(|cores| {

@@ -1,5 +1,5 @@
-//! A person and a guest: a conversation at the console with a
-//! guest that runs until it is told to end, its status, and its graph.
+//! A person and a guest: a conversation at the console with a guest running until told to end, its
+//! status, and its graph.
 
 use harness::{Guest, Members, Said, lawful_runs};
 use recording::Counted;
@@ -33,7 +33,7 @@ fn answers(outcome: &Outcome) -> Vec<(&str, bool)> {
     answers.collect()
 }
 
-/// One of two endless DAGs; the other one is in a cluster of its own, or not.
+/// Pauses one of two endless DAGs; the other DAG is in a cluster of its own, or in the same.
 #[test]
 fn a_dag_is_paused_and_resumed_while_the_other_goes_on_and_both_are_shut_down() {
     talk(endless());
@@ -120,7 +120,7 @@ fn a_person_is_heard_and_told_under_overload() {
     assert_eq!(last.number("released"), last.number("completed"));
 }
 
-/// Returns how busy each core has been, in permille.
+/// Returns the load of each core, in permille.
 fn loads(status: &MachineLine) -> Vec<u64> {
     elements(status, "load_permille")
         .iter()

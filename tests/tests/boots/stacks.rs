@@ -1,4 +1,4 @@
-//! Stacks that are larger than usual, and what of each is used.
+//! Stacks larger than usual, and the measured use of each.
 
 use harness::{Guest, Members, Said};
 

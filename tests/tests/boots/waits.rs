@@ -1,12 +1,13 @@
-//! Instances that wait for bytes of the serial port, and what a wait costs. (The scenarios tell what
-//! waits do, on the machine by their traces, and `camera` has answers of a device.)
+//! Instances waiting for bytes of the serial port, and the cost of a wait. (The scenarios show the
+//! effects of waits, on the machine by their traces, and `camera` has answers of a device.)
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::EventKind;
 use views::record::{COUNTED_TOLERANCE_NS, Run};
 
-/// Returns what the only subtask does, a line for each job, with times in milliseconds: a core is
-/// free at the same tenth at which a wait begins, and an instance goes on at that at which it ends.
+/// Returns the events of the only subtask, a line for each job, with times in milliseconds, cut to
+/// tenths: a core becomes free at the tenth of a wait's begin, and an instance goes on at the tenth
+/// of the wait's end.
 fn told(run: &Run) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for event in run.events.iter().filter(|event| event.subtask.is_some()) {
@@ -24,7 +25,7 @@ fn told(run: &Run) -> Vec<String> {
     lines
 }
 
-/// Bytes of the serial port end waits; one that comes too late is there for the next job.
+/// Bytes of the serial port end waits; a byte coming too late is there for the next job.
 #[test]
 fn a_function_waits_until_its_bytes_have_gone_and_for_those_that_come() {
     let input = "4ms \"1000\\n\"\n28ms \"200\\n\"\n64ms \"30\\n\"\n";
@@ -51,8 +52,9 @@ fn a_function_waits_until_its_bytes_have_gone_and_for_those_that_come() {
     }
 }
 
-/// The instructions that a wait and its wake add to an instance which has the machine for itself,
-/// the function's own included; and for one that takes time, how late it goes on.
+/// Counts the instructions added by a wait and its wake to an instance alone on the machine,
+/// including the function's own instructions; for a wait taking time, counts the delay after its
+/// end.
 #[test]
 fn a_wait_costs_no_step_of_the_scheduler() {
     let outcome = Guest::test("waits_cost").succeed();

@@ -1,5 +1,5 @@
-//! A set that the commit has divided, with owners and members, from its record: a replay divides it
-//! again in the same way, and the host judges it by the cores that the record has.
+//! A set divided by the commit, with owners and members, from its record: a replay divides the set
+//! again in the same way, and the host judges by the cores in the record.
 
 use std::time::Duration;
 
@@ -12,8 +12,8 @@ use virtual_time::VirtualTime;
 const PERIOD: Duration = Duration::from_millis(10);
 
 /// Each DAG, the times of its subtasks behind the source, which takes a millisecond, and its bound
-/// in milliseconds. The heavy one is made an owner of two cores, and `light` executes on what it
-/// leaves of core 1.
+/// in milliseconds. The commit makes the heavy DAG an owner of two cores, and `light` executes in
+/// the time left on core 1.
 const DAGS: [(&str, &[u64], u64); 4] = [
     ("heavy", &[4, 4, 4], 9),
     ("light", &[3], 8),
@@ -21,7 +21,7 @@ const DAGS: [(&str, &[u64], u64); 4] = [
     ("lightest", &[1], 5),
 ];
 
-/// Builds the DAGs. Sources count from a number, which the others pass on.
+/// Builds the DAGs. Sources count from `from`, and the other subtasks pass the number on.
 fn build(from: u64, demands_proof: bool) -> Vec<Dag> {
     let taking = |ms| {
         let time = Duration::from_millis(ms);
@@ -58,7 +58,7 @@ fn build(from: u64, demands_proof: bool) -> Vec<Dag> {
     dags.into()
 }
 
-/// Commits and runs DAGs, and returns what the host makes of the record.
+/// Commits and runs DAGs, and returns the recording's bytes, and the host's reading of them.
 fn record(machine: &VirtualTime, dags: &[Dag]) -> (Vec<u8>, Record) {
     let commit = finish_create_dags_with(dags, ConstructionPolicy::any_graph());
     assert!(commit.expect("nothing is wrong").first_unproven().is_none());

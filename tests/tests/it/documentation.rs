@@ -1,15 +1,15 @@
-//! Every type, trait and free function of the crates that apps use has an example, or names the
-//! item whose example shows it. A method is shown by the example of its type.
+//! Every type, trait and free function of the crates used by apps has an example, or names the item
+//! with an example showing it. The example of a type shows its methods, too.
 //!
-//! That there is documentation at all, the compiler demands (`missing_docs`); that
-//! examples compile, and run where the host can run them, rustdoc does.
+//! The compiler demands documentation (`missing_docs`); rustdoc compiles the examples, and runs
+//! them if the host can run them.
 
 use std::fs;
 use std::path::PathBuf;
 
 use tool::system::workspace;
 
-/// Files with items that apps use: all of a folder, or these.
+/// Files with items used by apps: all files of a folder, or single files.
 const FOLDERS: [&str; 7] = [
     "fass/src",
     "fass/src/api",
@@ -30,8 +30,8 @@ const FILES: [&str; 8] = [
     "kernel/front/src/text/mod.rs",
 ];
 
-/// Items that are public for their own crate alone, because its module is not, or for the kernel,
-/// which does not pass it on.
+/// Items public only for their own crate, in a private module, or only for the kernel, which does
+/// not export them.
 const INTERNAL: [&str; 5] = [
     "MessageType",
     "ResettableState",
@@ -40,7 +40,7 @@ const INTERNAL: [&str; 5] = [
     "whole_number",
 ];
 
-/// The words that begin an item that can have an example.
+/// The words beginning an item that can have an example.
 const ITEMS: [&str; 6] = [
     "pub fn ",
     "pub const fn ",

@@ -1,5 +1,5 @@
-//! Pages and faults held to their word, the baseline to its reference, and a client to its router,
-//! without a guest.
+//! Pages and faults compared with the code, the baseline with its reference, and a client with its
+//! router, without a guest.
 
 mod commit_faults;
 mod divided;

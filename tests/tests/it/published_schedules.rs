@@ -1,5 +1,5 @@
-//! Schedules in virtual time are as long as those that others found for the same graphs and the
-//! same order of priorities: Kasahara's task graphs, the longest path first, without preemption.
+//! Schedules in virtual time have the published lengths for the same graphs and the same order of
+//! priorities: Kasahara's task graphs, the longest path first, without preemption.
 
 use std::fs;
 
@@ -11,10 +11,10 @@ use tool::system::workspace;
 use views::json::{self, Value};
 use virtual_time::VirtualTime;
 
-/// A length of a unit that leaves no rest.
+/// The length of a unit, in ns, which leaves no rest.
 const UNIT_NS: u64 = 1000;
 
-/// Returns the length of a graph's one job in virtual time, in units.
+/// Returns the length of a graph's only job in virtual time, in units.
 fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
     let machine = VirtualTime::new()
         .cores(cores)

@@ -1,7 +1,7 @@
-//! The paper's workload against reference figures that were made with the original
-//! policies: 20 seeds of 2000 jobs, execution times uniform from 1 to 50 ms, join
-//! queue 1000. The seeds here are others and fewer, so figures agree as far as samples
-//! do: over seeds, the sets per job have a standard deviation of at most 0.009.
+//! The paper's workload against reference figures made with the original policies: 20 seeds of 2000
+//! jobs, execution times uniform from 1 to 50 ms, join queue 1000. The seeds here are other seeds,
+//! and fewer, so figures agree only as closely as samples do: over seeds, the sets per job have a
+//! standard deviation of at most 0.009.
 
 use harness::workload;
 use join_latency::RunSamples;

@@ -52,7 +52,7 @@ fn the_machine_computes_the_bits_of_the_host_and_both_replay_what_it_recorded() 
     assert_eq!(walk.digest(), wanted);
 }
 
-/// A person looks at a walk on Linux, and ends it.
+/// A person looks at a walk on Linux, and ends the run.
 #[test]
 fn a_console_on_linux_shows_topics() {
     for mechanism in ["fifo", "poll"] {

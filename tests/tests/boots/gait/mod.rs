@@ -16,11 +16,11 @@ use virtual_time::VirtualTime;
 /// The table of both sensors.
 const TABLE: &str = "apps/gait/data/walking.csv";
 
-/// The recording that `./scripts/recording` makes of the data.
+/// The recording of the data, made by `./scripts/recording`.
 struct Walked(File);
 
 impl Walked {
-    /// Makes it.
+    /// Makes the recording.
     fn new() -> Walked {
         let table = workspace().join(TABLE);
         let table = table.to_string_lossy();
@@ -43,7 +43,7 @@ impl Walked {
         Walked(out)
     }
 
-    /// Reads it.
+    /// Reads the recording.
     fn read(&self) -> Recording<'static> {
         let bytes = fs::read(&self.0.0).expect("the recording");
         Recording::read(bytes.leak()).expect("it is whole")

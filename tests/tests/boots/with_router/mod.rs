@@ -1,4 +1,4 @@
-//! Nodes of ROS 2 and a real router, in real time: judged by what arrives, and by counts.
+//! Nodes of ROS 2 and a real router, in real time: judged by the arriving values, and by counts.
 
 mod client;
 
@@ -14,8 +14,8 @@ use ros::{Message, from_cdr, to_cdr};
 /// How long anything may take: the host is busy.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// A guest whose node is joined to the router. A busy host may hold either for seconds, and an
-/// instance for longer than its budget.
+/// Describes a guest with a node joined to the router. A busy host may hold either back for
+/// seconds, and an instance for longer than its budget.
 fn joined(app: &str, port: u16) -> Guest {
     let guest = Guest::new(app).in_real_time();
     let guest = guest.network("virtio-net-pci,romfile=", "user");
@@ -40,7 +40,7 @@ fn bytes(hex: &str) -> Vec<u8> {
     (0..hex.len() / 2).map(|at| digits(2 * at)).collect()
 }
 
-/// Drives forward, as a node of ROS 2 does, until odometry says that the robot is beyond `x`.
+/// Drives forward, like a node of ROS 2, until the robot is beyond `x` by its odometry.
 fn drive(router: &mut Router, x: f64) {
     let mut place = [0; 64];
     let linear = Vector3 {
@@ -72,7 +72,7 @@ fn drive(router: &mut Router, x: f64) {
     }
 }
 
-/// Waits for a line of the router's that begins so.
+/// Waits for a line of the router beginning with `text`.
 fn heard(router: &Router, text: &str) -> String {
     let begun = Instant::now();
     while begun.elapsed() < LIMIT {

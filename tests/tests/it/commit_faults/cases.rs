@@ -1,14 +1,14 @@
-//! One commit for each fault that an app can make with `fass`.
+//! A commit for each fault an app can make with `fass`.
 //!
-//! A *case* builds DAGs that a commit must refuse for one reason, the fault whose name it has. A
-//! fault that `fass` rules out by its types (such as 17 inputs) has no case.
+//! A *case* builds DAGs with exactly one fault; the case is named like the fault, and the commit
+//! must refuse the DAGs. A fault excluded by the types of `fass` (such as 17 inputs) has no case.
 
 use std::time::Duration;
 
 use fass::shared::{Asker, Latest, Modes, Parameter, Sample, Uses, create_device};
 use fass::{Dag, FaultLimit, Subtask, SubtaskAttributes, Unique, create_dag, finish_create_dags};
 
-/// A fault's name and what builds the DAGs with that fault.
+/// A fault's name and the function building DAGs with this fault.
 type Case = (&'static str, fn() -> Vec<Dag>);
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
@@ -16,7 +16,7 @@ pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 /// One fault within 100 jobs, and 8 in all.
 const FAULT_LIMIT: FaultLimit = FaultLimit::new(1, 100, 8);
 
-/// Graphs that are wrong, each behind the name of its fault.
+/// Wrong graphs, each behind the name of its fault.
 pub(crate) const GRAPHS: &str = "\
 no_subtasks = lidar:
 duplicate_subtask = lidar: > read > points; points > filter > near_points; near_points > filter > objects; objects > store >
@@ -32,7 +32,8 @@ unwritten_topic = lidar: > read > points; points > filter > ground; ground point
 several_writers = lidar: > read > points; points > near > objects; points > far > objects; objects > store >
 duplicate_topic = lidar: > read > points; points points > store >";
 
-/// The cases, for a platform with static priorities. The last one needs a commit that succeeds.
+/// The cases, for a platform with static priorities. The last case needs an earlier, successful
+/// commit.
 pub(crate) const CASES: &[Case] = &[
     // The graph: its subtasks, edges, topics and types.
     ("no_dags", Vec::new),
@@ -352,7 +353,7 @@ fn attributes(name: &str) -> SubtaskAttributes {
 }
 
 /// Makes a DAG from its name and its subtasks, as `inputs > name > outputs`; a `_` in a topic's
-/// name is a blank.
+/// name becomes a blank.
 pub(crate) fn dag(text: &str) -> Dag {
     let (name, subtasks) = text.split_once(':').expect("a name");
     let dag = create_dag();
@@ -360,7 +361,7 @@ pub(crate) fn dag(text: &str) -> Dag {
     with(dag, subtasks).remove(0)
 }
 
-/// Registers subtasks of a DAG, and returns it.
+/// Registers subtasks of a DAG, and returns the DAG.
 fn with(dag: Dag, subtasks: &str) -> Vec<Dag> {
     for subtask in subtasks.split(';').filter(|text| !text.is_empty()) {
         let parts: Vec<&str> = subtask.split('>').map(str::trim).collect();
@@ -384,12 +385,12 @@ fn with(dag: Dag, subtasks: &str) -> Vec<Dag> {
     vec![dag]
 }
 
-/// A DAG without fault: a source, a topic, a sink.
+/// Makes a DAG without fault: a source, a topic, a sink.
 pub(crate) fn sound(name: &str, topic: &str) -> Dag {
     dag(&format!("{name}: > read > {topic}; {topic} > store >"))
 }
 
-/// A DAG whose source has these attributes.
+/// Makes a DAG from a source and the source's attributes.
 fn waiting(
     source: impl for<'d> FnOnce(&'d Dag) -> Subtask<'d>,
     read: SubtaskAttributes,
@@ -406,7 +407,7 @@ fn changed(change: impl FnOnce(&Dag)) -> Vec<Dag> {
     vec![dag]
 }
 
-/// Two of them, after a change.
+/// Makes two sound DAGs, and changes them.
 fn two(change: impl FnOnce(&Dag, &Dag)) -> Vec<Dag> {
     let both = [sound("lidar", "points"), sound("camera", "frames")];
     change(&both[0], &both[1]);
@@ -417,27 +418,27 @@ fn surviving(limit: FaultLimit) -> Vec<Dag> {
     changed(|dag| _ = dag.survive_faults(limit))
 }
 
-/// One whose source has a period and attributes.
+/// Makes a DAG from the period and the attributes of its source.
 fn read_by(period: Duration, read: SubtaskAttributes) -> Vec<Dag> {
     let dag = dag("lidar:");
     dag.register_periodic_subtask(|| (1_u32,), vec!["points"], period, read);
     with(dag, "points > store >")
 }
 
-/// One whose sink has a deadline and attributes.
+/// Makes a DAG from the deadline and the attributes of its sink.
 fn due(deadline: Duration, store: SubtaskAttributes) -> Vec<Dag> {
     let dag = dag("lidar: > read > points");
     dag.register_sink_subtask(|(_,): (u32,)| (), vec!["points"], deadline, store);
     vec![dag]
 }
 
-/// Gives a DAG a deadline next to that of its sink.
+/// Gives a DAG a deadline next to its sink's.
 fn of_dag(dags: Vec<Dag>) -> Vec<Dag> {
     dags[0].relative_deadline(PERIOD);
     dags
 }
 
-/// One of a single subtask without topics, after a change.
+/// Makes a DAG of a single subtask without topics, and changes the DAG.
 fn untyped(change: impl FnOnce(&Dag)) -> Vec<Dag> {
     let dag = dag("lidar:");
     dag.register_untyped_subtask(|_job| (), attributes("start"));
@@ -445,7 +446,7 @@ fn untyped(change: impl FnOnce(&Dag)) -> Vec<Dag> {
     vec![dag]
 }
 
-/// The DAG `planner` of a single subtask, which uses something.
+/// Makes the DAG `planner` of a single subtask, with a use besides inputs.
 fn planning<U: Uses + 'static>(
     uses: U,
     mut plan: impl for<'a> FnMut(U::Borrowed<'a>) + Send + 'static,
@@ -457,12 +458,12 @@ fn planning<U: Uses + 'static>(
     dag
 }
 
-/// That DAG, if it samples.
+/// Makes the DAG `planner` sampling a latest value.
 fn planner(latest: &Latest<u32>) -> Dag {
     planning(latest.sample(), |_| ())
 }
 
-/// Registers the sink `store`, which reads the topic `points` and uses something.
+/// Registers the sink `store`, reading the topic `points`, with another use besides.
 fn storing<U: Uses + 'static>(
     dag: Dag,
     uses: U,
@@ -472,7 +473,7 @@ fn storing<U: Uses + 'static>(
     stored(dag, |dag| dag.using(uses).subtask(sink))
 }
 
-/// Registers what becomes the sink `store`, which reads the topic `points`.
+/// Registers a subtask as the sink `store`, reading the topic `points`.
 fn stored(dag: Dag, store: impl for<'d> FnOnce(&'d Dag) -> Subtask<'d>) -> Vec<Dag> {
     let store = store(&dag).reads(&["points"]).due(PERIOD);
     store.register(attributes("store"));

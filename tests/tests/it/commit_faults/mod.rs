@@ -1,7 +1,7 @@
-//! Every fault that there is stands in `docs/errors.md` as the commit says it.
+//! Every existing fault is in `docs/errors.md`, with the commit's own text.
 //!
-//! A fault that `fass` cannot be brought to report is found by `sched_dag::verify` itself, or
-//! is a value of the fault where provoking it would take 2^32 DAGs.
+//! `sched_dag::verify` itself finds the faults `fass` cannot be brought to report. A fault needing
+//! 2^32 DAGs is not provoked, but made as a value.
 
 mod cases;
 
@@ -87,7 +87,7 @@ fn not_fixed() -> fass::commit::CommitError {
     refused(machine, dag)
 }
 
-/// A DAG of one subtask.
+/// Makes a DAG of one subtask.
 fn starting(name: &str) -> fass::Dag {
     let dag = fass::create_dag();
     dag.name(name).period(PERIOD).relative_deadline(PERIOD);
@@ -95,13 +95,13 @@ fn starting(name: &str) -> fass::Dag {
     dag
 }
 
-/// Commits a DAG for a machine that refuses it.
+/// Commits a DAG for a machine, and returns the machine's refusal.
 fn refused(_machine: virtual_time::VirtualTime, dag: fass::Dag) -> fass::commit::CommitError {
     let any_graph = fass::commit::ConstructionPolicy::any_graph();
     fass::commit::finish_create_dags_with(&[dag], any_graph).expect_err("there is a fault")
 }
 
-/// Faults that `fass` rules out by its types.
+/// Returns faults excluded by the types of `fass`.
 fn of_the_model() -> Vec<DagFault> {
     let one = CommitOptions::new(Policy::Edf, 1);
     let topic = |number: u32| TopicPort {
@@ -276,7 +276,7 @@ fn every_reason_against_a_proof_is_listed() {
     must_list("| text | what to do |", &all);
 }
 
-/// Holds the first column of a table to texts, with `...` for what stands in braces there.
+/// Compares the first column of a table with texts, with `...` for the parts in braces.
 fn must_list(head: &str, texts: &[&str]) {
     let documented = table(head);
     assert_eq!(documented.len(), texts.len());
@@ -288,7 +288,7 @@ fn must_list(head: &str, texts: &[&str]) {
     }
 }
 
-/// Returns sources, with texts that go on in the next line behind a backslash joined.
+/// Returns sources as a single text, with lines joined at a backslash inside a text.
 fn sources(files: &[&str]) -> String {
     let sources: String = files.iter().map(|file| page(file)).collect();
     let lines = sources.split("\\\n").enumerate();
@@ -299,7 +299,7 @@ fn sources(files: &[&str]) -> String {
     joined.collect()
 }
 
-/// Checks that each part of documented texts stands in sources.
+/// Checks that each part of documented texts is in the sources.
 fn all_are_in(documented: &[String], sources: &str) {
     for text in documented {
         for part in text.split("...") {
