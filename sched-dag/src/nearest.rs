@@ -14,7 +14,7 @@ const LONGEST: usize = 200;
 type Row = [u8; LONGEST + 1];
 
 /// Returns the allowed name nearest to `word`, if near enough to be the intended name: at most a
-/// third of the word's length away, where a distance of 1 is always near enough.
+/// third of the name's own length away, where a distance of 1 is always near enough.
 ///
 /// ```
 /// assert_eq!(sched_dag::nearest("lidra", &["camera", "lidar"]), Some("lidar"));

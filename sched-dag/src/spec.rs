@@ -56,9 +56,10 @@ impl DagSpec {
     /// Returns the most jobs in flight: the stated number or enough for the deadline, but no more
     /// than the limit of jobs.
     ///
-    /// A job that meets its deadline is in flight for at most D, so at most ceil(D / T) of them are
-    /// at any time; with one more a late job can end while the next is released. Where subtasks
-    /// share a state, jobs take turns: without a stated number, only one is in flight.
+    /// A job that meets its deadline is in flight for at most D, so at most ceil(D / T) such jobs
+    /// are in flight at any time. With one more, a late job can end while the next is released.
+    /// Where subtasks share a state, jobs take turns: without a stated number, only one is in
+    /// flight.
     pub fn most_in_flight(&self) -> u64 {
         let jobs = self.jobs.unwrap_or(u64::MAX);
         if let Some(given) = self.in_flight {

@@ -2,7 +2,7 @@
 //!
 //! The source starts a job every 25 ms. Each of the N parallel subtasks executes for a time drawn
 //! uniformly from 1 to 50 ms; the sink joins them. The mean load of a parallel subtask is 25.5 /
-//! 25, so backlogs grow slowly, however many cores there are, and in time jobs miss their
+//! 25, so backlogs grow slowly, however many cores there are, until jobs miss their
 //! deadlines. Such misses are the workload's nature, not an error. An error is a *mixed join*: a
 //! sink receiving values of different jobs. [`JoinCount`] counts mixed joins; there must be none.
 //!

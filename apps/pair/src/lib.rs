@@ -53,8 +53,8 @@ pub enum Role {
 }
 
 /// Builds a machine's DAGs, and returns them with the wires of the topics `reading` and `wish`. The
-/// run ends after the given number of jobs, each a period long. The app states a delay of up to
-/// `delay` for the link.
+/// run ends after the given number of jobs, released once per period. The app states a delay of up
+/// to `delay` for the link.
 pub fn build(
     node: &mut Node,
     role: Role,

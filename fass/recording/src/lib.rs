@@ -48,7 +48,7 @@
 //! - Reading any bytes gives a value, or the offset of the first error. Reading does not panic,
 //!   recurses to a depth fixed by the type, and allocates at most [`MOST_GROWTH`] times the given
 //!   bytes, for each level of that depth. Only bytes in the exact form written for the value are
-//!   accepted.
+//!   accepted; in CDR, the padding is not compared.
 //! - Reading a file takes a time bounded by the file's length: each type has at most
 //!   [`MOST_WEIGHTLESS`] parts taking no bytes, so no value has many more parts than bytes.
 //!

@@ -372,8 +372,8 @@ impl DeviceEnd {
     }
 
     /// Ends a subtask's wait for a packet, if there is one, and returns the arguments for
-    /// [`Platform::raise`](crate::platform::Platform::raise), like [`arrive`](Self::arrive). Call
-    /// the method without a lock of the device: the wait may end at once.
+    /// [`Platform::raise`](crate::platform::Platform::raise), like [`arrive`](Self::arrive). The
+    /// caller holds no lock of the device, because the wait may end at once.
     ///
     /// See [`swap_in`](Self::swap_in).
     pub fn announce(&self) -> Option<(u64, DagId)> {
@@ -422,8 +422,8 @@ impl DeviceEnd {
         outgoing.take_packet(|packet| send(&mut packet.buffer, packet.peer))
     }
 
-    /// Ends a subtask's wait for departure, if there is one and nothing is left to go. Call the
-    /// method without a lock of the device.
+    /// Ends a subtask's wait for departure, if there is one and nothing is left to go. The caller
+    /// holds no lock of the device.
     ///
     /// See [`swap_out`](Self::swap_out).
     pub fn tell_gone(&self) {

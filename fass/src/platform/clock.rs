@@ -29,8 +29,9 @@ pub enum Occupation {
 /// Executes for `duration` on the calling instance's core, inside a subtask.
 ///
 /// Stands for computation still missing in an app, or for work whose time is being studied.
-/// Preempted time does not count. In virtual time the call takes exactly this time; a function
-/// without such a call takes its WCET.
+/// Preempted time does not count. In virtual time the call takes exactly this time. A function
+/// without such a call takes its WCET there, unless the test sets another time, and without a WCET
+/// no time.
 ///
 /// # Panics
 ///

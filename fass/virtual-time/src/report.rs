@@ -134,7 +134,7 @@ impl Report {
         self.instances.iter().all(|record| record.execution_ns == 0)
     }
 
-    /// Returns a warning if no call took any time, so the times mean nothing.
+    /// Returns a warning if no call took any time, because then the times mean nothing.
     pub(crate) fn warning(&self) -> Option<String> {
         let calls = self.instances.len();
         (calls > 0 && self.took_no_time()).then(|| {
@@ -145,8 +145,8 @@ impl Report {
         })
     }
 
-    /// Checks rules R1 to R5 of the task model over the recorded events, and returns the
-    /// violations: none, unless the scheduler is wrong.
+    /// Checks the rules of the task model over the recorded events (R1 to R5, and those for waits
+    /// and tables), and returns the violations: none, unless the scheduler is wrong.
     ///
     /// After a panic ([`RunError::Panicked`](crate::RunError::Panicked)) the last instant is
     /// incomplete, and may seem to break the rules.
@@ -170,7 +170,8 @@ impl Report {
     }
 
     /// Returns the events as lines such as `5000000 start sink[0] core 1`: the time, the event, the
-    /// name with the job in brackets, and further facts. A stop of a whole DAG names no job.
+    /// name with the job in brackets, and further facts. An event of a whole DAG, such as a pause,
+    /// names no job.
     ///
     /// For tests that compare whole sequences in words.
     #[must_use]

@@ -134,7 +134,8 @@ impl InterferingDag {
     }
 
     /// Adds for each `j` the work on `m - j` cores within a window: to `plain` all work that fits,
-    /// and to `clipped` the work limited to the `waiting_ns` for which the job waits.
+    /// and to `clipped` the work limited to the time for which the job waits. `times` are the
+    /// window and the waiting time, in nanoseconds.
     pub(super) fn add_to(
         &self,
         times: (u64, u64),

@@ -282,9 +282,9 @@ impl Run {
         self.task_set.dag(dag).sinks().binary_search(&sink).ok()
     }
 
-    /// Returns every breach of the model's rules R1 to R4, of the order of each instance's events,
-    /// and of the limit of one instance at a time on each core. Durations are never breaches,
-    /// because the machine decides them.
+    /// Returns every breach of the model's rules R1 to R4, of the stated number of waits (W1), of
+    /// the order of each instance's events, and of the limit of one instance at a time on each
+    /// core. Durations are never breaches, because the machine decides them.
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         self.judge(&mut |_| ()).into_iter()
     }

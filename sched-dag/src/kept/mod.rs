@@ -241,7 +241,7 @@ impl Journal {
     }
 
     /// Computes the statistics of the run, in histograms of `2^bits` buckets for each doubling, or
-    /// in the resolution of the existing tally. Returns `None` if events were neither kept nor
+    /// in the resolution of the existing tally. Returns `None` if any event was neither kept nor
     /// counted.
     #[inline(never)]
     pub fn statistics(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<RunTally> {

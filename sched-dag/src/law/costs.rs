@@ -30,8 +30,9 @@ pub struct MeasuredCosts {
 
 impl MeasuredCosts {
     /// Measures the events of a whole run, given in their order, core by core. An instance is owed
-    /// a core as soon as the instance waits and its next core has finished another instance. If a
-    /// fault ended that other instance, the time since its begin counts as the cost of the fault.
+    /// a core from the instant when the instance gets in line, or from the latest finish or wait of
+    /// another instance on its next core, if later. If a fault ended the other instance, the other
+    /// instance's begin counts instead, so all its time counts as the cost of the fault.
     /// ([`judge_dispatch`](super::judge_dispatch) asks the rule itself, with ten times the code:
     /// the instance to be run, on any core.)
     pub fn of_cores(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {

@@ -355,7 +355,8 @@ const fn shown_ns(wrong: &DispatchBreach) -> u64 {
     }
 }
 
-/// Returns the awaited instance's relation to an event's instance, and when and where it is over.
+/// Returns the words for the relation of an awaited instance to an event's job, and for when and
+/// where the awaited instance is over.
 pub(super) fn comes(event: &Event, awaited: Instance, over: Option<(u64, CoreId)>) -> impl Display {
     fmt::from_fn(move |f| {
         f.write_str(match awaited.job == event.job {

@@ -185,9 +185,10 @@ impl Scheduler {
     }
 
     /// Ends the wait with the earliest limit, if the limit has come by `now_ns`, and gives the
-    /// instance an idle core. Returns `None` if no such limit has come, or if more is to be decided
-    /// at this instant; the wait may have been ended even then. After `None`, the driver takes the
-    /// step the usual way. No request may be pending.
+    /// instance an idle core. Returns `None` if the next event is not such a limit, if no core is
+    /// idle, if the instance belongs to another line than the cluster's, or if more is to be
+    /// decided at this instant; in this last case the wait may have been ended. After `None`, the
+    /// driver takes the step the usual way. No request may be pending.
     #[inline]
     pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
         let (limit_ns, timer) = self.timers.peek()?;

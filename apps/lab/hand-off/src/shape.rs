@@ -1,8 +1,8 @@
 //! The measured graphs, as lists of edges.
 //!
-//! Nothing here belongs to this project: a few such lines and empty functions are enough to time
-//! another scheduler on the same graphs. Subtasks are numbered from 0 in topological order; 0 is
-//! the only source, the last number is the only sink.
+//! Nothing here depends on the scheduler, and only `random` is of this project: a few such lines
+//! and empty functions are enough to time another scheduler on the same graphs. Subtasks are
+//! numbered from 0 in topological order; 0 is the only source, the last number is the only sink.
 
 use alloc::vec::Vec;
 

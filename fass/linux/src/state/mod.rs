@@ -109,7 +109,7 @@ pub(crate) struct State {
     /// By worker: the earliest end of its instance, namely its latest start or resumption, or the
     /// latest step that another thread wrote down under the same core.
     resumed_ns: Box<[u64]>,
-    /// The core and vertex whose processor a worker reporting an end has just taken.
+    /// The core and vertex whose processor a worker has just taken in order to report an end.
     interrupted: Option<(CoreId, Vertex)>,
     /// Instances that finished after losing their core, and are not reported yet.
     pub(crate) left: Vec<Left>,

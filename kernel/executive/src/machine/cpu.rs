@@ -42,7 +42,7 @@ pub(super) fn probe_stack() {
     unsafe { asm!("test byte ptr [rsp - {}], 0", const STACK_FOR_A_SECTION, options(nostack)) };
 }
 
-/// More than any section with interrupts disabled takes of the stack, in bytes; less than a page.
+/// More bytes of the stack than any section with interrupts disabled uses; less than a page.
 const STACK_FOR_A_SECTION: usize = 2048;
 
 /// Interrupts the running code, at its own request to be ended.

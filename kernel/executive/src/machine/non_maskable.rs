@@ -8,7 +8,7 @@ use super::this_core::{self, Core};
 /// Whether non-maskable interrupts are this kernel's own signal to stop.
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
-/// Makes a core without interrupts answer. If the core's interrupts are disabled at several answers
+/// Makes a core answer even if its interrupts are disabled. If they are disabled at several answers
 /// in a row, the core ends the run.
 pub fn accuse(core: &Core) {
     if core.accusation.open() {

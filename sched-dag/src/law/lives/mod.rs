@@ -1,5 +1,5 @@
-//! Judges a journal by the rules R1 to R4, by one life of each instance, and by one instance on
-//! each core.
+//! Judges a journal by the rules R1 to R4, by the rules W1 and W2 for waits, by one life of each
+//! instance, and by one instance on each core.
 //!
 //! The judge takes the events in their order, where each event comes after all its causes, and
 //! compares each event with the state known so far. An event not yet seen has not happened,
@@ -21,7 +21,7 @@
 //! *One life*: an instance becomes ready once, starts once and only when ready, is suspended only
 //! on the core where it runs, resumed only when suspended, and finishes once, on the core where it
 //! runs. So an instance is on one core at a time. An instance is cancelled only if its job was cut.
-//! The time of each event is no earlier than the time of the event before.
+//! An event of an instance never has an earlier time than the instance's event before.
 //!
 //! *One core*: an instance on a core is the core's *occupant*. The occupant must be gone before the
 //! next instance starts or is resumed there.
@@ -54,8 +54,8 @@ pub struct LifeVerdict {
     pub finish_to_ready_max_ns: u64,
 }
 
-/// Checks a journal against the rules R1 to R4, and each instance and each core against the rules
-/// of every machine: one life, and one instance on a core at a time.
+/// Checks a journal against the rules R1 to R4 and, for waits, W1 and W2, and each instance and
+/// each core against the rules of every machine: one life, and one instance on a core at a time.
 ///
 /// [`dispatch_violations`](super::dispatch_violations) judges which instance should have run.
 #[must_use]

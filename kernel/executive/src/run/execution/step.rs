@@ -344,8 +344,8 @@ pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     Some((cost, budget_ns))
 }
 
-/// Makes a step of the scheduler if `is_event`, and follows its decisions on this core. Called in
-/// an interrupt handler.
+/// Makes a step of the scheduler if `is_event` or if letters may be waiting, and follows its
+/// decisions on this core. Called in an interrupt handler.
 pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     let core = this_core::get();
     let cluster = cluster::cluster_of(core);

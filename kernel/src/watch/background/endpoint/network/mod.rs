@@ -7,10 +7,11 @@
 //!
 //! # A storm is bounded by law
 //!
-//! An interrupt takes [`Law::most`] frames. Then the card is masked: the next interrupt comes
-//! [`Law::distance_ns`] later, by an alarm of the same core, and takes as many. Meanwhile the card
-//! drops the frames it has no buffer for, at no cost. So any storm costs that core at most one such
-//! interrupt in each distance, and bounds are charged for exactly this.
+//! An interrupt takes at most [`Law::most`] frames, and masks the card. [`Law::distance_ns`] later
+//! an alarm of the same core takes at most as many, and masks the card again; if there are no
+//! frames, the alarm lets the card interrupt again. Meanwhile the card drops the frames it has no
+//! buffer for, at no cost. So any storm costs that core at most one such interrupt in each
+//! distance, and bounds are charged for exactly this.
 //!
 //! # Locks
 //!
@@ -50,7 +51,7 @@ pub(super) use wire::UdpWire;
 /// The limit on the cost of a storm.
 #[derive(Clone, Copy)]
 struct Law {
-    /// The number of frames taken, or packets sent, in an interrupt.
+    /// The most frames taken, or packets sent, in an interrupt.
     most: u64,
     /// The least time from one interrupt to the next, in nanoseconds.
     distance_ns: u64,
