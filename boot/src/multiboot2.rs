@@ -60,7 +60,7 @@ fn read_tag(memory: &impl PhysicalMemory, kind: u32, start: u64, end: u64, info:
             if let (Some(from), Some(to)) = place
                 && memory.u32(start + 8) != Some(FILLER)
             {
-                // Modules without room are more than the kernel uses.
+                // Modules beyond the list's room are more than the kernel uses.
                 let _ = info.add_module(u64::from(from), u64::from(to));
             }
         }

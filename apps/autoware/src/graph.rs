@@ -58,8 +58,8 @@ const RECORDED: [&[&str]; 6] = [
 ];
 
 impl AutowareSystem {
-    /// Records the topics needed and compared by a replay. Recording and replaying take a quarter
-    /// of the image.
+    /// Records the topics that a replay needs, and the topics that a replay compares. Recording and
+    /// replaying take a quarter of the image.
     pub fn record(&self) {
         for (dag, topics) in self.dags.iter().zip(RECORDED) {
             for topic in topics {
@@ -115,7 +115,7 @@ impl GraphBuilder<'_> {
         dag
     }
 
-    /// Returns the number of a DAG's jobs during the jobs of the lidars.
+    /// Returns the number of jobs that a DAG has in the time of the lidars' jobs.
     fn jobs(&self, period: Duration) -> u64 {
         let jobs = u128::from(self.workload.jobs);
         let jobs = (jobs * LIDAR.as_nanos()).div_ceil(period.as_nanos());

@@ -38,10 +38,10 @@
 //!
 //! # Execution times
 //!
-//! In the original each such node computes primes up to 4096, a few ms on a Raspberry Pi 4. Here a
-//! piece of work has a WCET of 4 ms unless [`Workload::crunch`] says otherwise, and takes a time
-//! between a part of its WCET and all of it. Drivers and sinks, which only pass values on, have a
-//! WCET of 100 us.
+//! In the original each node with work computes primes up to 4096, a few ms on a Raspberry Pi 4.
+//! Here a piece of work has a WCET of 4 ms unless [`Workload::crunch`] says otherwise, and takes a
+//! time between a part of its WCET and all of it. Drivers and sinks, which only pass values on,
+//! have a WCET of 100 us.
 //!
 //! The library does not use the kernel: the tests run the system in virtual time.
 

@@ -1,4 +1,4 @@
-//! The way from a set to DAGs executing for the set's times.
+//! Makes a set into DAGs that execute for the set's times.
 //!
 //! Instances occupy their cores for their execution times. Waiting instances sleep for as long as a
 //! simulated device takes to answer.
@@ -25,8 +25,8 @@ pub struct RunSettings {
     pub occupation: Occupation,
     /// The number of jobs, as a length.
     pub length: Length,
-    /// Not 0: a segment's execution counts from the latest multiple of this time on the clock. So
-    /// the kernel's time before the segment is a part of the execution, as in a model without
+    /// If not 0, a segment's execution counts from the latest multiple of this time on the clock.
+    /// So the kernel's time before the segment is a part of the execution, as in a model without
     /// overheads.
     pub grid_ns: u64,
 }

@@ -3,7 +3,7 @@
 //! The time drawn by an instance follows only from the seed, the subtask's position in its set, and
 //! the job. So two policies, or two numbers of cores, get the same load. A sample contains the
 //! times of all segments and waits. Without a sample, the segments of a subtask divide the
-//! instance's time in the proportions of its WCET.
+//! instance's time in the same proportions as the subtask's WCET.
 //!
 //! A wait lasts until a simulated device answers, or to its limit. Where each instance takes its
 //! WCET, no device answers, which is the worst case of waits. Without a sample the time of an

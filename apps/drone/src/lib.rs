@@ -10,12 +10,12 @@
 //! | `descent` | every 50 ms | `descend` |
 //! | `safety` | by a fault of `camera`, `battery`, `mission` or `command` | `alarm` |
 //!
-//! The airframe and its sensors are simulated, within `measure`, `move` and `capture`; all other
-//! code would fly. The airframe is a *state* of `attitude`. *Latest values* travel between the
-//! DAGs: `camera` reads the estimate of `attitude`; `attitude` reads the place of the airframe
-//! found by `camera` and the goal decided by `command`. `mission` signals a reached waypoint,
-//! `battery` a low charge. A frame still unfinished when the next frame is due makes the DAG skip
-//! the next frame.
+//! The airframe and its sensors are simulated, within `measure`, `move` and `capture`; a real drone
+//! would fly with all other code. The airframe is a *state* of `attitude`. *Latest values* travel
+//! between the DAGs: `camera` reads the estimate of `attitude`; `attitude` reads the place of the
+//! airframe found by `camera` and the goal decided by `command`. `mission` signals a reached
+//! waypoint, `battery` a low charge. A frame still unfinished when the next frame is due makes the
+//! DAG skip the next frame.
 //!
 //! There are two *modes*: in `flight`, `camera` and `mission` run; in `landing`, `descent` runs.
 //! The others run in both. `command` enters the landing for want of charge, when the camera has

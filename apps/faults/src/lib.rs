@@ -37,7 +37,7 @@ pub const BUDGET: Duration = Duration::from_millis(6);
 /// The job in which the doomed DAG commits its crime.
 pub const FATAL_JOB: u64 = 10;
 
-/// The faults survived by the doomed DAG, unless a fault ends it.
+/// The faults survived by the doomed DAG, unless its policy is [`FaultPolicy::End`].
 const FAULT_LIMIT: FaultLimit = FaultLimit::new(1, 10, 2);
 
 /// The jobs of each DAG.
@@ -69,7 +69,7 @@ pub fn healthy() -> Dag {
 /// The time between two jobs where faults come thick and fast.
 const SHORT_PERIOD: Duration = Duration::from_millis(1);
 
-/// Builds a healthy DAG, and a restless DAG that survives `faults` faults, in every second job.
+/// Builds a healthy DAG, and a restless DAG that survives `faults` faults, one in every second job.
 pub fn restless(faults: u32) -> [Dag; 2] {
     let jobs = u64::from(faults) * 2;
     let healthy = create_dag();

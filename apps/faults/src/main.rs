@@ -115,7 +115,7 @@ enum FaultVerdict {
     /// The healthy DAG was late before the fault, so the host is too busy to judge.
     Unclear,
     /// The healthy DAG was late or incomplete, or the doomed DAG lost more or fewer jobs than its
-    /// policy says.
+    /// policy says, or the asking DAG failed.
     Harmful,
 }
 

@@ -22,7 +22,7 @@ impl ExecutionTimes {
         Self::up_to(WCET, seed, branch)
     }
 
-    /// Starts a sequence whose longest time, at least 1 ms, differs from the paper's.
+    /// Starts a sequence whose longest time, at least 1 ms, may differ from the paper's.
     pub fn up_to(longest: Duration, seed: u64, branch: usize) -> Self {
         let seed = nth(seed, branch as u64);
         Self {

@@ -47,7 +47,7 @@ impl RunFigures {
         let since = |later: Option<u64>, earlier: u64| Some(later?.saturating_sub(earlier));
         // From the last parallel subtask's finish to the sink being ready.
         let to_ready = (sinks.clone()).filter_map(|(join, sink)| since(sink.ready_ns, join));
-        // From there to the sink's first instruction.
+        // From the same finish to the sink's first instruction.
         let to_start = sinks.filter_map(|(join, sink)| since(sink.start_ns, join));
         // From the nominal release to the completion.
         let responses = jobs

@@ -18,7 +18,7 @@ const WCET: Duration = Duration::from_micros(50);
 /// Selects the measurements of one sensor.
 type Take = fn(&Sample) -> &Sensor;
 
-/// Builds the DAG, which runs the jobs of a recording up to its last sample, and the place of the
+/// Builds the DAG, which runs the jobs of a recording up to the last sample, and the place of the
 /// DAG's results.
 ///
 /// # Errors
@@ -101,7 +101,7 @@ impl WalkOrientations {
     }
 
     /// Returns a hash of all bits (FNV-1a with 64 bits, over whole words): walks with equal hashes
-    /// are equal.
+    /// are almost certainly equal.
     pub fn digest(&self) -> u64 {
         let words = self.0.iter().map(|word| word.load(Relaxed));
         words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {

@@ -66,7 +66,7 @@ fn link(script: &str) {
     for argument in arguments(&copy.display().to_string()) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
-    // No other file of the package counts, and this file always exists.
+    // No file of the package counts for the script; cargo is told of one that always exists.
     println!("cargo::rerun-if-changed=Cargo.toml");
 }
 

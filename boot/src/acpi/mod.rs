@@ -94,8 +94,8 @@ impl core::fmt::Display for AcpiError {
 
 const HEADER: u64 = 36;
 
-/// Reads the tables, starting from the root pointer named by the loader or, by default, from the
-/// root pointer in the BIOS area (ACPI 5.2.5.1).
+/// Reads the tables, starting from the root pointer named by the loader. If the loader named none,
+/// or none is there, the root pointer in the BIOS area counts (ACPI 5.2.5.1).
 ///
 /// # Errors
 ///

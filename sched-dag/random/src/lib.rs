@@ -1,9 +1,8 @@
 //! Random numbers: the same for the same seed, everywhere.
 //!
-//! The generator is SplitMix64 (Steele, Lea, Flood, OOPSLA 2014,
-//! doi 10.1145/2660193.2660195). Its `n`th number is a function of the seed and
-//! of `n` alone, which [`nth`] gives without the ones before: what one job draws
-//! does not depend on which jobs before it were skipped.
+//! The generator is SplitMix64 (Steele, Lea, Flood, OOPSLA 2014, doi 10.1145/2660193.2660195). Its
+//! `n`th number is a function of the seed and of `n` alone, and [`nth`] computes the number without
+//! its predecessors. So the draws of a job do not depend on which earlier jobs were skipped.
 //!
 //! [`sets`] draws DAGs.
 
@@ -37,33 +36,34 @@ impl Random {
         number
     }
 
-    /// Draws a number from `range`, none of which is below 0, each with the same probability.
+    /// Draws a number from `range`, with the same probability for each number; the range has no
+    /// number below 0.
     pub fn within<N: Copy + TryFrom<u64> + TryInto<u64>>(&mut self, range: RangeInclusive<N>) -> N {
         scale(self.number(), range)
     }
 
-    /// Draws an index into a list of `length` items, which is not empty.
+    /// Draws an index into a list of `length` items, at least one.
     pub fn index(&mut self, length: usize) -> usize {
         self.within(0..=length.saturating_sub(1))
     }
 
-    /// Draws one of some items, of which there is one at least.
+    /// Draws one of some items; at least one is needed.
     pub fn one_of<T: Copy>(&mut self, items: &[T]) -> T {
         items[self.index(items.len())]
     }
 
-    /// Is true once in `count` times.
+    /// Returns `true` once in `count` times on average.
     pub fn once_in(&mut self, count: u64) -> bool {
         self.within(1..=count) == 1
     }
 
-    /// Is true in `percent` of 100 cases.
+    /// Returns `true` in `percent` of 100 cases on average.
     pub fn chance(&mut self, percent: u64) -> bool {
         self.within(1..=100) <= percent
     }
 
-    /// Draws the edges of a graph, from vertices to later ones: of all that there can be,
-    /// `percent` of 100.
+    /// Draws the edges of a graph. Each edge from a vertex to a later vertex is drawn with a
+    /// probability of `percent` in 100.
     pub fn edges(&mut self, vertices: usize, percent: u64) -> impl Iterator<Item = (usize, usize)> {
         let pairs = (1..vertices).flat_map(|to| (0..to).map(move |from| (from, to)));
         pairs.filter(move |_| self.chance(percent))
@@ -78,8 +78,8 @@ pub const fn nth(seed: u64, n: u64) -> u64 {
     mixed ^ (mixed >> 31)
 }
 
-/// Maps a number of 64 bits to a range: the high part of the product has not
-/// the bias of a remainder.
+/// Maps a number of 64 bits to a range. A remainder would favour small numbers; the high part of
+/// the product does so hardly at all.
 pub fn scale<N: Copy + TryFrom<u64> + TryInto<u64>>(number: u64, range: RangeInclusive<N>) -> N {
     let [least, most] = [range.start(), range.end()].map(|&it| it.try_into().unwrap_or(0));
     let choices = u128::from(most.saturating_sub(least)) + 1;

@@ -7,9 +7,9 @@ use sched_dag::{DagSpec, Priority, SubtaskSpec};
 
 use crate::Random;
 
-/// Draws up to 4 DAGs for clusters of `clusters` cores, which they take in turn, at least one each:
-/// from light to full load, deadlines below, at and beyond the period, priorities by DAG or by
-/// subtask.
+/// Draws up to 4 DAGs for clusters with `clusters` cores. The DAGs take the clusters in turn, and
+/// each cluster gets at least one. The load is light to full, deadlines lie below, at and beyond
+/// the period, and priorities go by DAG or by subtask.
 #[must_use]
 pub fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<DagSpec> {
     let count = random.within(clusters.len()..=4);
@@ -40,8 +40,8 @@ fn dag(random: &mut Random, unit_ns: u64, cores: u64, share: u64, overlaps: bool
     let (volume_ns, longest_ns): (u64, _) = (wcets_ns().sum(), wcets_ns().max().unwrap_or(1));
     let period_ns = (volume_ns * share).div_ceil(cores * 4) + random.within(0..=10 * unit_ns);
     let (period_ns, deadline_ns) = if overlaps {
-        // With overlapping jobs the period may be shorter than a job, but not than its longest
-        // subtask.
+        // With overlapping jobs the period may be shorter than a job, but not shorter than the
+        // job's longest subtask.
         let period_ns = period_ns.max(longest_ns);
         let more_ns = random.within(0..=period_ns);
         (period_ns, period_ns * random.within(1..=4) + more_ns)

@@ -28,7 +28,7 @@ const LEFT: u64 = 84;
 const RIGHT: u64 = 36;
 const ROW: u64 = 30;
 const BOX: (u64, u64) = (104, 40);
-/// The distance of two boxes.
+/// The distance between two boxes.
 const GAP: (u64, u64) = (44, 12);
 /// The approximate width of a letter.
 const LETTER: u64 = 7;
@@ -48,7 +48,7 @@ pub struct WindowRequest<'w> {
     pub to: Option<&'w str>,
     /// The names of the DAGs, with commas between them; else all DAGs are drawn.
     pub dags: Option<&'w str>,
-    /// Without `to`: the length as a multiple of the longest period; else 1.
+    /// Without `to`: the length, as a multiple of the longest period of these DAGs; `None`: 1.
     pub periods: Option<u64>,
 }
 
@@ -288,7 +288,7 @@ impl<'v> Picture<'v> {
             let model = self.view.run.task_set.dag(instance.dag);
             let name = model.subtask(instance.subtask).name();
             // Jobs released before or after the window are drawn, too: a core is never shown idle
-            // while it executes.
+            // while it executes one of these DAGs.
             for slice in &history.slices {
                 let to_ns = slice.to_ns.unwrap_or(self.end_ns).min(self.end_ns);
                 if slice.from_ns >= self.end_ns || to_ns < self.window.released_ns.start {

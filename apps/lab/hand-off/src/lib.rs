@@ -56,7 +56,7 @@ pub struct Workload {
     pub wcet: Option<Duration>,
 }
 
-/// Builds the DAG, and the place of the times left by its bodies.
+/// Builds the DAG, and returns it with the place where its bodies leave their times.
 ///
 /// # Panics
 ///

@@ -89,7 +89,7 @@ pub(crate) fn in_a_table(
     Ok(())
 }
 
-/// Measures the same on two cores: each hop wakes the other core.
+/// Measures a chain in a table of two cores: each hop wakes the other core.
 pub(crate) fn hops_elsewhere(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     in_a_table(machine, workload(Shape::Chain(64), jobs, Stamping::Ends), 2)
 }

@@ -110,7 +110,7 @@ impl RunSamples {
         let indices = (0..).take(self.last_publications_ns().count());
         let covering = indices.map_while(|index| {
             let covers = |join: &usize| self.indices_of(*join).iter().all(|own| *own >= index);
-            // A join without this index covers no later index either.
+            // A join that does not cover this index covers no later index either.
             first = (first..self.joins.len()).find(covers)?;
             Some(first)
         });

@@ -178,7 +178,7 @@ fn span(times: &InstanceRecord) -> Option<ExecutionSpan> {
     })
 }
 
-/// The number of executions or joins in a line.
+/// The most executions or joins in a line.
 const BATCH: usize = 32;
 
 /// The outcome of a condition.

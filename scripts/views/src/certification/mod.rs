@@ -13,8 +13,8 @@
 //!    bound may rest on the demand of all, so has each released job of any DAG;
 //! 6. *WCET*: no segment executes for longer than its WCET and its charges;
 //! 7. *lost*: nor do execution and lost time together take longer;
-//! 8. *bound*: no response is above its bound. By hand this follows from all other conditions, so a
-//!    failure is an error of ours.
+//! 8. *bound*: no response is above its bound. By an argument on paper this follows from all other
+//!    conditions, so a failure is an error of ours.
 //!
 //! *Lost* times are the time until an instance is ready, from the nominal release or the last
 //! finish that the instance waits for; the time for which a wait goes on beyond its limit; and for
@@ -97,7 +97,7 @@ fn due_again(view: &View<'_>) -> Option<String> {
 
 /// Returns which job was not released, if any, although it is one of a stated number or should have
 /// been complete. Only periodic DAGs with a bound are checked, except DAGs that were paused or
-/// closed or may be left out by a mode.
+/// closed. A run that entered a mode is not checked, because a mode may leave DAGs out.
 fn missing(view: &View<'_>) -> Option<String> {
     let run = view.run;
     let modes = view.events.iter().any(|it| it.what == EventKind::Entered);
