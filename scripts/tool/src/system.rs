@@ -112,8 +112,8 @@ pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
     candidates.into_iter().find(|file| is_program(file))
 }
 
-/// Returns all files below a folder, sorted, except generated and hidden files; `enters` decides
-/// for each folder whether to descend.
+/// Returns all files below a folder, sorted, except the files in hidden folders and in folders
+/// named `target`; `enters` decides for each other folder whether to descend.
 pub fn files_below(root: &Path, enters: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root.to_path_buf()];

@@ -380,7 +380,7 @@ pub enum ValueKind {
     Nothing,
     /// A decimal number, from the first bound to the second, inclusive.
     Number(u64, u64),
-    /// Several such numbers, with commas between.
+    /// One or more such numbers, with commas between.
     Numbers(u64, u64),
     /// One of these words.
     OneOf(&'static [&'static str]),

@@ -4,8 +4,8 @@
 //! Runs of several boots can be added up: two DAGs count as the same DAG if the hashes of their
 //! names and edges are equal.
 //!
-//! The overheads are measured from the journal of a run: `sched_dag::law::Costs` defines the
-//! measurement, `sched_dag::analysis::Overheads::measured` the resulting charge.
+//! The overheads are measured from the journal of a run: `sched_dag::law::MeasuredCosts` defines
+//! the measurement, `sched_dag::analysis::Overheads::measured` the resulting charge.
 //!
 //! Observed WCETs go to files, for later commits. `sched_dag::wcets` defines the format and the
 //! reader, which the guest's commit uses, too. This module refuses faults visible without the DAGs;

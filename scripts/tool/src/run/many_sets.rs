@@ -113,7 +113,7 @@ fn read<'f>(
 }
 
 /// Runs parts by a program. Where the program dies at a set, another program goes on behind the
-/// set. A set may take up to `seconds`.
+/// set. A program may take up to `seconds` for each of its sets, on average.
 fn run_share(
     program: &Path,
     (words, options, length): (&[String], &CommandLine, Length),

@@ -283,7 +283,7 @@ fn meaning(mode: Mode) -> &'static str {
     }
 }
 
-/// Returns the words for programs of this computer only.
+/// Returns the words that only a program for Linux or for virtual time gets.
 pub(super) fn own_words(options: &CommandLine) -> Vec<String> {
     let mut words = Vec::new();
     for name in [name::CORES, name::MECHANISM, name::OUTPUT] {

@@ -3,7 +3,7 @@
 //! The judge is [`sched_dag::law`], as for all runs, within a stated *bound*, because a decision
 //! takes effect only after an interrupt.
 //!
-//! Lost events are always the oldest, and the judge looks only at events after the instant of the
+//! Lost events count as the oldest, so the judge looks only at events after the instant of the
 //! first event left. An instance unfinished at the end of the trace breaks no rule, unless the run
 //! says that it is complete.
 //!

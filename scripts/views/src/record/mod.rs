@@ -613,7 +613,7 @@ pub struct Run {
     pub bounds_ns: Vec<Option<u64>>,
     /// The events, in the order of the journal.
     pub events: Vec<Event>,
-    /// The number of lost events, all older than the others.
+    /// The number of lost events; a judge takes all of them for older than the others.
     pub lost: u64,
     /// Whether the run has ended in order, so no events are missing at its end.
     pub complete: bool,
