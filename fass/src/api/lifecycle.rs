@@ -456,8 +456,8 @@ fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
             );
             add("mode_starts_paused", text);
         }
-        // The handler of faults brings about a safe state, so it has to be on in every mode in
-        // which its DAG runs.
+        // The handler brings about a safe state, so it has to be on in every mode in which the DAG
+        // runs whose faults it handles.
         let handler = draft.all().next();
         let handler = handler.and_then(|FaultSignal(target)| dag_of(drafts, target));
         // No mode ever pauses a handler outside all modes.

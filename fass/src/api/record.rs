@@ -129,9 +129,9 @@ fn plan_channels(drafts: &Drafts, plan: &mut Plan) {
     }
 }
 
-/// Numbers all recorded topics of a DAG, the samples of its subtasks from such topics, and its
-/// recorded states; tells the platform, and appends their lines to the plan. Returns the wrappers
-/// needed around subtasks.
+/// Numbers all recorded topics of a DAG, the samples of its subtasks from such topics, the recorded
+/// answers of devices, and its recorded states; tells the platform, and appends their lines to the
+/// plan. Returns the wrappers needed around subtasks.
 #[allow(clippy::too_many_lines, reason = "one order, to be seen whole")]
 fn open_channels(drafts: &Drafts, dag: DagId, plan: &mut Plan) -> Vec<(usize, Around)> {
     let draft = &*drafts[dag.index()].borrow();
@@ -238,8 +238,8 @@ fn replay_sources(draft: &mut DagDraft) {
 }
 
 /// Adds a fault for each value missing from the recording but needed by a replay. In each DAG with
-/// a recorded source, those are the other topics of the sources, the answers of devices, and the
-/// topics sampled by the other subtasks.
+/// a recorded source, those are the other topics of the sources, and, for all other subtasks, the
+/// answers of devices and the sampled topics.
 fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
     for (id, draft) in (0..).map(DagId).zip(drafts) {
         let draft = draft.borrow();

@@ -253,7 +253,7 @@ fn note_replaceable(draft: &mut DagDraft, subtask: usize) {
 }
 
 impl<'d> Subtask<'d> {
-    /// Begins with functions of which one replaces the other.
+    /// Begins the registration of a subtask with functions of which one replaces the other.
     fn with_replacement<Args: VecToSubs, Ret: VecToPubs>(
         dag: &'d Dag,
         begin: impl FnOnce(&Dag, usize) -> Replacement<Args, Ret> + 'd,

@@ -12,7 +12,7 @@
 //!   may run at the same time. The commit adds the necessary precedence edges, and the analysis
 //!   sees them (`sched-dag/src/verify/topics.rs` has the rule).
 //! - Job k + 1 finds the value left by job k: a DAG whose subtasks share a state has one job in
-//!   flight. The commit refuses a `Dag::in_flight` beyond 1.
+//!   flight. The commit then refuses a `Dag::in_flight` beyond 1.
 //! - No function waits for a state, so there is no blocking to account for, and no priority
 //!   inversion.
 //!

@@ -1,11 +1,11 @@
 //! Uses of a subtask besides its inputs, declared at registration.
 //!
 //! Values of the same job come along edges, as arguments. [`Dag::using`] declares access to
-//! anything else: a [`State`](crate::shared::State) shared by subtasks of the DAG, the [latest
-//! value](crate::shared::Latest) of a topic of any DAG, a [signal](crate::shared::Signal) to raise,
-//! a [wire](crate::shared::Wire) for bytes, a [parameter](crate::shared::Parameter) set from
-//! outside, a DAG to [pause](crate::shared::Switch), a [mode](crate::shared::Modes) to enter, the
-//! [end](crate::shared::Shutdown) of the run. The function then gets the declared use as its
+//! anything else, such as a [`State`](crate::shared::State) shared by subtasks of the DAG, the
+//! [latest value](crate::shared::Latest) of a topic of any DAG, a [signal](crate::shared::Signal)
+//! to raise, a [wire](crate::shared::Wire) for bytes, a [parameter](crate::shared::Parameter) set
+//! from outside, a DAG to [pause](crate::shared::Switch), a [mode](crate::shared::Modes) to enter,
+//! the [end](crate::shared::Shutdown) of the run. The function then gets the declared use as its
 //! *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
@@ -53,7 +53,7 @@ pub(crate) mod sealed {
 
 /// Anything a subtask can use besides its inputs, or a tuple of up to 8 uses.
 ///
-/// Apps do not call its methods; they meet the trait as a bound of [`Dag::using`].
+/// Apps do not call the trait's methods; they meet the trait as a bound of [`Dag::using`].
 ///
 /// ```
 /// use fass::shared::{State, Uses};
@@ -102,7 +102,7 @@ pub trait Uses: sealed::Sealed {
 }
 
 /// Uses of a subtask whose function can be replaced after a fault: a state, reset after the fault,
-/// or a tuple of states.
+/// a lock, or a tuple of such uses.
 ///
 /// Apps do not call the trait's methods; they meet the trait as a bound of
 /// [`SubtaskBuilder::restarting`](crate::shared::SubtaskBuilder::restarting).

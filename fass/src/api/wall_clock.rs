@@ -2,7 +2,7 @@
 //!
 //! Unix time is an instant, such as [`now_ns`](crate::now_ns), plus an *offset*. The machine sets
 //! the offset at first, and peers may correct the offset later. A *source* reads the offset when it
-//! starts, like a [parameter](crate::shared::Parameter), and sends the time along edges: so a job
+//! starts, like a [parameter](crate::shared::Parameter), and sends the offset along edges: so a job
 //! has one offset, recorded and replayed with the source's results.
 //!
 //! No clock sets an offset by itself: an image without a wall clock contains no code for one. A run

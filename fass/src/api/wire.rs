@@ -342,7 +342,7 @@ impl DeviceEnd {
     }
 
     /// Passes to the wire the bytes that arrived at `now_ns`, on the clock of [`crate::now_ns`]. If
-    /// a packet is complete and a sporadic DAG receives packets, returns the arguments for
+    /// a packet is complete and a sporadic DAG receives the packets, returns the arguments for
     /// [`Platform::raise`](crate::platform::Platform::raise).
     ///
     /// An interrupt handler may call the method.
@@ -373,7 +373,7 @@ impl DeviceEnd {
 
     /// Ends a subtask's wait for a packet, if there is one, and returns the arguments for
     /// [`Platform::raise`](crate::platform::Platform::raise), like [`arrive`](Self::arrive). The
-    /// caller holds no lock of the device, because the wait may end at once.
+    /// caller must not hold a lock of the device, because the wait may end at once.
     ///
     /// See [`swap_in`](Self::swap_in).
     pub fn announce(&self) -> Option<(u64, DagId)> {
@@ -423,7 +423,7 @@ impl DeviceEnd {
     }
 
     /// Ends a subtask's wait for departure, if there is one and nothing is left to go. The caller
-    /// holds no lock of the device.
+    /// must not hold a lock of the device.
     ///
     /// See [`swap_out`](Self::swap_out).
     pub fn tell_gone(&self) {

@@ -418,7 +418,8 @@ impl SubtaskAttributes {
     }
 
     /// Sets the execution budget: if an instance executes for longer, preempted time not counted,
-    /// the platform ends the instance as a fault, and its DAG as well.
+    /// the platform ends the instance as a fault, and its DAG as well, unless the DAG survives the
+    /// fault.
     ///
     /// Without a budget the platform may enforce a multiple of the [WCET](Self::wcet). At most
     /// `u64::MAX` nanoseconds; a longer budget is a fault at commit.

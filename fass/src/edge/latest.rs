@@ -6,9 +6,9 @@
 //!
 //! This is the evidence of a crash. A recording of a whole run needs memory or a way out for all
 //! its values. To compute a fault again, the inputs of the last jobs mostly suffice: values
-//! returned by sources and samples taken by subtasks, both of recorded topics, and recorded states.
-//! Each such channel has a place for each of the kept jobs, made at the commit; a value replaces
-//! the value of as many jobs before.
+//! returned by sources and samples taken by subtasks, both of recorded topics, recorded states, and
+//! recorded answers of devices. Each such channel has a place for each of the kept jobs, made at
+//! the commit; a value replaces the value of as many jobs before.
 
 use alloc::boxed::Box;
 use alloc::string::String;

@@ -111,8 +111,8 @@ pub trait Crossing: Send {
     /// Takes an event of a job or an instance, of the kinds in [`HEARS`].
     fn happened(&mut self, notice: &DriverNotice);
 
-    /// Notes that an instance has failed, and takes its samples: at time `at_ns` of the run, and
-    /// `clock_ns` on the clock of [`crate::now_ns`].
+    /// Notes that an instance has failed, and takes its recorded samples, states and answers: at
+    /// time `at_ns` of the run, and `clock_ns` on the clock of [`crate::now_ns`].
     fn failed(&mut self, _instance: Instance, _at_ns: u64, _clock_ns: u64) {}
 
     /// Returns the time for an instance asking for it, at `clock_ns` on the clock of

@@ -455,7 +455,7 @@ impl LostJobs {
 struct LossCounts {
     /// Lost values, by channel.
     values: Arc<[LostJobs]>,
-    /// When an event found no room; `u64::MAX`: never.
+    /// When an event, or the note of a lost value, found no room; `u64::MAX`: never.
     rest_ns: Arc<AtomicU64>,
 }
 

@@ -168,8 +168,8 @@ impl Effect for PlatformGive {
     }
 }
 
-/// Publishes or gives the samples and states found by an instance, even a failed one: without them
-/// nobody could compute its fault again.
+/// Publishes or gives the samples, answers and states found by an instance, even a failed one:
+/// without them nobody could compute its fault again.
 pub(super) struct InstanceOutputs(pub(super) Arc<ChannelState>);
 
 impl Effect for InstanceOutputs {
@@ -234,7 +234,7 @@ pub(crate) struct LineOf {
 }
 
 impl LineOf {
-    /// Reports whether the line carries samples or a state found by an instance.
+    /// Reports whether the line carries samples, answers or a state found by an instance.
     pub(crate) fn is_found_by(&self, instance: Instance) -> bool {
         let of = (self.dag, self.subtask);
         !self.role.is_written() && of == (instance.dag, instance.subtask.index())

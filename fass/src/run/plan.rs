@@ -392,8 +392,8 @@ impl SubtaskCode {
         None
     }
 
-    /// Gives the platform the samples taken by a failed instance, if they are recorded: without
-    /// them, nobody could reproduce the fault.
+    /// Gives the platform the samples, answers and states found by a failed instance, if they are
+    /// recorded: without them, nobody could reproduce the fault.
     pub fn failed(&mut self, failed_ns: u64) {
         let all = self.effects.all().iter_mut();
         all.for_each(|effect| effect.fail(failed_ns));

@@ -117,7 +117,7 @@ pub(crate) struct TurnState {
     asks: AtomicU8,
     asked_ns: AtomicU64,
     has_timed_out: AtomicBool,
-    /// The least time since the release.
+    /// The time since the release that has certainly passed, in ns.
     reached_ns: AtomicU64,
 }
 

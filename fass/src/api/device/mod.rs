@@ -401,8 +401,9 @@ impl<Q, A: Recordable + Send + Sync + 'static> Device<Q, A> {
     /// answers instead of asking: its waits are as long as in the recorded run.
     ///
     /// Answers are recorded along with topics, so record topics of the DAG, too ([`Dag::record`]).
-    /// If a topic of a source is recorded, recording the answers is mandatory. If the answers of a
-    /// job take more than 4 KiB together, they are lost. Call the method before the commit.
+    /// If a topic of a source is recorded, the commit demands a record of all answers to subtasks
+    /// other than sources. If the answers of a job take more than 4 KiB together, they are lost.
+    /// Call the method before the commit.
     ///
     /// ```
     /// use core::time::Duration;

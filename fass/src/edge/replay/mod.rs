@@ -49,7 +49,7 @@ pub struct Replay {
     signals: BTreeMap<DagId, VecDeque<u64>>,
     /// The first job of each DAG with a recorded signal.
     first_signals: BTreeMap<DagId, u64>,
-    /// The entries without a value.
+    /// The entries of signals, skips, cuts, restarts and faults.
     events: Vec<Entry<'static>>,
     /// The recorded faults that have not occurred again so far.
     faults: Vec<RecordedFault>,
@@ -251,7 +251,8 @@ impl Replay {
         time_ns
     }
 
-    /// Returns the recorded events of the DAGs: all entries except values.
+    /// Returns the recorded events of the DAGs with recorded inputs: all entries except values,
+    /// losses and told times.
     pub fn events(&self) -> impl Iterator<Item = Entry<'_>> {
         (self.events.iter().copied()).filter(|entry| self.passed.is_of(entry.dag))
     }
@@ -501,7 +502,7 @@ pub(in crate::edge) struct OfMachine {
     lines: Vec<LineOf>,
     /// `Some` from the launch on.
     replay: Option<(Replay, SignalTimes)>,
-    /// `Some` until core 0 takes it.
+    /// `Some` from the launch until core 0 takes it, if there are signals to raise.
     replayer: Option<Box<dyn Drain>>,
 }
 
