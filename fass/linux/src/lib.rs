@@ -35,9 +35,9 @@
 //!   normal thread, until the function returns.
 //! - An instance blocking in mid-function (reading a file, locking a mutex) leaves its core to
 //!   workers demoted there, and to other programs. An async instance can ask
-//!   [`blocking`](fn@blocking) to make such a call, and wait. A non-preemptive instance leaves its
-//!   core as well: if a worker demoted there finishes meanwhile, that end is reported only after
-//!   the non-preemptive instance has ended, or when the scheduler wants the demoted one.
+//!   [`blocking`](fn@blocking) to make such a call, and wait. A blocking non-preemptive instance
+//!   leaves its core as well: if a worker demoted there finishes meanwhile, that end is reported
+//!   only after the non-preemptive instance has ended, or when the scheduler wants the demoted one.
 #![deny(unsafe_code)]
 
 mod blocking;

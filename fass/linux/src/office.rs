@@ -95,7 +95,8 @@ impl Office {
     /// could lose its core while holding the lock.
     pub(crate) fn send(&self, from: Option<ClusterId>, request: Request) -> bool {
         self.letters.send(from, request, |cluster| {
-            // Before the letter: settled without a reason of its own, it could end the run early.
+            // Before the letter is counted: settled without a reason of its own, it could end the
+            // run early.
             self.reasons.fetch_add(1, Ordering::AcqRel);
             let letters = &self.doors[cluster.index()].letters;
             letters.fetch_add(1, Ordering::AcqRel);

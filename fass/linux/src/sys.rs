@@ -2,7 +2,7 @@
 //! calls.
 //!
 //! The symbols belong to the C library, linked by the standard library anyway. Each function checks
-//! the results of its calls and is safe to call with any arguments.
+//! the results it uses, and is safe to call with any arguments.
 
 use std::ffi::{CStr, c_char};
 use std::io;

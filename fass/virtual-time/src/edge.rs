@@ -107,8 +107,8 @@ impl VirtualTime {
     /// Keeps only the inputs of each DAG's last jobs, in memory allocated at the commit, like a
     /// machine that records nothing else. So [`recording`](Self::recording) has the inputs leading
     /// to a fault, but no results. The recording contains nothing a function remembers of earlier
-    /// jobs, except in recorded states. Each state is written down at least twice in that many
-    /// jobs.
+    /// jobs, except in recorded states. Each state is written down at least twice in each span of
+    /// `jobs` jobs.
     ///
     /// ```
     /// use virtual_time::VirtualTime;

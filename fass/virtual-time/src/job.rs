@@ -37,7 +37,8 @@ pub struct SubtaskShown {
     pub times: Option<InstanceRecord>,
     /// The message of a panic that ended the instance.
     pub panic: Option<String>,
-    /// The inputs: values read or sampled from topics, and answers to requests for the time.
+    /// The inputs: values read or sampled from topics, recorded states, answers of devices, and
+    /// clock readings.
     pub takes: Vec<Passed>,
     /// The outputs.
     pub gives: Vec<Passed>,
@@ -48,7 +49,7 @@ pub struct SubtaskShown {
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Passed {
-    /// The topic; or `the time`, for all clock readings of the subtask.
+    /// The topic, the state or the device; or `the time`, for all clock readings of the subtask.
     pub what: String,
     /// The value.
     pub value: Value,
@@ -63,7 +64,8 @@ pub enum Value {
     Json(String),
     /// A value of this type, on a topic that is not recorded.
     NotRecorded(&'static str),
-    /// No value: the writer has not come to its end.
+    /// No value: the writer was cut or has not come to its end, or the recording has lost the
+    /// value.
     None,
 }
 

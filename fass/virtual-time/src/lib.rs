@@ -326,7 +326,7 @@ impl VirtualTime {
     ///
     /// # Errors
     ///
-    /// See [`RunError`]. After an error the run is over.
+    /// See [`RunError`]. After any of them except [`RunError::Endless`] the run is over.
     pub fn try_run(&self) -> Result<Report, RunError> {
         self.run_until(None, None)
     }

@@ -63,8 +63,8 @@ pub struct Report {
     pub uncompared: u64,
     /// In a replay, the first value differing from the recorded one.
     pub divergence: Option<Divergence>,
-    /// In a replay, a DAG and its first recorded job, unless that job is the DAG's very first: then
-    /// its functions' memory of earlier jobs is missing.
+    /// In a replay, the first DAG that begins with a job after job 0 without a record of all its
+    /// states there, and that job: its functions lack their memory of earlier jobs.
     pub lacking: Option<(String, u64)>,
     pub(crate) run: Run,
     /// How late interrupts may have been, in nanoseconds.
@@ -356,7 +356,7 @@ impl Deref for JobRecord {
     }
 }
 
-/// A contained panic: it ended its DAG, and the run went on.
+/// A contained panic: it ended its DAG or cost a job, and the run went on.
 ///
 /// See [`contain_panics`](crate::VirtualTime::contain_panics).
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 //! The scheduler decides at one instant which instance each core runs.
 //! [`Placement`](sched_dag::placement::Placement) keeps each core's present instance, and the
 //! instance the core should have. The thread making the step takes unwanted instances from their
-//! cores here. A core without an instance that should have one is *called*: its worker comes and
+//! cores here. A core that has no instance but should have one is *called*: its worker comes and
 //! looks.
 //!
 //! # Instances ending after the loss of their core
@@ -21,7 +21,7 @@
 //!   occupant's end then reports the left end, too. If the scheduler gives the parked instance a
 //!   core earlier, its own thread reports the end there. In the model, the instance was suspended
 //!   until then.
-//! - Any occupant, but the parked instance ends by a fault: a fault takes an instance away wherever
+//! - Any occupant, if the parked instance ends by a fault: a fault takes an instance away wherever
 //!   it is, and needs no core.
 //!
 //! # The number of workers
