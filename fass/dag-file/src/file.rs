@@ -60,8 +60,8 @@ pub struct FileSubtask {
 }
 
 impl FileDag {
-    /// Returns the longest possible execution time of a subtask's instance: the WCET, or the
-    /// longest sample.
+    /// Returns the longest possible execution time of a subtask's instance: the WCET, or, without a
+    /// WCET, the longest sample.
     pub fn most_ns(&self, subtask: usize) -> u64 {
         let spec = &self.spec.subtasks[subtask];
         let samples = self.subtasks[subtask].samples_ns.chunks(sample_len(spec));

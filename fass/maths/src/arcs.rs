@@ -1,8 +1,8 @@
 //! The inverse functions, all by the arc tangent of two numbers.
 //!
 //! The smaller of the two, divided by the larger, is a tangent t from 0 to 1. With the nearest
-//! eighth c, atan t = atan c + atan((t - c) / (1 + tc)): the first comes from a table, of the
-//! second's argument, 1/16 at most, seven terms of the series are enough.
+//! eighth c, atan t = atan c + atan((t - c) / (1 + tc)): the first comes from a table. The second's
+//! argument is at most 1/16, so seven terms of the series are enough.
 
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
@@ -42,8 +42,8 @@ pub fn acos(x: f64) -> f64 {
     atan2(sqrt((1.0 - x) * (1.0 + x)), x)
 }
 
-/// Returns the angle of the point (x, y), in radians, from -pi to pi; of zeros and infinities as
-/// IEEE 754 (9.2.1) has it.
+/// Returns the angle of the point (x, y), in radians, from -pi to pi; for zeros and infinities as
+/// IEEE 754 (9.2.1) demands.
 pub fn atan2(y: f64, x: f64) -> f64 {
     if x.is_nan() || y.is_nan() {
         return f64::NAN;

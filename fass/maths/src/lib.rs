@@ -1,8 +1,8 @@
 //! The mathematical functions that `core` lacks, for apps: square root and trigonometry.
 //!
-//! A result depends on its argument alone: it has the same bits on the host and on the machine,
-//! and none depends on a library of the host. Errors are given in *ulp*, units in the last place
-//! of the true value; `tests/references.rs` measures them against true values in 90 digits.
+//! A result depends only on the arguments: it has the same bits on the host and on the machine, and
+//! depends on no library of the host. Errors are given in *ulp*, units in the last place of the
+//! true value; `tests/references.rs` measures them against true values in 90 digits.
 //!
 //! | function | error, at most | arguments |
 //! |---|---|---|
@@ -12,8 +12,8 @@
 //! | [`atan`], [`atan2`] | 2 ulp | all |
 //! | [`asin`], [`acos`] | 3 ulp | from -1 to 1 |
 //!
-//! Outside, and of NaN, the result is NaN. [`single`] has the same functions of `f32`, which are
-//! calculated in `f64`, so that the error is next to 0.5 ulp.
+//! For other arguments, and for NaN, the result is NaN. [`single`] has the same functions for
+//! `f32`, calculated in `f64`, so their error is close to 0.5 ulp.
 //!
 //! Other functions (`exp`, `ln`, `pow`) are in crates such as `libm`: any `no_std` crate works in
 //! an app.
@@ -34,11 +34,11 @@ pub use arcs::{acos, asin, atan, atan2};
 pub use root::sqrt;
 pub use trigonometry::{LARGEST_ANGLE, cos, sin, sin_cos, tan};
 
-/// Added to a number below 2^51 it makes the last bit count 1: the sum is rounded, and
-/// its low bits are an integer.
+/// Added to a number below 2^51, this constant makes the last bit of the sum count 1: the sum is
+/// rounded, and its low bits are an integer.
 const ROUNDS: f64 = 6_755_399_441_055_744.0;
 
-/// Returns the nearest integer, as a number and by its low bits, of a number below 2^51.
+/// Returns the integer nearest to a number below 2^51: as a number, and by its low bits.
 fn nearest_integer(x: f64) -> (f64, u64) {
     let shifted = x + ROUNDS;
     (shifted - ROUNDS, shifted.to_bits())

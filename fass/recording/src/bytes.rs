@@ -122,7 +122,7 @@ pub(crate) const fn require(has_form: bool) {
     );
 }
 
-/// Returns the number of bytes up to the next multiple of `bytes`, at most 8.
+/// Returns the number of bytes up to the next multiple of `bytes`, or of 8 if `bytes` is more.
 const fn padding(offset: usize, bytes: usize) -> usize {
     offset.wrapping_neg() & (bytes - 1) & 7
 }

@@ -36,8 +36,8 @@ crate::recordable! {
         pub graph: u64,
     }
 
-    /// Values of one type and one place: values that a subtask writes to a topic, or samples, or
-    /// finds in a state.
+    /// Values of one type and one place: values that a subtask writes to a topic, samples, finds in
+    /// a state, or gets from a device.
     ///
     /// See [`Writer`](crate::Writer).
     #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ crate::recordable! {
         pub subtask: u16,
         /// The role of the values in the DAG.
         pub role: Role,
-        /// The topic, or the state.
+        /// The topic, the state or the device.
         pub topic: String,
         /// The type.
         pub schema: Schema,
@@ -109,7 +109,7 @@ kinds! {
         Source = "source",
         /// Another subtask returned the values. A replay compares them.
         Result = "result",
-        /// A subtask found the values as latest values of a topic, in any DAG. The type is
+        /// A subtask found the values as latest values of a topic of any DAG. The type is
         /// `(u64, u64, T)?`, with the value's job, and the time at which its writer was complete.
         /// A replay takes the values.
         Sample = "sample",

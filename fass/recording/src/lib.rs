@@ -49,7 +49,7 @@
 //!   recurses to a depth fixed by the type, and allocates at most [`MOST_GROWTH`] times the given
 //!   bytes, for each level of that depth. Only bytes in the exact form written for the value are
 //!   accepted; in CDR, the padding is not compared.
-//! - Reading a file takes a time bounded by the file's length: each type has at most
+//! - Reading a file takes a time bounded by the file's length: each type in a file has at most
 //!   [`MOST_WEIGHTLESS`] parts taking no bytes, so no value has many more parts than bytes.
 //!
 //! # Limits

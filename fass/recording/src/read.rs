@@ -89,8 +89,9 @@ impl<'b> Recording<'b> {
         self.read.lost
     }
 
-    /// Reports whether the recording ends before its run: the run died, or the buffer was full of
-    /// entries that must never be lost.
+    /// Reports whether the recording may lack more than the values marked as lost: the run died,
+    /// the buffer was full of entries that must never be lost, or only the jobs before a fault were
+    /// kept.
     ///
     /// See [`Stream`].
     pub const fn is_cut(&self) -> bool {

@@ -24,7 +24,7 @@ const MOST_LOST: u32 = 4;
 const STEP: Duration = Duration::from_millis(1);
 
 impl Node {
-    /// Tells the DAGs that the session has come up, or is lost.
+    /// Tells the DAGs if the session has come up, or is lost, since the last call.
     fn tell_session(&mut self) {
         let since_ns = self
             .session

@@ -80,8 +80,9 @@ impl<'b> Reader<'b> {
         self.bytes(length)
     }
 
-    /// Reads the extensions behind a message with this header, if any. Hands over each extension
-    /// consisting of bytes. `known` must have the bit of each extension that must be understood.
+    /// Reads the extensions behind a message with this header, if any. Hands over each extension,
+    /// with its bytes if it has any. `known` must have the bit of each extension that must be
+    /// understood.
     pub(crate) fn extensions(
         &mut self,
         header: u8,

@@ -46,8 +46,8 @@ pub const MOST_BYTES: u16 = 1400;
 const MOST_COOKIE: usize = 128;
 /// The time between CLOSE and INIT.
 const GAP_NS: u64 = 100_000_000;
-/// After so long without an answer a step begins anew. Declarations are repeated at this interval,
-/// or more often if the lease is short.
+/// After so long without an answer the session begins anew. In an open session, one declaration is
+/// repeated at half this interval. Both times are shorter if the lease is short.
 const RETRY_NS: u64 = 500_000_000;
 
 /// The client of a session, and its lease.
