@@ -254,7 +254,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 9 of recordings, which are those that are read");
+            input.expected("version 1 to 10 of recordings, which are those that are read");
         // A later version may have kinds that this code cannot check; an earlier version only lacks
         // some kinds.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {

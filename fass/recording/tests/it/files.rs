@@ -235,7 +235,7 @@ fn foreign_and_newer_files_are_told() {
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
     assert_eq!(
         said(&of_version(VERSION + 1, &recording())),
-        "at byte 8: expected version 1 to 9 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 10 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);
