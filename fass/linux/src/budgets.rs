@@ -59,7 +59,7 @@ impl Budgets {
         if self.shortest_ns == u64::MAX {
             return Ok(u64::MAX);
         }
-        // An instance may start right after this look: the next one comes within the shortest
+        // An instance may start right after this look, so the next look comes within the shortest
         // budget.
         let mut next_ns = now_ns.saturating_add(self.shortest_ns);
         for (core, seen) in (0..).map(CoreId).zip(&mut self.seen) {

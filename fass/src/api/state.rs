@@ -253,7 +253,7 @@ impl<T: StateValue> State<T> {
         T: Recordable,
     {
         let value = Arc::<ResettableState<T>>::clone(&self.value);
-        // For its check: the commit has taken the recording of states already.
+        // For its check: the commit takes the recording of states, so later the call has no effect.
         let _open = self.dag.open();
         let kept = Arc::new(KeptState::new(value, jobs));
         self.options.kept.replace(Some(kept));

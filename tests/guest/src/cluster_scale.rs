@@ -1,7 +1,8 @@
 //! The same graph in each cluster: the cost of an instance with more and more clusters.
 //!
 //! The clusters work one after the other. With counted time all cores share a clock, and computing
-//! cores take turns: if several clusters worked together, waits for turns would be counted, too.
+//! cores take time slices: if several clusters worked together, waits for slices would be counted,
+//! too.
 
 use alloc::format;
 use alloc::vec::Vec;

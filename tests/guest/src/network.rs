@@ -1,4 +1,5 @@
-//! An echo next to a control loop. The loop prints each change of the wire's link.
+//! An echo next to a control loop. The loop prints the state of the wire's link, at first and after
+//! each change.
 //!
 //! With two clusters the loop is in the first cluster and the echo in the second.
 

@@ -11,8 +11,9 @@ use crate::scenarios::{judged, print};
 /// The most bytes of the heap a fault keeps for good: its body, and everything owned by the body.
 const KEPT_BYTES: usize = 1024;
 
-/// Runs `rounds` random rounds of `round_ms`, from round `first` of a `seed` on, each twice: the
-/// second run must reuse all memory kept after the first. Prints the faults of each run.
+/// Runs `rounds` random rounds of `round_ms`, from round `first` of a `seed` on, each twice: after
+/// the second run the machine must hold no more memory than after the first, except for
+/// [`KEPT_BYTES`] for each fault. Prints the errors of each run.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let seed = options.number("seed", 0..=u64::MAX, 1)?;

@@ -77,7 +77,7 @@ pub(crate) struct Step {
     when: Vec<u64>,
     /// The number of calls so far.
     calls: AtomicU64,
-    /// Whether all inputs began in the same call of the only source.
+    /// Whether all inputs must stem from the same call: the DAG has a single source.
     joins: bool,
     of_all: Arc<Calls>,
 }

@@ -6,8 +6,8 @@
 //! for some DAGs, waiting subtasks, sinks with their own deadlines, DAGs released by others, and
 //! two modes taking turns. Two of three rounds have *trouble*: functions fail, and then their DAG
 //! ends or goes on; and DAGs pause others, over and over. In one of eight rounds instances compute.
-//! Such rounds have no trouble: where cores take turns, the report of a fault is a longer turn than
-//! others may have to wait.
+//! Such rounds have no trouble: where cores take time slices, the report of a fault would make
+//! others wait for longer than allowed.
 //!
 //! Every DAG by itself could be served forever: no subtask takes longer than most of a period, and
 //! no path longer than the deadline. So other DAGs cause all lateness.

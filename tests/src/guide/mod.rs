@@ -3,7 +3,7 @@
 //! A broken tutorial is worse than none, so nothing in them goes unchecked:
 //!
 //! - their Rust is this crate's doctests (see `lib.rs`), each compiled and run;
-//! - the options' tables of the named scripts parse their commands;
+//! - their commands must parse by the option tables of the scripts they name;
 //! - a boot of a new app must print the output shown in the guide;
 //! - a block of any other kind is refused, as is Rust that would not be tested.
 

@@ -17,7 +17,8 @@ fn each_message_of_a_device_takes_one_interrupt_on_its_core() {
                 [number("came"), number("releases"), number("elsewhere")],
                 [500, 500, 0]
             );
-            // The message's own interrupt has released the DAG. Two cores take turns, by their timers.
+            // The message's own interrupt has released the DAG. Two cores take time slices, by
+            // their timers.
             let timer_interrupts = number("timer_interrupts");
             assert!(cores > 1 || timer_interrupts < 100, "{timer_interrupts}");
         }

@@ -8,7 +8,7 @@ use tool::{Mode, Outcome};
 use views::protocol::{MachineLine, Status};
 use views::record::Run;
 
-/// The longest wait of a core for the other cores' turns, and for the kernel's work meanwhile
+/// The longest wait of a core for the others' time slices, and for the kernel's work meanwhile
 /// (`docs/decisions/0008-deterministic-by-default.md`).
 const TURN_NS: u64 = 20_000;
 
@@ -49,8 +49,8 @@ fn longest_of_the_source(run: &Run) -> u64 {
     longest_ns
 }
 
-/// The budgets are so short that an instance would exceed its budget if suspensions, or others'
-/// turns, counted as its own time.
+/// The budgets are so short that an instance would exceed its budget if suspensions, or the time
+/// slices of others, counted as its own time.
 #[test]
 fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
     for cores in [1, 2, 4, 8] {
@@ -70,8 +70,8 @@ fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
             let runs = lawful_runs(&outcome, TURN_NS);
             assert_eq!((runs.len(), runs[0].lost), (1, 0));
             if policy == "static" {
-                // A first short turn of each that is released at the same time, and a turn of
-                // each if the function is not done in its own first one.
+                // A short first slice of each core released at the same time, and a whole slice of
+                // each if the function is not done in its own first slice.
                 let longest_ns = longest_of_the_source(&runs[0]);
                 assert!(longest_ns <= (2_000 + 8_000) * cores, "{longest_ns}");
             }

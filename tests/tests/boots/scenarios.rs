@@ -24,7 +24,7 @@ fn run(mut run: impl FnMut(u64) -> Transcript) {
     assert_eq!(ran, stated);
 }
 
-/// By their traces, too, no instance waits for longer than the cores' turns.
+/// By their traces, too, no instance waits for longer than the cores' time slices.
 #[test]
 fn each_scenario_is_as_it_says() {
     run(|cores| {

@@ -102,7 +102,8 @@ impl<T> Taker<T> {
     pub(crate) fn front(&mut self, mark: usize) -> Option<&mut T> {
         let places = &*self.0;
         let read = places.read.load(Ordering::Relaxed);
-        // Not by the mark alone: after a mark passed before, the next place may be the putter's.
+        // Not by the mark alone: once `read` has passed the mark, the next place may be the
+        // putter's.
         if read == mark || read == self.mark() {
             return None;
         }

@@ -327,7 +327,7 @@ fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
     }
     let length_ns = length_of_slice(core)?;
     let (mine, order) = (core.index, Ordering::Relaxed);
-    // QEMU may have ended this core's turn since the look: then another core may have begun a
+    // QEMU may have ended this core's visit since the look: then another core may have begun a
     // slice.
     let begun = SLICE_HOLDER.compare_exchange(holder, mine, order, order);
     begun.is_ok().then_some(length_ns)

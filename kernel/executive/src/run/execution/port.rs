@@ -241,7 +241,7 @@ pub fn arm_next_event() {
 /// Sets the alarms of all clusters. Called on core 0, before a run.
 pub fn arm_all() {
     arm_next_event();
-    // Only the core itself can write its timer: the first cores arm theirs in `wake_interrupt`.
+    // Only the core itself can write its timer: the first cores arm theirs once they wake up.
     for cluster in cluster::all().skip(1) {
         this_core::all()[cluster.core(FIRST_SEAT) as usize].wake_up();
     }

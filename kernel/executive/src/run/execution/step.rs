@@ -197,8 +197,8 @@ impl ClusterRun {
         }
         let suspended = self.engine.placement.detach(here);
         if let Some(vertex) = suspended {
-            // Not the interrupt's time: its step has written later events, and the journal keeps
-            // order.
+            // Not the interrupt's time: a step may have written later events since then, and the
+            // journal keeps order.
             let time_ns = since_epoch(clock::now_ns());
             let instance = self.engine.scheduler.instance_of(vertex);
             self.engine.scheduler.log.journal.write(
