@@ -164,8 +164,8 @@ impl Line {
         })
     }
 
-    /// Sends the message to another core from now on. To be called between runs, while the device
-    /// has nothing to say: a message on its way may be lost.
+    /// Makes the function send the message to another core from now on. To be called between runs,
+    /// while the device has nothing to say: a message on its way may be lost.
     ///
     /// # Errors
     ///

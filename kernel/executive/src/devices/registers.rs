@@ -49,7 +49,7 @@ macro_rules! access {
 
 impl Registers {
     /// Maps a range of a function, before the function may [reach memory](Function::enable_reach):
-    /// later, any holder of its registers could make it write anywhere.
+    /// later, any holder of the registers could make the device write anywhere.
     ///
     /// # Errors
     ///

@@ -7,7 +7,7 @@
 //! processor knows whether upper halves are in use, and does not write unused ones.
 //!
 //! **Avx invariant**: the instructions were exchanged if and only if [`IS_ON`] is set, before any
-//! core takes interrupts, and AVX is enabled on each core before that core takes interrupts.
+//! core takes interrupts, and each core enables AVX before its first interrupt.
 
 use core::arch::asm;
 use core::arch::x86_64::{__cpuid, __cpuid_count};

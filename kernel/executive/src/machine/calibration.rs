@@ -1,9 +1,9 @@
 //! Calibration: measures the time stamp counter and the local APIC's timer by a clock of known
 //! rate.
 //!
-//! If the machine has two such clocks, both are read; if the processor states the counter's rate,
-//! the stated rate is compared as well. Each may be wrong on some board, and a wrong clock makes
-//! all times wrong in silence.
+//! The measured rate is checked by a second such clock, if another can be read at any two moments,
+//! and otherwise by the counter's rate stated by the processor, if any. Each may be wrong on some
+//! board, and a wrong clock makes all times wrong in silence.
 //!
 //! # The clocks of known rate
 //!

@@ -11,21 +11,21 @@
 //! in 100,000 goes the other way, and everything afterwards is shifted.
 //!
 //! Interrupts late by less than [`GRACE_NS`] can be made equally late: a timer's interrupt, before
-//! any other action or look, waits until exactly that long after its time ([`settle`]). As a loop
-//! has a length, a loop could not wait for a nanosecond; the interrupt executes as many `nop`s as
+//! any other action or look, waits until exactly that long after its time ([`settle`]). A loop
+//! takes longer than a nanosecond to go round, so the interrupt instead executes as many `nop`s as
 //! nanoseconds are left. And a core reads the counter right before halting ([`count_before_halt`]),
 //! so that QEMU counts all instructions executed so far and no more than a few remain at stake.
 //!
-//! The jump does more than move the clock. The jump tells every core's emulation to leave its next
+//! The jump does more than move the clock: it also marks every core's emulation to leave its next
 //! turn (`qemu_timer_notify_cb`, `rr_kick_vcpu_thread`). As a rule QEMU has passed all cores by
 //! then, and continues with the first. But if the main loop is so early that QEMU is still passing
 //! the halted cores behind the last core (`rr_cpu_thread_fn`), QEMU continues right there, and
-//! other cores than usual have that mark left when the timer's core gets its turn. The mark matters
+//! other cores than usual still have the mark when the timer's core gets its turn. The mark matters
 //! if another timer ends in the next few microseconds: QEMU then looks for due timers before a
-//! marked core's turn, but within an unmarked core's turn, which then has no instruction left for
-//! the core and is lost (`icount_prepare_for_run`). The order of turns would thus depend on the
-//! host. A core whose timer has fired therefore passes its turn once, by a `pause`; at its next
-//! turn QEMU has passed all cores, and no mark is left ([`settle`]).
+//! marked core's turn, but within an unmarked core's turn, which then has no instruction left and
+//! is lost (`icount_prepare_for_run`). The order of turns would thus depend on the host. A core
+//! whose timer has fired therefore passes its turn once, by a `pause`; at its next turn QEMU has
+//! passed all cores, and no mark is left ([`settle`]).
 //!
 //! All of this is off unless [`enable`] is called, and useless where an instruction does not take a
 //! nanosecond. Where a timer's interrupt waits for its turn because other cores compute, not all
@@ -50,8 +50,8 @@ pub fn enable() {
     IS_ENABLED.store(true, Ordering::Relaxed);
 }
 
-/// Returns [`GRACE_NS`] after `at_ns`, the time of this core's timer; at once if already past, or
-/// if the timer is early. All other cores have a turn before.
+/// Returns [`GRACE_NS`] after `at_ns`, the time of this core's timer; at once if that moment is
+/// past, or if the timer is early. Before a wait, all other cores have a turn.
 #[inline]
 pub(super) fn settle(at_ns: u64) {
     if !IS_ENABLED.load(Ordering::Relaxed) {

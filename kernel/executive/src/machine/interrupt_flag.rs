@@ -1,8 +1,8 @@
 //! Disables and enables interrupts, and measures the time in between on request.
 //!
-//! When app code has used up its stack, only the app may fail. A call into the kernel must
-//! therefore fail before it disables interrupts: [`disable`], the common way to do so, touches as
-//! much of the stack as a section without interrupts needs.
+//! When app code has used up its stack, only this code may fail, not the kernel. A call into the
+//! kernel must therefore fail while interrupts are still enabled: [`disable`], the usual way to
+//! disable them, first touches as much of the stack as a section without interrupts needs.
 
 use core::panic::Location;
 

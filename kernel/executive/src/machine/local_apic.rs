@@ -98,7 +98,7 @@ fn write(register: ApicRegister, value: u32) {
     }
 }
 
-/// A separate function, so that the usual mode keeps its registers.
+/// A separate function, so that the usual path through the caller saves no registers for it.
 #[cold]
 #[inline(never)]
 #[expect(clippy::cast_possible_truncation, reason = "their upper half is 0")]

@@ -9,7 +9,7 @@ use core::ops::Range;
 /// The smallest page, in bytes.
 pub(crate) const PAGE: u64 = 4096;
 
-/// The access allowed to a page.
+/// The access allowed by a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PageAccess {
     /// Read only.

@@ -113,8 +113,8 @@ fn write_control(control: u16, value: u16) {
 }
 
 /// Ends the run, and reports the result: QEMU exits with 33, 35 or 37. Without the debug exit
-/// device the machine ends by the chosen action ([`set_end`]), or stays halted: all its cores halt,
-/// because a running core would investigate this core's silence.
+/// device the machine ends by the chosen action ([`set_end`]), or stays halted: all cores halt,
+/// because a running core would investigate the silence of a halted core.
 pub fn exit(told: AppExit) -> ! {
     const DEBUG_EXIT: u16 = 0xf4;
     // QEMU's own exit status is twice what its device takes, plus 1.

@@ -6,8 +6,8 @@
 //! holder would block every core waiting for the lock. The delay is [`LONGEST_SECTION`] at most: a
 //! holder that never returns delays other instances for that time, and no longer.
 //!
-//! Waiting cores take turns in a circle: the leaving core gives the turn to the next waiting core.
-//! A waiting core therefore sees each other core in the lock once at most. A waiting context can be
+//! Waiting cores take turns in a circle: a leaving core gives the turn to the next in line. A
+//! waiting core therefore sees each other core in the lock once at most. A waiting context can be
 //! preempted; the context then gives up its turn with its core.
 //!
 //! **Section invariant**: while the lock of a context's `SectionNote` is not null, the lock belongs

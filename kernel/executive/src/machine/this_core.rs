@@ -64,8 +64,8 @@ impl CoreMeter {
 ///    continue a suspended instance.
 /// 3. `time_slice::join`: as 2, by a worker that no interrupt has chosen; or an interrupt continues
 ///    a suspended instance; or the instance goes on after a halt or a watch of the clock.
-/// 4. `time_slice::wait`, the first slice, once no core has the slice and none is urgent: a short
-///    slice if other cores are fresh, too.
+/// 4. `time_slice::wait`, once no core has the slice and none is urgent. This first slice is short
+///    if other cores are fresh, too.
 /// 5. `time_slice::pass`, at the end of an interrupt after the slice's alarm has fired.
 /// 6. `time_slice::wait`, likewise, once no core is fresh and no other waiting core is next.
 /// 7. `time_slice::leave` as the instance halts, watches the clock or is preempted;

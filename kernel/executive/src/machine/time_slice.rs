@@ -51,8 +51,8 @@ const SLICE_NS: u64 = 8_000;
 /// The length of a fresh core's first slice, in nanoseconds, if other cores are fresh, too.
 const FIRST_SLICE_NS: u64 = 2_000;
 
-/// How often a waiting core looks for the slice before taking over the slice of a core that does
-/// not pass the slice because it takes no interrupts. Some milliseconds.
+/// How often a waiting core looks for the slice before taking over from a core that takes no
+/// interrupts, and so never passes the slice on. Some milliseconds.
 const MOST_LOOKS: u32 = 100_000;
 
 static IS_ENABLED: AtomicBool = AtomicBool::new(false);
@@ -158,7 +158,7 @@ pub fn look_up() {
     }
 }
 
-/// Makes this core fresh unless the core takes part already: the core continues with an instance.
+/// Makes this core, about to continue with an instance, fresh unless it takes part already.
 /// Interrupts are disabled.
 #[inline]
 pub fn join(core: &Core) {
@@ -287,7 +287,7 @@ fn end_interrupt_in_slice() {
 }
 
 /// Ends this core's slice.
-// In a circle, from the next core on, so that each computing core gets the same share.
+// The next waiting core in a circle follows, so that each computing core gets the same share.
 fn pass(core: &Core) {
     let (before, from_here) = this_core::all().split_at(core.index as usize);
     let mut others = from_here.iter().skip(1).chain(before);
@@ -318,8 +318,8 @@ fn wait(core: &Core) -> bool {
     has_slice
 }
 
-/// Begins this core's slice, if allowed, or if this core `takes_over` another core's slice. Returns
-/// the length of the slice in nanoseconds.
+/// Begins this core's slice, if allowed. With `takes_over`, another core's slice is no obstacle.
+/// Returns the length of the slice in nanoseconds.
 fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
     let holder = SLICE_HOLDER.load(Ordering::Relaxed);
     if (holder != NONE && !takes_over) || URGENT.load(Ordering::Relaxed) != 0 {

@@ -17,9 +17,9 @@
 //! them.
 //!
 //! Containment is possible because the interrupt flag tells possibly faulty code apart: apps run
-//! with interrupts enabled, while kernel code that holds a lock or handles an interrupt has
-//! interrupts disabled. A fault in kernel code, or outside any subtask, is the kernel's own and
-//! ends the run (see `panic`).
+//! with interrupts enabled, while kernel code that holds a lock or runs in a handler has them
+//! disabled. A fault in kernel code, or outside any subtask, is the kernel's own and ends the run
+//! (see `panic`).
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;

@@ -55,8 +55,8 @@ pub(super) fn with<T>(work: impl FnOnce(Option<&mut File>) -> T) -> T {
     result
 }
 
-/// Sends a part of a run in progress, or raises the signals of a replay; `false` means: nothing
-/// left.
+/// Sends a part of a run in progress, or raises the signals of a replay. Returns `false` if there
+/// was nothing to do now.
 pub fn step(outgoing: &mut Outgoing) -> bool {
     let has_port = debug_port::is_there();
     with(|mut record| {

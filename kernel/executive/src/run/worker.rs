@@ -22,8 +22,8 @@
 //!    starts, or proceeds after a wait. A waiting instance has no context. With time slices, the
 //!    context may wait for its slice first, with interrupts enabled.
 //! 3. The subtask's function returned, and [`execution::complete`] looks for the next work.
-//! 4. The scheduler has no work for the core ([`CoreWork::Rest`]); never on core 0 during a run,
-//!    whose parked background continues instead (8).
+//! 4. The scheduler has no work for the core ([`CoreWork::Rest`]); never on core 0 during a run:
+//!    the parked background continues instead (8).
 //! 5. `Core::wake` is set, by another core's `wake_up` or by the core's own interrupt.
 //! 6. An interrupt on the core preempts the instance (`ClusterRun::follow`), unless a section of an
 //!    app's lock postpones the preemption.

@@ -1,4 +1,4 @@
-//! Loans of runners: the kernel knows where each subtask's runner is, so no fault loses a runner.
+//! Loans of runners: the kernel knows the place of each subtask's runner, so a fault loses none.
 //!
 //! A *loan* is the handle for using a runner. The loan moves between the runner's place and the
 //! core running an instance. If a fault ends the instance, the loan is somewhere on the stack of an

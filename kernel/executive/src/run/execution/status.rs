@@ -5,9 +5,9 @@
 //!
 //! # After a run: the bodies and values left behind by its clusters
 //!
-//! The bodies, and the values waiting for them, are dropped at once, DAG by DAG. The drop happens
-//! outside any instance, so an app's `drop` that panics or never returns cannot be contained, but
-//! the report can name its DAG ([`look_at_clearing`]).
+//! All are dropped at once, DAG by DAG. The drop happens outside any instance, so an app's `drop`
+//! that panics or never returns cannot be contained, but the report can name its DAG
+//! ([`look_at_clearing`]).
 
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
@@ -147,8 +147,8 @@ pub fn control(dag: DagId, change: fn(DagId) -> Request) {
 }
 
 /// Serves a request in a step of a cluster's scheduler, or sends the request to the concerned
-/// cluster. A request with a plan's number counts only if that plan runs, and as of time 0 if its
-/// run has not begun.
+/// cluster. A request with a plan's number counts only if that plan is committed now, and as of
+/// time 0 if its run has not begun.
 pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: Request) {
     let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {

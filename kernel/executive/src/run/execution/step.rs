@@ -281,8 +281,8 @@ fn keep_slice(core: &Core, work: CoreWork) -> CoreWork {
     work
 }
 
-/// Reports this core's instance as completed, and finds the core's next work. Interrupts are
-/// disabled.
+/// Ends a turn of this core's instance, by its completion or by a wait, and finds the core's next
+/// work. Interrupts are disabled.
 pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     let here = here();
     let mut place = finished.cluster().execution.lock_uninterrupted();
