@@ -16,7 +16,7 @@ pub use front::output;
 #[cfg(test)]
 front::output!(write_as);
 
-/// Makes an app's function the function run by the image.
+/// Makes the image run an app's function.
 ///
 /// Use once, in the `main.rs` of a `#![no_std] #![no_main]` binary whose `build.rs` calls
 /// `boot_link::link_image()`:

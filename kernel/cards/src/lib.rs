@@ -1,8 +1,8 @@
 //! Drivers for PCI network cards: virtio-net and Intel's 82574.
 //!
-//! A card has two rings of descriptors: a ring of buffers to fill, and a ring of buffers to send.
-//! Each descriptor names a buffer. A driver has two halves, one for each ring, so that a core may
-//! receive while another core sends. Frames are not copied: their buffers are swapped.
+//! A card has two rings of descriptors: the first for buffers to fill, the other for buffers to
+//! send. Each descriptor names a buffer. A driver has two halves, one for each ring, so that a core
+//! may receive while another core sends. Frames are not copied: their buffers are swapped.
 //!
 //! **Reach invariant**: a card is told only the addresses of its rings, which are [DMA
 //! memory](executive::devices::dma), and of its halves' buffers, each with a length within the
@@ -71,8 +71,8 @@ pub trait Receive: Send {
 /// The sending half of a driver.
 pub trait Transmit: Send {
     /// Takes a frame: swaps its buffer for a free one. Returns false, with the buffer unchanged, if
-    /// there is no room. A buffer with no valid frame, judged by its length, or without 12 bytes of
-    /// room before the frame for a card's header, is dropped.
+    /// there is no room. A frame with an invalid length, or less than 12 bytes of room in front for
+    /// a card's header, is dropped, and the result is true.
     fn send(&mut self, frame: &mut Buffer) -> bool;
 
     /// Tells the card about the frames sent since the last call.

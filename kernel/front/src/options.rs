@@ -206,7 +206,8 @@ impl<'a> CommandLine<'a> {
     ///
     /// # Errors
     ///
-    /// If an option has not been taken. The error names the option and all existing keys.
+    /// If an option has not been taken. The error names the option and, unless the option is one of
+    /// the kernel's own, all existing keys.
     ///
     /// ```no_run
     /// let options = kernel::options::CommandLine::parse("sed=3").unwrap();

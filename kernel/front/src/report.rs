@@ -142,7 +142,7 @@ pub fn fault(
     });
 }
 
-/// Prints whether a recording is complete.
+/// Prints how complete a recording is.
 pub fn recorded(drained: &RecordingState) {
     let is_complete = !drained.is_cut && drained.lost == 0;
     json::emit("recorded", |line| {

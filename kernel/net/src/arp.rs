@@ -116,8 +116,7 @@ impl<B> Neighbours<B> {
         self.table.iter_mut().for_each(|known| known.mac = None);
     }
 
-    /// Keeps a frame until its neighbour has answered, by swapping the frame for the previously
-    /// kept frame.
+    /// Keeps a frame until its neighbour has answered, in exchange for the previously kept buffer.
     pub(crate) fn keep(&mut self, ip: Ipv4Addr, frame: &mut B) {
         let uses = self.uses;
         let neighbour = self.entry(ip);

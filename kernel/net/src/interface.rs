@@ -37,7 +37,8 @@ impl Address {
         gateway: None,
     };
 
-    /// Returns whether the address, and that of the router, may each belong to a single host.
+    /// Returns whether the address, and the router's if there is a router, may each belong to a
+    /// single host.
     #[must_use]
     pub fn is_of_a_host(&self) -> bool {
         let mut ips = [Some(self.ip), self.gateway].into_iter().flatten();
@@ -308,8 +309,8 @@ impl<B: AsMut<[u8]>> Interface<B> {
         self.neighbours.forget();
     }
 
-    /// Keeps a frame until its neighbour has answered, by swapping the frame for the previously
-    /// kept frame: a single frame is kept for each neighbour.
+    /// Keeps a frame until its neighbour has answered, in exchange for the previously kept buffer:
+    /// there is a single place for each neighbour.
     pub fn keep(&mut self, neighbour: Ipv4Addr, frame: &mut B) {
         self.neighbours.keep(neighbour, frame);
     }

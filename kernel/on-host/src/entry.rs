@@ -31,8 +31,8 @@ use crate::host_system::{HostSystem, Machine, with_terms};
 use crate::program;
 pub use crate::program::write_as;
 
-/// Makes an app's function the function run by the program: defines the function `program`, for the
-/// file with the app's `main.rs` as its module.
+/// Makes the program run an app's function: defines the function `program`, for the file with the
+/// app's `main.rs` as its module.
 #[macro_export]
 macro_rules! entry {
     ($app:path) => {

@@ -46,8 +46,8 @@ use crate::linux_system::{LinuxSystem, Machine, memory_kib};
 pub use crate::program::write_as;
 use crate::program::{self, read};
 
-/// Makes an app's function the function run by the program: defines the function `program`, for the
-/// file with the app's `main.rs` as its module.
+/// Makes the program run an app's function: defines the function `program`, for the file with the
+/// app's `main.rs` as its module.
 #[macro_export]
 macro_rules! entry {
     ($app:path) => {

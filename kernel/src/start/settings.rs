@@ -13,7 +13,7 @@
 //!   Default: 0.
 //! - `events=off|on`: without `keep`, sends commits, events and times after each run. Default:
 //!   `off`.
-//! - `latest=N`: without `keep` and `events`, and with a debug port, keeps the inputs of each DAG's
+//! - `latest=N`: without `keep` and `replay`, and with a debug port, keeps the inputs of each DAG's
 //!   last N jobs, 64 at most, and sends them after a fault; 0: keeps none. Default: 16.
 //! - `replay=N`: the next N bytes of the loader's module are a recording to be replayed. Default:
 //!   0.
@@ -24,7 +24,8 @@
 //! - `trace_events=N`: the most events kept by a run's journal; 0: none. Default: as many as the
 //!   run needs, or as fit into a quarter of the free memory.
 //! - `bounds=judge|observe`: whether exceeding a proven bound makes a run fail. Default: `judge`.
-//! - `log=off|error|warn|info|debug`: the last level of the log that is printed. Default: `info`.
+//! - `log=off|error|warn|info|debug`: the least urgent level of the log still printed. Default:
+//!   `info`.
 //! - `idle=halt|poll`: whether idle cores halt, or poll for work, and so begin it sooner. Default:
 //!   `halt`.
 //! - `measure=nothing|interrupts|stacks`: whether to measure sections without interrupts, or each
@@ -75,8 +76,8 @@ pub(crate) struct RunSettings {
     pub(crate) wishes: BackgroundOptions,
 }
 
-/// Has the runs to come recorded or replayed, if the options say so. Returns the rest of the
-/// module.
+/// Requests a recording or a replay of the runs to come, if the options say so. Returns the rest of
+/// the module.
 pub(crate) fn set_wish(
     options: &CommandLine<'static>,
     app: &'static str,

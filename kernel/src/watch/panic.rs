@@ -28,7 +28,7 @@ const EVENTS_SHOWN: usize = 16;
 /// The most bytes of the message shown.
 const MESSAGE_BYTES: usize = 2048;
 
-/// The core reporting at present, or `NOBODY`.
+/// The first core to report, [`FAILED`] after a failed report, or [`NOBODY`] before any.
 static REPORTING: AtomicU32 = AtomicU32::new(NOBODY);
 const NOBODY: u32 = u32::MAX;
 /// Stands for a core after a failed report.

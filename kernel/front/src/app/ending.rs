@@ -166,9 +166,10 @@ pub struct RunVerdict {
     judges_bounds: Cell<bool>,
     /// Whether several cores share a single clock.
     shares_clock: bool,
-    /// The complaint about a fault, if there was a fault.
+    /// The complaint about the DAGs ended by faults, if any.
     fault: RefCell<Option<String>>,
-    /// The complaint about an exceeded bound, if a bound was exceeded.
+    /// The complaint about the first exceeded bound, if any; not kept if the app judges bounds
+    /// itself.
     exceeded: RefCell<Option<String>>,
 }
 

@@ -159,10 +159,10 @@ impl<S: System> Machine<S> {
         &self.options
     }
 
-    /// Returns the app's file, if there is a file: on the bare machine the file left in memory by
-    /// the loader (`qemu -initrd FILE`), on Linux the file named by the option `module=`. The
-    /// loader's file is not copied, so files of any size cost the same memory and boot time. If
-    /// there is a file and the app never asks for it, a warning says so at the end.
+    /// Returns the app's file, if any: on the bare machine (`qemu -initrd FILE`) as left in memory
+    /// by the loader, on Linux as named by the option `module=`. The loader's file is not copied,
+    /// so files of any size cost the same memory and boot time. If the app never asks for its file,
+    /// a warning says so at the end.
     pub fn module(&self) -> Option<&'static [u8]> {
         self.has_asked.set(true);
         self.module.get()
@@ -290,7 +290,7 @@ impl<S: System> Machine<S> {
     /// Linux the bytes come from standard input.
     ///
     /// Core 0 polls the port when it has nothing else to do, so a byte may count up to 20 ms late,
-    /// and later on a busy core.
+    /// and later while core 0 is busy.
     ///
     /// # Panics
     ///
@@ -325,11 +325,10 @@ const MARGIN_PERCENT: u64 = 20;
 impl<S: System> Machine<S> {
     /// Connects a wire to the endpoint named by its [option](super::endpoint). Without an option
     /// the endpoint is the second serial port (COM2, at I/O port 0x2f8): in the runs to come, the
-    /// port sends the wire's output, and bytes received by the port arrive on the wire. If the
-    /// option `input=` declares the end of the loader's module a script, the script arrives
-    /// instead, in each run. Call before
-    /// [`CommandLine::finish`](crate::options::CommandLine::finish), which otherwise refuses these
-    /// options, and before [`module`](Self::module).
+    /// port sends the wire's output, and received bytes arrive on the wire. If the option `input=`
+    /// declares the end of the loader's module a script, the script arrives instead, in each run.
+    /// Call before [`CommandLine::finish`](crate::options::CommandLine::finish), which otherwise
+    /// refuses these options, and before [`module`](Self::module).
     ///
     /// The port is polled every millisecond. Core 0 sends when it has nothing else to do. After
     /// each run a line reports the wire's counts. On Linux, standard input (`input=-`) and a file

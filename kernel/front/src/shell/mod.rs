@@ -99,7 +99,7 @@ pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<DagSnapsho
 }
 
 /// Calls `take` with the latest events in the journal of a cluster, from the latest one backwards:
-/// at most `most` events, and until `take` returns false.
+/// at most `most` events, rounded up to a multiple of 64, and until `take` returns false.
 pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Event) -> bool) {
     /// The number of events copied at a time under the lock.
     const AT_ONCE: usize = 64;

@@ -236,7 +236,7 @@ impl CompletionRate {
 }
 
 /// Finds a topic of any DAG: its DAG, and its index there. Otherwise says so, and suggests a
-/// similar name.
+/// similar name or lists some topics.
 fn find(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<(DagId, usize)> {
     let dags = || (0..).map(DagId).zip(task_set.dags());
     let found = dags().find_map(|(dag, model)| {

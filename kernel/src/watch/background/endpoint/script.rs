@@ -194,7 +194,7 @@ impl ScriptEndpoint {
     /// Sends a part of the current line, or of the next line. Reports whether there was something
     /// to send.
     fn send_line(&self, is_ready: impl Fn() -> bool, send: impl Fn(u8)) -> bool {
-        // The line is long, and the lock disables interrupts: so send outside of the lock.
+        // A line may be long, and the lock disables interrupts: so send outside of the lock.
         let (mut line, mut gone) = core::mem::take(&mut *self.script.line.lock());
         if gone == line.len() {
             line.clear();

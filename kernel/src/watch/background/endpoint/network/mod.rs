@@ -65,7 +65,7 @@ impl Law {
     /// The charge is that of the longest interrupt in instructions, each a nanosecond: with its
     /// entry and exit, the release of a DAG, the alarm, and the packet sent by a heartbeat. Packets
     /// sent by a core behind a completion are charged as a part of the dispatch. The time that
-    /// cores wait for each other, when they need the card at once, is not charged.
+    /// cores wait for each other, when several need the card at the same time, is not charged.
     fn charged(options: &CommandLine<'static>, distance_us: u64) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
         // No longer than a heartbeat, because the heartbeat sends as well.
@@ -487,8 +487,8 @@ impl Endpoint for &'static Network {
             self.wires.iter().for_each(|wire| wire.end.set_link(is_up));
             PROTOCOLS.iter().for_each(|place| place.set_link(is_up));
         }
-        // Packets without room or address so far, beyond a bell's limit, or due to a protocol's
-        // peer. Not behind a message of DHCP: a heartbeat is charged for one packet.
+        // Sends a packet that had no room or no address so far, exceeded a bell's limit, or is due
+        // to a protocol's peer. Not after a message of DHCP: a heartbeat is charged for one packet.
         if !has_asked {
             self.send(1, now_ns);
         }
@@ -496,7 +496,7 @@ impl Endpoint for &'static Network {
 
     fn step(&self) -> bool {
         PROTOCOLS.iter().for_each(|place| place.tell_news());
-        // Packets beyond the limit of a completion.
+        // Sends a packet beyond the limit of a completion.
         self.send(1, clock::now_ns())
     }
 
