@@ -71,8 +71,8 @@ impl Baseline {
             .map_err(|why| format!("the baseline `{file}`: {why}; `{saved_by}` writes it anew"))
     }
 
-    /// Compares new figures with the figures before, if any, and keeps the new figures if `saves`
-    /// says so. Prints a table, and reports whether no figure has grown.
+    /// Compares new figures with those before, if any, in a table, and keeps the new ones if
+    /// `saves` says so. Reports whether no figure has grown.
     ///
     /// # Errors
     ///

@@ -2,9 +2,9 @@
 //!
 //! An instruction belongs to a single part. Among the functions the instruction was inlined from,
 //! the innermost in a file of ours decides, so library code counts for the part that uses it. A
-//! part is a folder or file right below a crate's `src`. Code from no file of ours, such as the
-//! code for dropping values, is listed separately, and so is everything other than code: constants,
-//! variables with nonzero initial values, headers.
+//! part is a folder or file right below a crate's `src`. Code from no file of ours, such as for
+//! dropping values, is listed separately, and so is everything else: constants, variables with
+//! nonzero initial values, headers.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;

@@ -21,7 +21,7 @@
 //!   other part of the tolerance. With a window of 0 the kernel decides at once, as in apps; cases
 //!   without simultaneous events pass that way too.
 //! - *Completions come before releases* of the same instant, and a finish at the deadline is no
-//!   miss. For both, execution ends a *guard* before the unit of time.
+//!   miss. For both, execution ends a *guard* before the end of the unit of time.
 
 use std::ffi::OsString;
 use std::fs;

@@ -191,7 +191,7 @@ impl SetFile {
     ///
     /// # Errors
     ///
-    /// In words: the file cannot be read, or no method is for one of its sets.
+    /// In words: the file cannot be read, or has a set not covered by the methods.
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let name = files::shown_path(path);
         if path.is_dir() || path.extension().is_some_and(|of| of == "dag") {
