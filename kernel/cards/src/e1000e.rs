@@ -37,8 +37,8 @@ const LINK_UP: u32 = 1 << 1;
 /// A message leaves the mask unchanged.
 const KEEP_MASK: u32 = 1 << 27;
 
-/// The cause "frame received", for a message of its own, and the value of the message register that
-/// makes it message 0.
+/// The cause "frame received", with its own message, and the register value for sending it as
+/// message 0.
 const RECEIVED: u32 = 1 << 20;
 const MESSAGE_IS_RECEIVED: u32 = 1 << 3;
 

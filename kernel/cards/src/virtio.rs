@@ -43,8 +43,8 @@ const VERSION_1: u32 = 1;
 const LINK: u64 = 6;
 const DEVICE: u64 = 8;
 
-/// The parts of a ring's page: descriptors, descriptors given to the card, descriptors the card is
-/// done with. The latter two begin with flags, whose bit 0 means "do not call", and an index. The
+/// The parts of a ring's page: the descriptors, those given to the card, and those the card is done
+/// with. The latter two begin with flags, whose bit 0 means "do not call", and an index. The
 /// elements of the last part, after the index, are words of 8 bytes.
 const GIVEN: usize = 16 * RING as usize;
 const DONE: usize = 2052;

@@ -1,8 +1,8 @@
 //! The clusters of a divided machine: the state each cluster has for itself.
 //!
-//! Each event on a core takes its cluster's lock, steps its cluster's scheduler and writes into its
-//! cluster's journal; the hot path of a cluster therefore touches no word of another cluster. The
-//! first core of a cluster keeps the cluster's time.
+//! Each event on a core takes the lock of its cluster, steps the scheduler and writes into the
+//! journal there; the hot path of a cluster therefore touches no word of another. The first core of
+//! a cluster keeps the cluster's time.
 //!
 //! Undivided cores form one cluster. [`divided`](super::divided) divides the cores.
 //!

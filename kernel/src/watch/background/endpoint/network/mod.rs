@@ -126,7 +126,8 @@ pub(super) struct Network {
     law: Law,
     /// The core interrupted by the card.
     core: AtomicU32,
-    /// The time when the masked card may interrupt again; `u64::MAX` if it is not masked.
+    /// The time when the masked card may interrupt again; `u64::MAX` if not masked, or outside a
+    /// run.
     unmask_ns: AtomicU64,
     is_run: AtomicBool,
     is_linked: AtomicBool,
