@@ -43,9 +43,9 @@
 //! there without an interrupt to another core. A driver that knows of an awake core says so
 //! ([`CoreTable::prefer`]).
 //!
-//! The search for the core to preempt looks at all cores, but is rare: it happens only when no core
-//! is idle and the newly ready instance is not the first in line. Keeping the cores in order
-//! instead would cost every start and every completion.
+//! The search for the core to preempt looks at all cores, but is rare: it happens only when an
+//! instance has become ready, no core is left idle, and the line is not empty. Keeping the cores in
+//! order instead would cost every start and every completion.
 
 use alloc::boxed::Box;
 use alloc::vec;

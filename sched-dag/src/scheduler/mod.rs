@@ -212,8 +212,8 @@ impl Scheduler {
     /// Keeps events of these kinds as [notices](EventLog::has_notices) from now on, and returns the
     /// number of notices there is room for.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
-        // At one instant a DAG's end may skip and cancel all jobs of the DAG, and a change of mode
-        // the waiting jobs of each other DAG; a step also reports skips.
+        // At one instant a DAG's end may cancel all instances of the DAG, and a change of mode may
+        // skip a job of each other DAG; a step also reports earlier skips.
         let of_dag = |dag: &Dag| dag.slots() * (dag.subtasks().len() + 4);
         let most = self.task_set.dags().iter().map(of_dag).max();
         let others = 8 * self.dags.len() + SKIPS_A_STEP;

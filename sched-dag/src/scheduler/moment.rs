@@ -139,11 +139,12 @@ impl<'s> Moment<'s> {
     }
 
     /// Serves a request about one DAG; ignores other requests. A pause of a closed DAG, or any
-    /// request to an ended DAG, does nothing (the module `phase` states the rules).
+    /// request to an ended DAG except a signal, does nothing (the module `phase` states the rules).
     ///
     /// With a signal to a sporadic DAG, its next job is due now, or as soon after the job before as
     /// the minimum inter-arrival time allows. While the next job is to come, or waits for room,
-    /// further signals are dropped and counted (the module `signals` states the rules).
+    /// further signals are dropped and counted, like all signals to a closed or ended DAG (the
+    /// module `signals` states the rules).
     ///
     /// # Panics
     ///

@@ -161,7 +161,7 @@ pub enum DagPhase {
     Ended,
 }
 
-/// A person's question to a scheduler, or wish. It takes the scheduler little time.
+/// A person's question or wish to a scheduler. Serving it takes the scheduler little time.
 #[derive(Debug)]
 pub enum SchedulerQuery<'a> {
     /// The state of a DAG.

@@ -89,7 +89,7 @@ impl ReadyQueue {
             };
         }
         let keys: Vec<u128> = of_vertices.into_iter().map(u128::from).collect();
-        // No key needs its job: the whole order is known at the commit.
+        // If all DAGs have ranks, no key needs its job: the whole order is known at the commit.
         if dags.all(|(dag, numbers)| has_ranks(dag, numbers)) {
             let order = rank(&keys, vertices, KeyOrder::Rank);
             return Self::of(KeyOrder::Rank, ranked(&order));

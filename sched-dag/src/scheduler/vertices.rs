@@ -245,8 +245,8 @@ impl VertexTable {
     pub(super) fn allow_passing_on(&mut self, vertices: Range<usize>) {
         for vertex in &mut self.vertices[vertices] {
             let [from, to] = vertex.successors;
-            // With one slot no next job can wait for this vertex, and a job ends only with a sink.
-            // So the end of a vertex with successors needs neither check.
+            // With one slot no next job can wait for this vertex, and a job ends only with an
+            // instance without successors. So the end of any other instance needs neither check.
             vertex.ends = match vertex.slot_mask == 0 && from < to {
                 true if vertex.line.is_table() => EndKind::PassesOnInTable,
                 true => EndKind::PassesOn,
@@ -292,7 +292,8 @@ impl VertexTable {
         own.phase = InstancePhase::Absent;
         own.progress += 1;
         // Both counters have their initial values already: the ended vertex's was reset when its
-        // entry began, and the successor's would be counted down to 0 and reset.
+        // entry began, or never counted down after a hand-over; the successor's would be counted
+        // down to 0 and reset.
         (next.phase, next.job) = (InstancePhase::Running(core), own.job);
         Some(next.present_instance())
     }
