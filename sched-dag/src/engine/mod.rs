@@ -258,7 +258,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         let log = &mut self.scheduler.log;
         let Some(mut body) = exchanged else {
-            // The next instance is suspended, so its readiness was recorded before.
+            // The next instance has started before, so its readiness is already recorded.
             if HAS_ENDED {
                 log.journal.write_all(core, [finish]);
             }

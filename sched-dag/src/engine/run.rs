@@ -138,7 +138,7 @@ impl Run {
         let (task_set, cluster) = (&self.task_set, other.cluster);
         let ids = (0..).map(DagId).zip(&mut self.dags);
         // Each scheduler treats the DAGs of other clusters as ended from the start, so its data
-        // covers only its own.
+        // covers only the DAGs of its own cluster.
         for (dag, of_dag) in ids.filter(|(dag, _)| task_set.dag(*dag).cluster() == cluster) {
             *of_dag = DagCounts::new(&other.scheduler, dag);
         }
@@ -159,7 +159,7 @@ impl Run {
     }
 
     /// Returns the times of all jobs and instances, in nanoseconds from the origin of release
-    /// times. If there was no memory for all events, only the latest whole jobs.
+    /// times. If there was no memory for all events, the record has only the latest whole jobs.
     ///
     /// Computed from the journal at the first call.
     ///
@@ -182,7 +182,7 @@ impl Run {
     }
 
     /// Returns the response times of a DAG's complete jobs, in nanoseconds. If there was no memory
-    /// for all events, only the latest jobs.
+    /// for all events, only the latest jobs count.
     ///
     /// # Panics
     ///

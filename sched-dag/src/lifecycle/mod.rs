@@ -104,8 +104,8 @@ impl PendingRequests {
         }
     }
 
-    /// Keeps a request of a function until the next step. A function's request never answers a
-    /// wait: answers come only as letters.
+    /// Keeps a request, mostly of a function, until the next step. A function's request never
+    /// answers a wait: answers come only as letters.
     pub fn keep(&mut self, request: Request) {
         // Keeping a request once is enough. This bounds the room: one place for each different
         // request.
@@ -244,7 +244,7 @@ impl Lifecycle for LifecyclePlan {
                 changes.extend(self.dags.drain(..).map(LifecycleChange::Close));
             }
             // Requests about one DAG without effect on the plan: `touches` was false, or the
-            // scheduler serves them.
+            // scheduler serves them. `Step` asks for nothing but a step.
             Request::Pause(_)
             | Request::Resume(_)
             | Request::Signal(_)

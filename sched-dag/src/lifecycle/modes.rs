@@ -18,7 +18,7 @@
 //!   entered, whichever entry either asks for. A request for the present mode is allowed, too.
 //! - **M5, what a person does.** A DAG that was paused or resumed at the console stays so until a
 //!   mode is entered.
-//! - **M6, those that are gone.** An ended DAG stays ended; only its instances in flight keep a
+//! - **M6, those that are gone.** An ended DAG stays ended; only its jobs in flight keep a
 //!   mode waiting. After a shutdown no mode is entered.
 //! - **M7, replays.** A DAG with recorded inputs is neither paused nor resumed, and no mode waits
 //!   for the DAG (L6).

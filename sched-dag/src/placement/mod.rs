@@ -248,7 +248,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Gives a core without a current instance an instance of subtask `vertex` to start. Returns
-    /// `None`, with nothing changed, if the instance is suspended.
+    /// `None`, with nothing changed, if the instance has started before, such as a suspended one.
     #[inline]
     pub fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
         let place = self.body_state(vertex);
@@ -269,8 +269,8 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Notes that a core has finished the instance it was meant to run, and makes subtask `next`
-    /// its target. Returns the body to start. Returns `None` if the next instance is suspended:
-    /// then the core has nothing yet.
+    /// its target. Returns the body to start. Returns `None` if the next instance has started
+    /// before, such as a suspended one: then the core has nothing yet.
     #[inline]
     pub fn exchange(
         &mut self,
@@ -281,8 +281,8 @@ impl<Body, Parked> Placement<Body, Parked> {
     ) -> Option<Body> {
         self.put(finished, body);
         let started = self.start(core, next);
-        // The next instance is suspended, and its context may not be here yet: the core looks for
-        // the instance in the usual way.
+        // The next instance has started before. If it is suspended, its context may not be here
+        // yet. So the core looks for the instance in the usual way.
         if started.is_none() {
             self.seats[core.index()] = CoreSlot {
                 current: NOTHING,
