@@ -130,7 +130,7 @@ use crate::task_set::{Dag, Subtask, TaskSet};
 /// A subtask of a DAG.
 pub type SubtaskRef = (DagId, SubtaskId);
 
-/// A topic sampled across DAGs: the subtask writing the topic and the subtask sampling it.
+/// A sampled topic: the subtask writing the topic and the subtask sampling it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SampledEdge {
     /// The subtask writing the topic.

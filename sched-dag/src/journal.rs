@@ -187,7 +187,7 @@ events! {
     Finish = "finish", Core;
     /// The instance was ended by a fault.
     Ended = "ended", Core;
-    /// A signal came, which makes a sporadic DAG's job due.
+    /// A signal came: a sporadic DAG's job is due now, or as soon as its distance allows.
     Signalled = "signalled", Job;
     /// A signal came while another was kept for the job, or no job was left.
     Dropped = "dropped", Job;

@@ -55,11 +55,11 @@ pub enum OverrunPolicy {
     Queue,
     /// The release does not happen and is counted. Nothing ever waits.
     Skip,
-    /// The oldest job in flight that is not aborted yet is aborted, and the release waits until it
-    /// is not blocked.
+    /// The oldest job in flight that is not cut yet, by an abort or a fault, is aborted, and the
+    /// release waits until it is not blocked.
     ///
     /// An aborted job starts no further instance. Started instances go on, and when no instance of
-    /// the job is left, the job is out of flight. If all jobs in flight are aborted already, the
+    /// the job is left, the job is out of flight. If all jobs in flight are cut already, the
     /// oldest waiting release is skipped.
     Abort,
 }

@@ -2,8 +2,8 @@
 //!
 //! A core in a table runs the *entries* of its list, in order and again from the first: each lap of
 //! the list is one hyperperiod of the table's DAGs. An entry is a subtask in one job. An entry of
-//! *depth* d starts on top of d begun and unfinished entries of its core. The entries of greater
-//! depth directly following an entry are *nested* in it.
+//! *depth* d starts on top of d begun and unfinished entries of its core, or fewer if some of these
+//! are void or over. The entries of greater depth directly following an entry are *nested* in it.
 //!
 //! The scenarios of the rules, in `tests/scenarios/tables.txt`, bear their numbers:
 //!
@@ -69,7 +69,7 @@ pub struct TableEntry {
     /// The number of the job in lap 0; each later lap adds the jobs of one lap. A job with a
     /// negative number does not exist.
     pub job: i64,
-    /// The number of begun entries below the entry when it starts.
+    /// The number of entries in which the entry is nested.
     pub depth: u32,
     /// The latest start after the beginning of the lap, in nanoseconds, less than the lap.
     pub start_ns: u64,

@@ -507,7 +507,7 @@ impl Dag {
 }
 
 impl TaskSet {
-    /// Divides the cores, and puts each DAG into a cluster with the reason.
+    /// Divides the cores, and puts each DAG into a cluster, with the reason.
     pub(crate) fn divide(&mut self, sizes: &[u32], of_dags: &[(ClusterId, AssignmentReason)]) {
         self.clusters = sizes.into();
         for (dag, (cluster, why)) in self.dags.iter_mut().zip(of_dags) {

@@ -241,8 +241,8 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Returns the schedule-abstraction graph of all DAGs, or an error if a graph does not cover
-    /// some DAG.
+    /// Returns the schedule-abstraction graph of all DAGs, or an error if the graph does not cover
+    /// some DAG or exceeds a limit.
     pub(super) fn graph(&self) -> Result<AbstractionSet, NotClosed> {
         if self.members.len() < self.own.len() || self.tells_cores() {
             return Err(NotClosed::NotCovered);

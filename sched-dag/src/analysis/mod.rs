@@ -309,7 +309,7 @@ texts! {
         TableOverheads =
             "its table is of several DAGs, and no bound covers long steps, interrupts of a device or \
              sections of locks there; give each DAG a table of its own, or leave the lists out";
-        /// A table runs on its cores, or holds its entries, and no other test applies there.
+        /// A table runs on its cores, or holds its entries, and no test bounds it there.
         BesideTable =
             "a table runs on its cores, or has its entries, and no test bounds it there; let it have \
              subtasks that can be preempted and do not wait, and all without a table static priorities \

@@ -31,8 +31,8 @@ use crate::policy::Preemption;
 use crate::task_set::Dag;
 
 /// Defines the terms of [`Overheads`], each with the number of times a segment is charged: always,
-/// and in addition where instances can be preempted. The last number says how often a move is
-/// charged.
+/// and in addition where instances can be preempted. The last number says how often a move takes
+/// the term.
 macro_rules! overheads {
     ($(
         $(#[doc = $doc:literal])+

@@ -279,8 +279,8 @@ impl Task {
         self.least_deadline_ns
     }
 
-    /// Returns the time after its release by which a job must complete so as not to overlap the
-    /// next: its deadline, or the next release if earlier.
+    /// Returns the time after its release by which a job must complete to be in time and not to
+    /// overlap the next: its deadline, or the next release if earlier.
     pub(super) fn within_ns(&self) -> u64 {
         self.relative_deadline_ns.min(self.period_ns)
     }

@@ -255,8 +255,8 @@ impl WitnessText {
             }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();
-                // A sink with a shared state may precede other subtasks, an order unknown to the
-                // graph alone.
+                // A sink with a shared state may precede other subtasks: the graph alone does not
+                // show that it is a sink.
                 if deadline_ns < dag.relative_deadline_ns() || !dag.successors(sink).is_empty() {
                     self.line(format_args!("due {} {deadline_ns}", sink.0));
                 }

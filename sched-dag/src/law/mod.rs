@@ -54,7 +54,7 @@ pub struct InstanceRecord {
     pub finish_ns: Option<u64>,
     /// When a fault had ended the instance instead; `None` also if no event records the fault.
     pub failed_ns: Option<u64>,
-    /// The core where the instance finished.
+    /// The core where the instance finished; before its finish, the core where it last ran.
     pub core: Option<CoreId>,
     /// How many times its function has returned; more than 1 is a violation.
     pub runs: u32,

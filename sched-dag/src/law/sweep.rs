@@ -144,7 +144,7 @@ pub enum DispatchBreach {
         /// The instance that ran meanwhile, or the core that idled.
         blame: DispatchFault,
     },
-    /// An instance started and keeps its core, although another instance went first.
+    /// An instance started and keeps its core, although another instance goes first.
     OutOfTurn {
         /// The instance.
         started: Instance,

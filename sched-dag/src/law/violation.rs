@@ -197,7 +197,7 @@ worded! {
         /// T4: an instance without a table was on a core outside its DAG's affinity.
         OutsideItsAffinity { event: Event } = "outside_its_affinity", (Table, By(event)),
             ", to which its DAG has no affinity";
-        /// R5: an instance lost the core that it keeps until its finish.
+        /// R5: an instance lost the core that it keeps until its finish or next wait.
         LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),
             " although it keeps its core until it finishes";
         /// One life: an event does not follow from the previous state of its instance.

@@ -149,7 +149,7 @@ pub(super) fn own_input(topic: Option<&String>) -> impl Display {
     })
 }
 
-/// Returns words for the clusters that can be stated; `clusters` is their number.
+/// Returns words for the clusters that can be stated, out of `clusters` clusters.
 pub(super) fn one_up_to(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| write!(f, "state one up to cluster {}", clusters.saturating_sub(1)))
 }
@@ -164,7 +164,7 @@ pub(super) fn counted_from_0(cores: u32) -> impl Display {
     })
 }
 
-/// Returns why a cluster does not exist, and the remedy; `clusters` is their number.
+/// Returns why a cluster does not exist where there are `clusters`, and the remedy.
 pub(super) fn undivided(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| match clusters {
         0 => f.write_str("this machine's cores are not divided; leave its cluster out"),

@@ -9,7 +9,7 @@
 //! R4: a job is complete with the last of its instances: all instances must be over, and the
 //! completion belongs to the scheduler step in which the last instance ends, within the tolerance.
 //! The same is true of a job that was aborted, or cut short by the end of its DAG. The next section
-//! says whether a job is late.
+//! says when a job is late.
 //!
 //! # R4: when a job is late
 //!
