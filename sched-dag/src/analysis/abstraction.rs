@@ -642,7 +642,8 @@ impl AbstractionSet {
 ///
 /// # Errors
 ///
-/// A sink may be late, or the list is open.
+/// A sink may be late, the list is open or does not include the initial state, a state is
+/// malformed, or a limit is exceeded.
 pub fn check_closed(
     set: &AbstractionSet,
     states: &[AbstractState],

@@ -17,7 +17,8 @@
 //! Two of the four squeeze the owners' lists before placing members. In the last two attempts as
 //! many periodic DAGs as fit into a lap form a *family*, with one table (`table_making`). Heavy
 //! DAGs outside the family are owners, on the last cores, and all others are members. The family
-//! gives up cores only if members find no place otherwise, and as few as possible.
+//! keeps all cores left by the owners if every member then finds a place. Otherwise the family gets
+//! the fewest cores on which its table can be made and every member finds a place.
 //!
 //! A new member lengthens no bound outside its own group. Bounds in a group depend only on its
 //! members and on the supplies of its cores ([`CoreSupply`]).
@@ -226,7 +227,8 @@ pub(super) struct LendingTerms<'b> {
 }
 
 /// Divides cores among DAGs by the analysis of tables in `docs/bounds.md`. A table of several DAGs
-/// has at most `entry_limit` entries; a commit passes [`ENTRY_LIMIT`](crate::ENTRY_LIMIT).
+/// has at most `entry_limit` entries. A commit allows [`ENTRY_LIMIT`](crate::ENTRY_LIMIT), or none
+/// if something may delay all entries of a table at once: long steps, device interrupts or locks.
 ///
 /// Returns `None` if the analysis does not apply: there are no cores, or a subtask waits.
 #[must_use]
