@@ -7,11 +7,11 @@
 //!
 //! # Words
 //!
-//! A *DAG* (or task) is released periodically; each release is a *job*, counted from 0. A *subtask*
-//! is a function in the DAG: the function reads its argument tuple and writes its result tuple, one
-//! *topic* for each element. One execution of a subtask, for one job, is an *instance*. A *source*
-//! has no inputs and starts at the release; a *sink* has no outputs. `docs/glossary.md` lists the
-//! project's own words.
+//! A *DAG* (or task) is released periodically, or by signals; each release is a *job*, counted from
+//! 0. A *subtask* is a function in the DAG: the function reads its argument tuple and writes its
+//! result tuple, one *topic* for each element. One execution of a subtask, for one job, is an
+//! *instance*. A *source* has no inputs and starts at the release; a *sink* has no outputs.
+//! `docs/glossary.md` lists the project's own words.
 //!
 //! # A first DAG
 //!

@@ -134,8 +134,8 @@ fn renew(latest: Base, since: u64) -> u64 {
         && BASES.latest().0.ticks == latest.ticks
         && let Some(rate) = rate.learn(ticks, system_ns)
     {
-        // A base ahead of the system's clock runs slower by as much, though not below half the
-        // rate. The limit keeps the shift in 64 bits.
+        // A base ahead of the system's clock runs slower until it has lost its lead, though not
+        // below half the rate. The limit keeps the shift in 64 bits.
         let slower = ((ns - system_ns).min(1 << 20) << 32) / FRESH;
         let rate = rate - slower.min(rate / 2);
         BASES.put(Base { ticks, ns, rate });

@@ -50,8 +50,9 @@ pub enum Mechanism {
 
 /// Cores of this computer, for the next commit of DAGs.
 ///
-/// A new machine has static priorities and preemption; [`with`](Self::with) changes the settings
-/// before the commit. A program has one machine at a time.
+/// A new machine has static priorities, and preemption where its [`Mechanism`] can preempt;
+/// [`with`](Self::with) changes the settings before the commit. A program has one machine at a
+/// time.
 ///
 /// # Examples
 ///

@@ -1,9 +1,10 @@
 //! Building a DAG: the registering half of the paper's API.
 //!
 //! A [`Dag`] is a handle of a DAG under construction. Registering a subtask takes a function, the
-//! names of the input and output topics, and attributes. A subtask has no other properties, and
-//! registration runs nothing. Registration does not report faults either: the commit reports all of
-//! them at once ([`finish_create_dags`](crate::finish_create_dags)). The commit uses up the handle.
+//! names of the input and output topics, attributes, and the [uses](Dag::using) of shared objects.
+//! A subtask has no other properties, and registration runs nothing. Registration does not report
+//! faults either: the commit reports all of them at once
+//! ([`finish_create_dags`](crate::finish_create_dags)). The commit uses up the handle.
 //!
 //! Construction happens on one thread; a `Dag` cannot leave the thread.
 

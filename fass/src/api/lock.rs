@@ -5,11 +5,11 @@
 //! registers changed by subtasks of several DAGs.
 //!
 //! Here a *section* is one call of [`Lock::with`]. Sections of one lock exclude each other, on all
-//! cores, and waiting cores take turns. Even where the platform preempts instances, an instance in
-//! a section keeps its core, since otherwise it would block every core waiting for the lock. So a
-//! section delays all other work of its core. Hence a lock declares its [longest
-//! section](Lock::longest), and a subtask the number of sections it [enters](Lock::entering); the
-//! analysis charges for both.
+//! cores. In the kernel waiting cores take turns. An instance in a section keeps its core there, up
+//! to [`LONGEST_SECTION`], since otherwise it would block every core waiting for the lock; on Linux
+//! it may lose its core. A section thus delays all other work of its core. Hence a lock declares
+//! its [longest section](Lock::longest), and a subtask the number of sections it
+//! [enters](Lock::entering); the analysis charges for both.
 //!
 //! # Guarantees
 //!

@@ -167,9 +167,10 @@ impl Dag {
 
     /// Sets a signal to be raised when a fault ends the DAG: a panic, an exception, an exceeded
     /// budget. The DAG released by the signal brings the system into a safe state; as a DAG it has
-    /// its place in the schedule, and a bound. The release happens in the step that ends the faulty
-    /// DAG. The released DAG should sample nothing written by the faulty DAG, since nobody renews
-    /// those values any more.
+    /// its place in the schedule, and a bound. The signal is raised in the step that ends the
+    /// faulty DAG, and reaches another cluster as a letter; the release keeps its least distance
+    /// from the release before. The released DAG should sample nothing written by the faulty DAG,
+    /// since nobody renews those values any more.
     ///
     /// ```
     /// use core::time::Duration;

@@ -165,9 +165,10 @@ impl Commit {
         &self.staleness
     }
 
-    /// Returns the first DAG not proven to meet its deadlines: a DAG that cannot be analysed, else
-    /// a DAG certain to miss its deadlines at its WCETs, else the most urgent DAG without a bound
-    /// from any test. Returns `None` if every DAG is proven.
+    /// Returns the first DAG not proven to meet its deadlines, in the first cluster with such a
+    /// DAG: a DAG that cannot be analysed, else a DAG certain to miss its deadlines at its WCETs,
+    /// else the most urgent DAG without a bound from any test. Returns `None` if every DAG is
+    /// proven.
     ///
     /// ```
     /// # use core::time::Duration;

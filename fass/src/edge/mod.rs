@@ -126,8 +126,8 @@ pub trait Crossing: Send {
         None
     }
 
-    /// Returns the drain for core 0, the first time only. When keeping the last jobs, there is a
-    /// drain only after a fault.
+    /// Returns the drain, the first time only. When keeping the last jobs, there is a drain only
+    /// after a fault.
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
     /// Returns the findings of a replay. If the run is over, they include a value the run has not
@@ -190,8 +190,8 @@ impl WatchedValue {
 /// The file for recorded entries.
 pub type Record = Stream<dyn Sink + Send>;
 
-/// The work of core 0 in its spare time: writing the recording into a file, with no allocation
-/// except for the header, or raising the signals of a replay.
+/// The work of core 0 in its spare time, or of a thread on Linux: writing the recording into a
+/// file, with no allocation except for the header, or raising the signals of a replay.
 ///
 /// See [`Crossing`].
 pub trait Drain: Send {

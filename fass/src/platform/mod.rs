@@ -1,7 +1,7 @@
 //! The platform: the machine below `fass`, and its interface.
 //!
-//! `fass` names no kernel. A platform (the kernel, or virtual time on the host) installs itself
-//! once, like a logger or an allocator, before the app commits its DAGs. The commit asks the
+//! `fass` names no kernel. A platform (the kernel, Linux, or virtual time on the host) installs
+//! itself once, like a logger or an allocator, before the app commits its DAGs. The commit asks the
 //! platform for the policy and the cores needed for verification, and hands the [`Plan`] over.
 //!
 //! # Code closed to apps
@@ -187,7 +187,7 @@ pub trait Platform: Sync {
     }
 
     /// Calls `section` when nobody else is in a section of the lock with the words `_lock`.
-    /// Meanwhile the caller's preemption is delayed, for at most
+    /// Meanwhile a platform may delay the caller's preemption, for at most
     /// [`LONGEST_SECTION`](crate::shared::LONGEST_SECTION). Returns the duration of the section in
     /// nanoseconds. If the caller is in a section already, returns `None` without calling
     /// `section`. A platform with one thread, running function after function, need not define the
@@ -319,8 +319,8 @@ impl core::error::Error for AlreadyInstalled {}
 ///
 /// # Examples
 ///
-/// Apps do not call the function; the kernel's entry or `VirtualTime` does. See [`Platform`] for a
-/// platform of one's own.
+/// Apps do not call the function; the kernel's entry, `Linux` or `VirtualTime` does. See
+/// [`Platform`] for a platform of one's own.
 ///
 /// ```standalone_crate
 /// use virtual_time::VirtualTime;

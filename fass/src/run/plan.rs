@@ -54,8 +54,8 @@ pub struct Plan {
     /// The answers of the commit, for platforms keeping a record of the run.
     pub(crate) answers: Box<dyn CommitWords>,
     /// For each DAG, the DAG to be released by a signal when a fault ends the former
-    /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
-    /// scheduler.
+    /// ([`Dag::on_fault`](crate::Dag::on_fault)). The signal comes right after the fault, in the
+    /// same step of the scheduler, or to another cluster as a letter.
     pub after_fault: Vec<Option<DagId>>,
     /// The server of requests other than signals, if a function may make one or a DAG begins
     /// paused. A platform without support for such requests refuses the plan.

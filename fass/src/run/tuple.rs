@@ -212,11 +212,12 @@ pub struct Publishers<Ends> {
     ends: Ends,
 }
 
-/// The future waiting at the gate, the only place where a subtask's future ever waits. Arriving
-/// values do not open the gate; only a grant does. So an instance cannot begin before the platform
-/// declares its predecessors complete (R2), and once begun it reaches its end in the same poll
-/// (R3). Equivalent to `core::future::PollFn`, but compiled into its caller, even where the caller
-/// is compiled for size.
+/// The future waiting at the gate, the only place where a subtask's future ever waits, besides the
+/// waits of an async function. Arriving values do not open the gate; only a grant does. So an
+/// instance cannot begin before the platform declares its predecessors complete (R2), and once
+/// begun it reaches its end in the same poll (R3), unless its function waits. Equivalent to
+/// `core::future::PollFn`, but compiled into its caller, even where the caller is compiled for
+/// size.
 struct AtTheGate<F>(F);
 
 impl<T, F: FnMut() -> Poll<T> + Unpin> Future for AtTheGate<F> {

@@ -95,7 +95,7 @@ impl VirtualTime {
     /// last job, up to this one, of which all states of the DAG are recorded
     /// ([`State::record`](fass::shared::State::record)), or, for a DAG without recorded states,
     /// with the job itself. Other DAGs begin with their jobs of the same time. To be called before
-    /// the commit. The commit is refused if no inputs of such a DAG are recorded.
+    /// the commit. The commit is refused if no inputs of the named DAG are recorded.
     ///
     /// See [`State::record`](fass::shared::State::record) for an example.
     pub fn from(self, dag: &str, job: u64) -> Self {

@@ -63,8 +63,9 @@ pub struct Report {
     pub uncompared: u64,
     /// In a replay, the first value differing from the recorded one.
     pub divergence: Option<Divergence>,
-    /// In a replay, the first DAG that begins with a job after job 0 without a record of all its
-    /// states there, and that job: its functions lack their memory of earlier jobs.
+    /// In a replay, the first DAG that begins with a job after job 0, and that job: its functions
+    /// lack their memory of earlier jobs. A DAG with a record of all its states there does not
+    /// count, unless a fault replaced a function before.
     pub lacking: Option<(String, u64)>,
     pub(crate) run: Run,
     /// How late interrupts may have been, in nanoseconds.

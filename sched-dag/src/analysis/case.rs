@@ -373,7 +373,8 @@ pub(super) fn dag_id(dag: usize) -> DagId {
 }
 
 /// Returns the tasks of the DAGs at the positions `own`, and notes for each unanalysable DAG the
-/// reason: a reason of its own, or the unanalysable DAG it may have to wait for.
+/// reason: a reason of its own, any DAG's lock without a longest section, or the unanalysable DAG
+/// it may have to wait for.
 fn analysable(
     places: &CorePlaces<'_>,
     own: &[usize],

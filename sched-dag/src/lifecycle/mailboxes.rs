@@ -12,8 +12,9 @@
 //!   modes. An end counts more than a closing.
 //! - Of two answers to waits of one subtask, the answer to the later wait counts.
 //! - All letters taken in one step are served in this order: the mode; DAG by DAG its pause or
-//!   resumption, its signals, its end; the end of the run. Letters that one sender leaves in this
-//!   order are served in this order, even if they are taken in two steps. Between different
+//!   resumption, its signals, its end, the answers to its waits; the end of the run. A mode,
+//!   letters about one DAG (except answers) and the end of the run, left by one sender in this
+//!   order, are served in this order, even if they are taken in two steps. Between several DAGs or
 //!   senders, the order is open.
 
 use alloc::boxed::Box;

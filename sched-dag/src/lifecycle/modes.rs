@@ -17,7 +17,7 @@
 //! - **M4, the last one counts.** A new request replaces a request still waiting for its mode to be
 //!   entered, whichever entry either asks for. A request for the present mode is allowed, too.
 //! - **M5, what a person does.** A DAG that was paused or resumed at the console stays so until a
-//!   mode is entered.
+//!   mode is entered, or until a request pauses the DAG (M3).
 //! - **M6, those that are gone.** An ended DAG stays ended; only its jobs in flight keep a
 //!   mode waiting. After a shutdown no mode is entered.
 //! - **M7, replays.** A DAG with recorded inputs is neither paused nor resumed, and no mode waits

@@ -21,11 +21,11 @@
 //! - Each job ends exactly once, in the order of its DAG's jobs, and each due job is released,
 //!   skipped, or dropped with its DAG's end, exactly once.
 //! - Bounded steps: a release costs the sources of its DAG, a completion the successors of its
-//!   subtask, a decision the logarithm of the number of subtasks. Besides, a cut job costs its
-//!   instances, once; at one instant these are at most the DAG's subtasks and edges times the jobs
-//!   that may be in flight. A skipped backlog costs [`SKIPS_A_STEP`] events a step, however long
-//!   the backlog is. After a pause of the driver, each release and each deadline passed meanwhile
-//!   costs its step.
+//!   subtask, a decision the logarithm of the number of subtasks, and a look at all cores if it may
+//!   preempt. Besides, a cut job costs its instances, once; at one instant these are at most the
+//!   DAG's subtasks and edges times the jobs that may be in flight. A skipped backlog costs
+//!   [`SKIPS_A_STEP`] events a step, however long the backlog is. After a pause of the driver, each
+//!   release and each deadline passed meanwhile costs its step.
 //!
 //! # Limits
 //!
@@ -95,7 +95,7 @@ pub struct Scheduler {
     fresh: u32,
     cores: CoreTable,
     /// For each DAG, the time of its next event without a completion; behind the DAGs, the latest
-    /// end of each wait, and the time of the next report of skips.
+    /// end of each wait, the time of the next report of skips, and the lanes of release classes.
     timers: Timers,
     waits: WaitTable,
     /// The earliest of these times, at hand for each completion; `u64::MAX` also if there is none.

@@ -17,9 +17,10 @@
 //!   sporadic DAG without limit is over whenever nothing of it is in flight and no signal is kept:
 //!   it keeps no run going.
 //!
-//! For the analysis a sporadic DAG is a DAG with period T. All tests of the analysis hold for every
-//! pattern of releases at least T apart: the papers behind the tests use the sporadic model. A
-//! response time counts from r(k), not from the signal, which may have come up to T before.
+//! For the analysis a sporadic DAG is a DAG with period T. The tests that answer for sporadic DAGs
+//! hold for every pattern of releases at least T apart, as in the sporadic model of the papers
+//! behind them. A response time counts from r(k), not from the signal, which may have come up to T
+//! before.
 
 use super::Scheduler;
 use crate::ids::DagId;

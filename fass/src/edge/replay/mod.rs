@@ -92,8 +92,9 @@ pub struct ReplayOutcome {
     pub uncompared: u64,
     /// The first value that differs from the recorded one.
     pub divergence: Option<Divergence>,
-    /// The first DAG beginning with a job after job 0, and that job, unless all of the DAG's states
-    /// are recorded there: its functions lack their memory of earlier jobs.
+    /// The first DAG beginning with a job after job 0, and that job: its functions lack their
+    /// memory of earlier jobs. A DAG with a record of all its states there does not count, unless a
+    /// fault replaced a function before.
     pub lacking: Option<(String, u64)>,
 }
 
@@ -502,7 +503,7 @@ pub(in crate::edge) struct OfMachine {
     lines: Vec<LineOf>,
     /// `Some` from the launch on.
     replay: Option<(Replay, SignalTimes)>,
-    /// `Some` from the launch until core 0 takes it, if there are signals to raise.
+    /// `Some` from the launch until the platform takes it, if there are signals to raise.
     replayer: Option<Box<dyn Drain>>,
 }
 

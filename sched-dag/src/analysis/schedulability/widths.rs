@@ -93,8 +93,8 @@ fn fitting(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
         let bound = case.set.bursts.after(case.tasks[dag].span_ns());
         bound.filter(|&bound_ns| bound_ns <= limit_ns && TEST.is_for(case, dag))
     });
-    // Starts from all DAGs that may have such a bound, and drops every DAG that rests on a DAG
-    // without one.
+    // Starts from all DAGs that may have such a bound, and drops every DAG whose widths do not fit,
+    // or that rests on a DAG without a bound.
     let mut bounds: Vec<Option<u64>> = alone.collect();
     for _ in 0..ROUNDS {
         let fits = |dag: usize| bounds[dag].filter(|_| has_room(case, dag, &bounds));
