@@ -78,7 +78,7 @@ pub struct JobRecord {
     pub missed_ns: Option<u64>,
     /// When no instance of the job was left.
     pub ended_ns: Option<u64>,
-    /// How the job ended; `None` if it was in flight at the end of the record.
+    /// How the job ended; `None` if it had not ended by the end of the record.
     pub outcome: Option<JobOutcome>,
 }
 

@@ -8,9 +8,10 @@
 //!   other. This is safe: while a subtask of `k` waits, any work on the cores belongs to `k` or
 //!   wins over the waiting subtask, so the DAG of that work counts.
 //! - *EDF.* Every DAG may outrank every other. For two DAGs without overlapping jobs, only jobs
-//!   with a deadline no later are counted: a waiting subtask is due no later than its job, so work
-//!   that wins over the subtask is, too. Where sinks have deadlines of their own, a job counts as
-//!   soon as the first of its deadlines is no later.
+//!   with a deadline no later are counted (without preemption, only if `D <= T` for all DAGs): a
+//!   waiting subtask is due no later than its job, so work that wins over the subtask is, too.
+//!   Where sinks have deadlines of their own, a job counts as soon as the first of its deadlines is
+//!   no later.
 //! - *No preemption at all.* Lower-ranked subtasks block in addition, except for subtasks of DAGs
 //!   that already count in full.
 //! - *Any other order.* Every other DAG counts in full.
