@@ -27,8 +27,8 @@
 //!
 //! 1. **The scheduler decides, the kernel carries out.** `sched-dag` is told about events and their
 //!    times; no line here chooses an instance.
-//! 2. **One lock around the scheduler**, held with interrupts off for a single step of the
-//!    scheduler, never across an app's function.
+//! 2. **One lock around each cluster's scheduler**, held with interrupts off for a single step of
+//!    the scheduler, never across an app's function.
 //! 3. **After commit nothing allocates**: all memory needed from a job's release to its completion
 //!    exists already.
 //! 4. **A core without work halts**, and is woken by a core with work for it.
@@ -94,8 +94,9 @@ pub fn timer_interrupts() -> u64 {
 /// given.
 ///
 /// A function using AVX carries the attribute `#[target_feature(enable = "avx")]`, and its caller
-/// has to ask first. For any other feature, such as `avx2`, the caller also has to ask the
-/// processor (`core::arch::x86_64::__cpuid`); the state of such features is saved with AVX's.
+/// has to ask first. For a feature using the same registers, such as `avx2` or `fma`, the caller
+/// also has to ask the processor (`core::arch::x86_64::__cpuid`). AVX-512 is not enabled, whatever
+/// the processor says.
 ///
 /// ```no_run
 /// # #![allow(unsafe_code)]

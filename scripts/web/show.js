@@ -74,8 +74,8 @@ let graphDrawn;
 // Shows the graphs, and what is stated besides.
 function showGraph() {
   const { graph, dags } = state.shown;
-  // The engine writes names in it as text, and the page's policy lets no other script run. To lay out a
-  // large one takes a browser long, and many an edit leaves it as it is.
+  // The engine writes names in the graph as text, and the page's policy lets no other script run. A
+  // browser takes long to lay out a large graph, so a graph left unchanged by an edit is kept.
   const text = graph.length > 1_000_000 ? "The graph is too large to be drawn." : graph;
   if (graphDrawn !== text) $("graph").innerHTML = graphDrawn = text;
   const subtasks = dag => dag.subtasks.map(({ name, notes }) => ({ name: `${dag.name}/${name}`, notes }));

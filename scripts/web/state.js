@@ -16,7 +16,7 @@ function element(name, properties, ...children) {
   return made;
 }
 
-// What is longer the editor of a browser does not bear; the commands do.
+// The most bytes of a file for the editor: a browser's editor does not bear more, the commands do.
 const MOST_TEXT = 1_000_000;
 
 const UNITS = [[1e9, "s"], [1e6, "ms"], [1e3, "us"], [1, "ns"]];

@@ -44,7 +44,8 @@ static STEPS: AtomicU32 = AtomicU32::new(0);
 /// The sum of the numbers of these steps, as the bits of an `f64`.
 static SUM: AtomicU64 = AtomicU64::new(0);
 
-/// Sends the token round from the executing core 0, and reports how far the token came.
+/// Sends the token round the cores, and prints how far the token came. Called on core 0, where the
+/// round begins.
 pub(crate) fn run() -> Result<(), AppError> {
     let cores = this_core::all().len();
     let start_ns = clock::now_ns();

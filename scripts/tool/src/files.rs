@@ -2,8 +2,8 @@
 //!
 //! A command reads its *inputs* and writes its *outputs*. Before a command begins its work it calls
 //! [`check`]. The check promises that no output is also an input or another output, under whatever
-//! name, and that each output can be written. The check empties no file; an output gets its new
-//! content when the content is ready.
+//! name, except devices, which keep nothing, and that each output can be written. The check empties
+//! no file; an output gets its new content when the content is ready.
 //!
 //! Only [`read`] reads inputs. It refuses folders, devices and named pipes, as these may have no
 //! end or no writer.

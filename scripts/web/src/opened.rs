@@ -84,7 +84,7 @@ impl<'r> OpenedRecords<'r> {
         let number = usize::try_from(run.number).unwrap_or(usize::MAX);
         let all = self.records.iter().zip(&self.bytes).enumerate();
         all.filter_map(move |(place, ((_, record), bytes))| {
-            // The times stand in the order of runs; one that has died has none.
+            // The times stand in the order of runs; a run that has died has no times.
             let times = record.times.get(number);
             let commit = match times {
                 Some((at, _)) => record.commits.get(*at),

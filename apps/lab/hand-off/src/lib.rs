@@ -52,7 +52,7 @@ pub struct Workload {
     pub stamping: Stamping,
     /// The time for which each subtask between source and sink computes; mostly zero.
     pub work: Duration,
-    /// The WCET of each subtask, and so a budget, if the subtasks have any.
+    /// The WCET of each subtask, if stated; each subtask then has a budget by default.
     pub wcet: Option<Duration>,
 }
 
@@ -252,7 +252,7 @@ impl StampPen {
 }
 
 impl BodyStamps {
-    /// Makes a pen for the next subtask's body, with room for two times a job.
+    /// Makes a pen for the next subtask's body, with room for two stamps in each job.
     pub fn pen(&mut self, jobs: u64) -> StampPen {
         let pen = StampPen::new(
             usize::try_from(jobs)

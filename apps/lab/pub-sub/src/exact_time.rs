@@ -9,8 +9,8 @@
 //! 2. An entry with all slots full is emitted and deleted; then every entry with a
 //!    smaller stamp is dropped. Newer entries stay.
 //! 3. While there are more entries than the queue size, the entry with the smallest stamp is
-//!    dropped, even if the latest message made it. So a topic more than a queue's length of stamps
-//!    behind can never match again.
+//!    dropped, even if the latest message made it. So a topic lagging by more stamps than the
+//!    queue size matches nothing until the lag shrinks.
 //! 4. Nothing is refused for being old: a late stamp makes a new entry that may still be completed,
 //!    so the stamps of successive sets can go backwards.
 //!

@@ -297,7 +297,7 @@ impl KnownClock {
                 // The gate of channel 2 on, its speaker off; then both bytes of the count,
                 // over and over from the top (Intel 8254 data sheet, mode 2).
                 // SAFETY: the ports are the PIT's and its gate's, which only this module uses;
-                // reading that changes nothing, and where there is none, writes go nowhere.
+                // reading the gate's changes nothing, and without a PIT writes go nowhere.
                 let gate = unsafe { port::read_u8(0x61) };
                 let setup = [(0x61, gate & !2 | 1), (0x43, 0xb4), (0x42, 0), (0x42, 0)];
                 for (register, value) in setup {

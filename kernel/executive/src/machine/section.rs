@@ -6,9 +6,9 @@
 //! holder would block every core waiting for the lock. The delay is [`LONGEST_SECTION`] at most: a
 //! holder that never returns delays other instances for that time, and no longer.
 //!
-//! Waiting cores take turns in a circle: a leaving core gives the turn to the next in line. A
-//! waiting core therefore sees each other core in the lock once at most. A waiting context can be
-//! preempted; the context then gives up its turn with its core.
+//! Waiting cores take turns in a circle: a leaving core gives the turn to the next in line. As a
+//! rule, each other core therefore enters at most once before a waiting core. A waiting context can
+//! be preempted; the context then gives up its turn with its core, and any core may enter.
 //!
 //! **Section invariant**: while the lock of a context's `SectionNote` is not null, the lock belongs
 //! to, and is borrowed by, a frame of [`with`] on the context's stack that has not returned.
@@ -133,7 +133,8 @@ pub fn stop_waiting(context: &Context) {
 pub(super) fn end(context: &Context) {
     stop_waiting(context);
     let note = context.sections();
-    // SAFETY: by the section invariant it lies in a frame, which nothing has used since.
+    // SAFETY: by the section invariant a frame of the abandoned context borrows the lock, and
+    // nothing has used the frame since.
     if let Some(lock) = unsafe { note.lock.swap(core::ptr::null_mut(), Acquire).as_ref() } {
         release(lock, this_core::get().index);
     }

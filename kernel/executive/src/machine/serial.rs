@@ -1,10 +1,11 @@
 //! The serial ports: 16550s at I/O ports 0x3f8 and 0x2f8, by polling.
 //!
 //! The first is for text, the second for an app's wire. Polling suffices, because text comes at
-//! boot, at the end, on a panic, or from an idle core byte by byte; an interrupt for each byte
-//! would only disturb. Input comes from a person, and an idle core looks for it now and then; the
-//! sender waits while the port's FIFO of 16 bytes is full, or bytes are lost. Registers: National
-//! Semiconductor PC16550D data sheet, 8.0.
+//! boot, at the end, on a panic, or during a run from an idle core byte by byte, or from core 0's
+//! heartbeat; an interrupt for each byte would only disturb. Input at the first port comes from a
+//! person, and core 0 looks for input now and then, idle or in its heartbeat. The heartbeat polls
+//! the second port. The sender waits while the port's FIFO of 16 bytes is full, or bytes are lost.
+//! Registers: National Semiconductor PC16550D data sheet, 8.0.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

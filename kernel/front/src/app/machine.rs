@@ -208,7 +208,7 @@ impl<S: System> Machine<S> {
     /// sees them all. On a machine they come one after the other, however close. A decision between
     /// two of them starts or preempts instances differently from the model. To compare the machine
     /// with the model, such events have to be taken together again. The price: every decision comes
-    /// `window` later. On Linux the next run is refused, unless `window` is 0.
+    /// `window` later. On Linux and in virtual time the next run is refused, unless `window` is 0.
     pub fn set_coincidence(&self, window: Duration) {
         self.system.set_coincidence(window);
     }

@@ -2,9 +2,9 @@
 //!
 //! # Events of a core
 //!
-//! A core finds work, starts an instance, completes an instance, takes an interrupt, or ends a
-//! faulty instance. Each event takes the cluster's lock once, makes a step of the scheduler if
-//! there is anything to decide, and wakes the other cores after releasing the lock.
+//! A core finds an instance to start or to continue, completes an instance, takes an interrupt, or
+//! ends a faulty instance. Each event takes the cluster's lock once, makes a step of the scheduler
+//! if there is anything to decide, and wakes the other cores after releasing the lock.
 //!
 //! # Effects of a completion beyond its DAG
 //!
@@ -344,8 +344,9 @@ pub fn fail(left: &AbandonedContext) -> Option<(FaultCost, u64)> {
     Some((cost, budget_ns))
 }
 
-/// Makes a step of the scheduler if `is_event` or if letters may be waiting, and follows its
-/// decisions on this core. Called in an interrupt handler.
+/// Makes a step of the scheduler, or just ends waits at their limit, if `is_event` or if letters
+/// may be waiting. Then follows the scheduler's decisions on this core, unless a section of an
+/// app's lock postpones the preemption. Called in an interrupt handler.
 pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     let core = this_core::get();
     let cluster = cluster::cluster_of(core);

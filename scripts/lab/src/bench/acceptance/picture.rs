@@ -53,7 +53,7 @@ pub(super) fn draw(points: &[AcceptancePoint], told: &Told) -> String {
     let curves: Vec<_> = points
         .chunk_by(|one, other| kind(one) == kind(other))
         .collect();
-    // A column for each number of cores; panels of one number lie side by side.
+    // A column for each number of cores; with a single number, its panels lie side by side.
     let numbers = curves.len() as u64 / kinds;
     let (columns, rows) = if numbers == 1 {
         (kinds, 1)

@@ -63,9 +63,10 @@ impl Law {
     /// Reads the options, and charges the commits to come, unless `overheads_ns` states a device.
     ///
     /// The charge is that of the longest interrupt in instructions, each a nanosecond: with its
-    /// entry and exit, the release of a DAG, the alarm, and the packet sent by a heartbeat. Packets
-    /// sent by a core behind a completion are charged as a part of the dispatch. The time that
-    /// cores wait for each other, when several need the card at the same time, is not charged.
+    /// entry and exit, its frames, the release of a DAG, the alarm, and the packet sent by a
+    /// heartbeat. Packets sent by a core behind a completion are charged as a part of the dispatch.
+    /// The time that cores wait for each other, when several need the card at the same time, is not
+    /// charged.
     fn charged(options: &CommandLine<'static>, distance_us: u64) -> Result<Self, UsageError> {
         let most = options.number("net_packets", 1..=16, 2)?;
         // No longer than a heartbeat, because the heartbeat sends as well.
