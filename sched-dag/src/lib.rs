@@ -14,19 +14,20 @@
 //! An instance is *ready* when it lacks only a core. A *dispatch* gives cores to ready instances:
 //! it *starts* them, or *resumes* instances that were *preempted*. An instance *finishes* when its
 //! function has returned, and a job is *complete* when all its instances have finished. From its
-//! release until then, the job is *in flight*. `docs/glossary.md` lists the project's own words.
+//! release until its last instance has ended, finished or not, the job is *in flight*.
+//! `docs/glossary.md` lists the project's own words.
 //!
 //! # The rules
 //!
 //! The scenarios of each rule bear its number, in `tests/scenarios/rules.txt`.
 //!
-//! - **R1, release.** No instance of job k runs before r. The release times are always on the
-//!   nominal grid, however late the driver or earlier jobs are.
+//! - **R1, release.** No instance of job k runs before r. The release times of a periodic DAG are
+//!   always on the nominal grid, however late the driver or earlier jobs are.
 //! - **R2, join.** An instance is ready exactly when its job is released, every predecessor in the
 //!   same job has finished, and the same subtask's instance in the job released before has
-//!   finished. So a subtask does its jobs in sequence, while jobs of one DAG may overlap as in a
-//!   pipeline. Nothing else delays the instance: no time passes between the last predecessor's
-//!   finish and readiness.
+//!   finished, failed or been cancelled. So a subtask does its jobs in sequence, while jobs of one
+//!   DAG may overlap as in a pipeline. Nothing else delays the instance: no time passes between the
+//!   last predecessor's finish and readiness.
 //! - **R3, completion boundary.** All outgoing edges of an instance are released at a single
 //!   instant, when the instance finishes. Nothing that happens within a function releases an edge.
 //! - **R4, job completion.** A job finishes when its last sink does. The job meets its deadlines if
@@ -42,7 +43,9 @@
 //!
 //! A core may have a list from a *table*: an order of subtasks over a common period of their DAGs.
 //! The core must keep to its list. All other instances share the remaining time of the cores, as R5
-//! says. Rules T1 to T4 are in `table.rs`, their scenarios in `tests/scenarios/tables.txt`.
+//! says: in each cluster by itself, where a commit divides the cores, and in each group of cores,
+//! where DAGs state affinities. Rules T1 to T4 are in `table.rs`, their scenarios in
+//! `tests/scenarios/tables.txt`.
 //!
 //! A subtask may *wait* between *segments* of its function. The instance then holds no core, and is
 //! not eligible until an answer arrives or the limit of the wait is reached. Rules W1 to W7 are in
@@ -52,8 +55,8 @@
 //! Rules S1 to S4 are in `scheduler/signals.rs`, their scenarios in `tests/scenarios/sharing.txt`.
 //! From its release on, a sporadic job is like any other job.
 //!
-//! When a release is due and the DAG already has its maximum number of jobs in flight, the DAG's
-//! [`OverrunPolicy`] decides. The scenarios are in `tests/scenarios/overrun.txt`.
+//! When a release is due and *blocked*, mostly because the DAG has its maximum number of jobs in
+//! flight, the DAG's [`OverrunPolicy`] decides. The scenarios are in `tests/scenarios/overrun.txt`.
 //!
 //! A DAG can be *ended* early, by an instance that [fails](Moment::fail) or by a
 //! [request](lifecycle::Request::End). An ended DAG starts nothing any more; the scheduler goes on
@@ -78,16 +81,17 @@
 //! - *Holders of a [`TaskSet`]*: acyclic graphs in the shapes allowed by the
 //!   [`ConstructionPolicy`], indices in range, no period or deadline of 0, a number of jobs in
 //!   flight of at least 1, and, for each job that will be due, times that fit 64 bits.
-//! - *A driver*: the scheduler allocates nothing after [`Scheduler::new`] (asserted in
-//!   `tests/it/allocation.rs`), does not recurse, and returns the time of the next necessary call
-//!   from [`Scheduler::next_event_ns`].
+//! - *A driver*: apart from a growing [`Journal`], the scheduler allocates nothing after
+//!   [`Scheduler::new`] and [`Scheduler::hear`] (asserted in `tests/it/allocation.rs`), does not
+//!   recurse, and returns the time of the next necessary call from [`Scheduler::next_event_ns`].
 //! - *A platform keeping values on edges*: at most [`Dag::in_flight`] jobs of a DAG are in flight,
 //!   and no two of them have the same number modulo [`Dag::in_flight`]. A released instance ends
 //!   exactly once, by a completion, by a failure or by
 //!   [`EventKind::Cancelled`](journal::EventKind::Cancelled).
 //! - *An app's author*: schedules that, core numbers apart, depend only on the times of a driver's
-//!   calls, not on their number or order; with the same execution times, the same schedule on every
-//!   driver.
+//!   calls, not on their number, nor on the order of completions; with the same execution times and
+//!   call times, the same schedule on every driver. Faults and requests of one instant count in
+//!   their order.
 //!
 //! Not guaranteed: that deadlines are met (ask [`analysis`]), that execution times stay below the
 //! stated WCETs, or anything about the time spent by a driver itself.

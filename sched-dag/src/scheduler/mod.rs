@@ -1,7 +1,8 @@
 //! The scheduler as a pure state machine.
 //!
 //! The scheduler has no clock, no thread and no I/O. A *driver* reports events with their times;
-//! the scheduler answers with *decisions*. All its memory is allocated at construction.
+//! the scheduler answers with *decisions*. All its memory is allocated at construction, except for
+//! [notices](Scheduler::hear) and a growing journal.
 //!
 //! # One instant
 //!
@@ -9,29 +10,31 @@
 //! both. The types force this order:
 //!
 //! 1. [`Scheduler::at`] begins the instant and returns a [`Moment`], which takes completions,
-//!    signals to sporadic DAGs, and faults and requests to end;
+//!    waits, faults, and requests such as signals to sporadic DAGs;
 //! 2. [`Moment::dispatch`] ends the instant: it releases due jobs, then returns the [`Decision`]s.
 //!
-//! A driver calls them when a subtask has returned, and at the latest at
-//! [`Scheduler::next_event_ns`].
+//! A driver calls them when a subtask has returned, waits or has failed, when a request has come,
+//! and at the latest at [`Scheduler::next_event_ns`].
 //!
 //! # Guarantees
 //!
 //! - The rules R1 to R5 (see the [crate]), with the key stated in R5.
-//! - Each job ends exactly once, in the order of its DAG's jobs, and each due job is released,
-//!   skipped, or dropped with its DAG's end, exactly once.
+//! - Each released job ends exactly once, in the order of its DAG's jobs, if its started instances
+//!   end; and each due job is released, skipped, or dropped with its DAG's end, exactly once.
 //! - Bounded steps: a release costs the sources of its DAG, a completion the successors of its
 //!   subtask, a decision the logarithm of the number of subtasks, and a look at all cores if it may
-//!   preempt. Besides, a cut job costs its instances, once; at one instant these are at most the
-//!   DAG's subtasks and edges times the jobs that may be in flight. A skipped backlog costs
-//!   [`SKIPS_A_STEP`] events a step, however long the backlog is. After a pause of the driver, each
-//!   release and each deadline passed meanwhile costs its step.
+//!   preempt. Tables add at most two laps of each list to a step. Besides, a cut job costs its
+//!   instances, once; at one instant these are at most the DAG's subtasks and edges times the jobs
+//!   that may be in flight. A skipped backlog costs [`SKIPS_A_STEP`] events a step, however long
+//!   the backlog is. After a pause of the driver, each release and each deadline passed meanwhile
+//!   costs its step.
 //!
 //! # Limits
 //!
 //! The scheduler does not know execution times: a subtask that never returns keeps its core (or,
-//! preempted, its place in line). The scheduler does not measure, but trusts the driver's times; a
-//! time before the latest instant counts as that instant.
+//! preempted, its place in line) until the driver reports a fault. The scheduler does not measure,
+//! but trusts the driver's times; a time before the latest instant counts as that instant in all
+//! decisions.
 
 mod bits;
 mod dispatch;
@@ -202,7 +205,8 @@ impl Scheduler {
         }
     }
 
-    /// Begins the instant `now_ns`. A time before the latest instant counts as that instant.
+    /// Begins the instant `now_ns`. A time before the latest instant counts as that instant, but
+    /// the end of a turn is recorded at the given time, and the limit of a wait counts from there.
     #[inline]
     pub fn at(&mut self, now_ns: u64) -> Moment<'_> {
         self.log.now_ns = self.log.now_ns.max(now_ns);
@@ -210,7 +214,8 @@ impl Scheduler {
     }
 
     /// Keeps events of these kinds as [notices](EventLog::has_notices) from now on, and returns the
-    /// number of notices there is room for.
+    /// number of notices there is room for. Events on a core, and [`Ready`](EventKind::Ready),
+    /// never become notices.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
         // At one instant a DAG's end may cancel all instances of the DAG, and a change of mode may
         // skip a job of each other DAG; a step also reports earlier skips.
@@ -233,16 +238,17 @@ impl Scheduler {
         (&self.decisions, &mut self.log)
     }
 
-    /// Returns the time of the next instant, if nothing completes before: the next release, the
-    /// first nanosecond after a deadline, the limit of a wait, or the next report of skips. An
-    /// ended DAG has no release and no deadline to come. `None`: only completions are to come, or
-    /// nothing.
+    /// Returns the time of the next instant, if the driver has nothing to report before, such as a
+    /// completion or a request: the next release, the first nanosecond after a deadline, the limit
+    /// of a wait, or the next report of skips. An ended DAG has no release and no deadline to come.
+    /// `None`: only reports of the driver are to come, or nothing.
     #[inline]
     pub fn next_event_ns(&self) -> Option<u64> {
         self.timers.peek().map(|(event_ns, _)| event_ns)
     }
 
-    /// Returns the instance that a core executes.
+    /// Returns the instance that a core executes by the latest decisions; `None` if the core is
+    /// idle. The cores of a machine follow the decisions a little later.
     ///
     /// # Panics
     ///
@@ -263,8 +269,8 @@ impl Scheduler {
 
     /// Reports whether nothing of a DAG is left to be done: no job is in flight, and none is to
     /// come. A DAG without a limit of jobs is over only once it [is closed](Self::is_closed) and
-    /// its started instances have ended. But a sporadic DAG is over whenever no signal is pending,
-    /// and may begin again.
+    /// its started instances have ended. But a sporadic DAG without a limit is over whenever
+    /// nothing of it is in flight and no signal is kept, and may begin again.
     ///
     /// # Panics
     ///
@@ -324,7 +330,7 @@ impl Scheduler {
         &self.task_set
     }
 
-    /// Returns the options.
+    /// Returns the options; `cores` is the number of the cluster's cores.
     #[inline]
     pub const fn options(&self) -> SchedulerOptions {
         self.options
@@ -336,8 +342,8 @@ impl Scheduler {
         self.log.now_ns
     }
 
-    /// Returns the vertex of an instance's subtask. At most one instance of a subtask is ready or
-    /// runs at a time.
+    /// Returns the vertex of an instance's subtask. At most one instance of a subtask is ready,
+    /// runs, waits or is preempted at a time.
     ///
     /// # Panics
     ///
@@ -347,8 +353,8 @@ impl Scheduler {
         self.task_set.vertex(instance)
     }
 
-    /// Returns a vertex's present instance, be it ready, running or preempted. If there is none,
-    /// the number of the job means nothing.
+    /// Returns a vertex's present instance, be it ready, running, waiting or preempted. If there is
+    /// none, the number of the job means nothing.
     ///
     /// # Panics
     ///
@@ -379,16 +385,16 @@ impl Hash for Scheduler {
 pub struct DagStatistics {
     /// Jobs released.
     pub released: u64,
-    /// Jobs with all subtasks finished.
+    /// Jobs with all subtasks finished, without those cut before.
     pub completed: u64,
-    /// Jobs whose deadline passed before they were complete, whether they were released or still
-    /// waited for their release.
+    /// Jobs in which some sink had not finished by its deadline, whether they were released or
+    /// still waited for their release. A job cut or skipped before that deadline does not count.
     pub misses: u64,
     /// Misses since a job last met its deadline.
     pub consecutive_misses: u64,
     /// The most misses in a row, without a job in between meeting its deadline.
     pub most_consecutive_misses: u64,
-    /// Releases that did not happen.
+    /// Due jobs skipped, by the overrun policy, a pause or a closing.
     pub skips: u64,
     /// Jobs aborted.
     pub aborts: u64,
@@ -396,7 +402,8 @@ pub struct DagStatistics {
     pub queued: u64,
     /// Signals to a sporadic DAG.
     pub signals: u64,
-    /// Signals that came while an earlier one was still kept, or no job was left.
+    /// Signals that came while an earlier one was still kept, or when the DAG was closed, ended or
+    /// at its limit of jobs.
     pub dropped_signals: u64,
     /// Instances ended by a fault.
     pub faults: u64,

@@ -15,7 +15,7 @@ pub struct Moment<'s> {
 }
 
 /// The end of a *turn*. A turn is the execution of an instance from its start, or the end of a
-/// wait, to its finish, or the next wait.
+/// wait, to its finish, its fault, or the next wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TurnEnd {
     /// The instance.
@@ -60,7 +60,7 @@ impl<'s> Moment<'s> {
     ///
     /// # Panics
     ///
-    /// If the instance has not started or has ended before.
+    /// If the instance has not started, waits, or has ended before.
     #[inline]
     pub fn complete(&mut self, instance: Instance) {
         // At the driver's own time: the instance finished then, even if another core has reported a
@@ -71,13 +71,14 @@ impl<'s> Moment<'s> {
         self.scheduler.finish(instance);
     }
 
-    /// Takes note that a turn of an instance has ended: the instance finishes, or waits (W1). As
-    /// with [`complete`](Self::complete), the instance may already be preempted in the scheduler's
-    /// eyes.
+    /// Takes note that a turn of an instance has ended: the instance finishes, or begins a wait
+    /// (W1); in a cut job it is cancelled instead of waiting (W6). As with
+    /// [`complete`](Self::complete), the instance may already be preempted in the scheduler's eyes.
     ///
     /// # Panics
     ///
-    /// As [`complete`](Self::complete), or if the instance waits and its subtask states no waits.
+    /// As [`complete`](Self::complete), or if the instance begins a wait and its subtask states no
+    /// waits.
     #[inline]
     pub fn end_turn(&mut self, turn: TurnEnd) {
         match turn.limit_ns {
@@ -93,16 +94,17 @@ impl<'s> Moment<'s> {
 
     /// Takes note that an instance has ended by a fault, and ends its DAG.
     ///
-    /// The instance's core is free. From now on the DAG releases no job and starts no instance.
-    /// Instances started on other cores, or preempted, are to be completed as ever (the module
-    /// `phase` states the rules). A further instance of an ended DAG may fail, too. As with
-    /// [`complete`](Self::complete), the instance may already be preempted in the scheduler's eyes.
-    /// Drivers should report known completions of the same instant first: an instance that finished
-    /// together with the fault counts as finished.
+    /// The instance's core, if it still has one, is free. From now on the DAG releases no job and
+    /// starts no instance. Instances started on other cores, or preempted, are to be completed as
+    /// ever; waiting instances are cancelled (the module `phase` states the rules). A further
+    /// instance of an ended DAG may fail, too. As with [`complete`](Self::complete), the instance
+    /// may already be preempted in the scheduler's eyes. Drivers should report known completions of
+    /// the same instant first: an instance that finished together with the fault counts as
+    /// finished.
     ///
     /// # Panics
     ///
-    /// If the instance has not started or has ended before.
+    /// If the instance has not started, waits, or has ended before.
     #[inline]
     pub fn fail(&mut self, instance: Instance) {
         self.scheduler
@@ -114,12 +116,13 @@ impl<'s> Moment<'s> {
 
     /// Takes note that an instance has ended by a fault, and that the driver has another function
     /// for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only the instance's job
-    /// is cut, and the subtask is [restarted](EventKind::Restarted); otherwise the DAG is ended, as
-    /// by [`fail`](Self::fail). (The module `phase` states the rules.)
+    /// is cut, unless it was cut before, and the subtask is [restarted](EventKind::Restarted);
+    /// otherwise the DAG is ended, as by [`fail`](Self::fail). (The module `phase` states the
+    /// rules.)
     ///
     /// # Panics
     ///
-    /// If the instance has not started or has ended before.
+    /// If the instance has not started, waits, or has ended before.
     #[inline]
     pub fn fail_replaceable(&mut self, instance: Instance) {
         self.scheduler
@@ -143,8 +146,8 @@ impl<'s> Moment<'s> {
     ///
     /// With a signal to a sporadic DAG, its next job is due now, or as soon after the job before as
     /// the minimum inter-arrival time allows. While the next job is to come, or waits for room,
-    /// further signals are dropped and counted, like all signals to a closed or ended DAG (the
-    /// module `signals` states the rules).
+    /// further signals are dropped and counted, like all signals beyond the limit of jobs, and to a
+    /// closed or ended DAG (the module `signals` states the rules).
     ///
     /// # Panics
     ///
@@ -167,8 +170,9 @@ impl<'s> Moment<'s> {
         self.scheduler.cores.prefer(core);
     }
 
-    /// Releases the jobs that are due and takes note of passed deadlines. Then gives the cores to
-    /// the instances with the smallest keys (R5), and returns the changes. The changes are in
+    /// Releases the jobs that are due, ends the waits whose limit has come, and takes note of
+    /// passed deadlines. Then gives the cores to entries of tables (T1) and otherwise to the
+    /// instances with the smallest keys (R5, T4), and returns the changes. The changes are in
     /// effect for the scheduler; the driver has to carry them out.
     #[must_use = "the decisions are for the driver to carry out"]
     #[inline]
@@ -193,7 +197,8 @@ impl<'s> Moment<'s> {
         false
     }
 
-    /// Releases the job due first, or notes a passed deadline; reports whether anything was due.
+    /// Serves the event due first: the due jobs and passed deadlines of one DAG, the limit of a
+    /// wait, or a report of skips. Reports whether anything was due.
     #[inline]
     fn release_next(&mut self) -> bool {
         let now_ns = self.scheduler.log.now_ns;

@@ -2,25 +2,27 @@
 //!
 //! # Rules of every policy
 //!
-//! 1. A job is due at its nominal release time O + kT, whatever happened to the jobs before. Its
-//!    deadline is the nominal release plus D, even if the job is released later.
-//! 2. Jobs are released in the order of their numbers. A due job is released at once unless an
-//!    older job waits or the release is blocked (the job J before it, or an older job, is in
-//!    flight).
-//! 3. A waiting job is released at the first instant at which it is the oldest waiting job and not
-//!    blocked; completions of that instant count.
+//! 1. A job is due at its nominal release time, O + kT unless the DAG is sporadic (S1), whatever
+//!    happened to the jobs before. Its deadline is the nominal release plus D, even if the job is
+//!    released later.
+//! 2. Jobs are released in the order of their numbers. A due job is released at once unless the DAG
+//!    is paused, an older job waits or the release is blocked (the job J before it, or an older
+//!    job, is in flight).
+//! 3. Unless it is skipped or dropped before, a waiting job is released at the first instant at
+//!    which it is the oldest waiting job and not blocked; completions of that instant count.
 //! 4. A miss is noticed at the first instant after the deadline, whether the job is in flight or
 //!    waits, and once. A job skipped or aborted before its deadline counts as skipped or aborted
-//!    and never as a miss; at its deadline the job is a miss, too, as if the step came some time
-//!    later.
-//! 5. The run of consecutive misses ends only with a job that meets its deadline. Skipped and
-//!    aborted jobs neither lengthen nor end the run.
+//!    and never as a miss. A job given up by the overrun policy at its deadline is a miss, too, as
+//!    if the step came some time later.
+//! 5. The run of consecutive misses ends only with a job that meets its deadline. Skipping or
+//!    cutting a job neither lengthens nor ends the run.
 //!
 //! # Queue
 //!
-//! A due job that cannot be released waits. Any number of jobs may wait, in constant memory, since
-//! only their numbers are kept; the number in flight stays bounded. Jobs therefore stay late as
-//! long as an overload lasts; choose another policy if old jobs are worth nothing.
+//! A due job that cannot be released waits. Any number of jobs of a periodic DAG may wait, in
+//! constant memory, since only their numbers are kept; the number in flight stays bounded. Jobs
+//! therefore stay late as long as an overload lasts; choose another policy if old jobs are worth
+//! nothing.
 //!
 //! # Skip
 //!
@@ -32,10 +34,10 @@
 //! abort or a fault, and waits. If all jobs in flight are cut already, the oldest waiting job,
 //! which may be the due job itself, is skipped.
 //!
-//! An aborted job starts no further instance: ready instances are cancelled at once, the others
-//! when they would become ready. Started instances go on, at their key, to their end; a preempted
-//! instance has started. The aborted job ends, and makes room, when no instance of the job is left;
-//! if none has started and not finished, at once.
+//! An aborted job starts no further instance: ready and waiting instances are cancelled at once,
+//! the others when they would become ready, or begin to wait (W6). Running and preempted instances
+//! go on, at their key, to their end. The aborted job ends, and makes room, when no instance of the
+//! job is left; if none runs or is preempted, at once.
 
 use super::Scheduler;
 use super::jobs::Job;

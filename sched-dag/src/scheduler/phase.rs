@@ -15,9 +15,10 @@
 //!   more before all are reported, the rest is counted only.
 //! - **P3, in flight.** Released jobs go on as ever, to their end.
 //! - **P4, resuming.** The first job due at the instant of the resumption or later is released at
-//!   its nominal release time.
-//! - **P5, the end.** Skipped jobs count towards the limit of jobs, so a paused DAG with a limit
-//!   comes to its end. A closed or ended DAG is neither paused nor resumed.
+//!   its nominal release time, unless it is blocked.
+//! - **P5, the end.** Skipped jobs count towards the limit of jobs, so a paused periodic DAG with a
+//!   limit comes to its end; a paused sporadic DAG needs its signals for that. A closed or ended
+//!   DAG is neither paused nor resumed.
 //!
 //! To the other rules a pause is nothing new: a job is skipped as with
 //! [`OverrunPolicy::Skip`](crate::OverrunPolicy::Skip).
@@ -54,15 +55,17 @@
 //! - **E2, no release.** An ended DAG releases no job, not even at the instant of its end, since
 //!   ends come before releases. Waiting releases are dropped: counted, but not reported
 //!   individually.
-//! - **E3, no start.** No instance of an ended DAG starts. Ready instances are cancelled at once,
-//!   the others when they would become ready: each once, and after all its predecessors have ended.
+//! - **E3, no start.** No instance of an ended DAG starts. Ready and waiting instances are
+//!   cancelled at once, the others when they would become ready: each once, and after all its
+//!   predecessors have ended.
 //! - **E4, started instances.** The DAG's other started instances go on, preempted ones at their
 //!   key, until they complete or fail, too. In an ended DAG nothing depends on them any more, so a
 //!   driver able to take an instance's context away for good may complete it at once.
 //! - **E5, jobs.** Each job in flight ends when no instance of the job is left, with
 //!   [`JobOutcome::DagEnded`], or as aborted if it was aborted before.
-//! - **E6, deadlines.** A deadline that has passed before the instant of the end is a miss. No
-//!   later deadline of the DAG is a miss, and the run of consecutive misses stays as it is.
+//! - **E6, deadlines.** A deadline that has passed before the instant of the end is a miss, unless
+//!   the job was cut before. No later deadline of the DAG is a miss, and the run of consecutive
+//!   misses stays as it is.
 //! - **E7, others.** Nothing changes for other DAGs, except that cores are free for them: their
 //!   releases, keys, joins and deadlines are independent of the end. From that instant on the
 //!   schedule equals the schedule of a set in which the ended DAG has no work left but its started
@@ -86,13 +89,15 @@
 //!   in a window of W jobs, A in all.) Any other fault ends the DAG (E1 to E8).
 //! - **D2, the instance.** The failing instance ends as in E1. The subtask's next instance may
 //!   start at that instant.
-//! - **D3, its job.** Unless it is cut already, the job is cut: ready instances are cancelled at
-//!   once, the others when they would become ready; started instances go on, at their key, to their
-//!   end. The job ends when no instance of the job is left, with [`JobOutcome::Failed`].
+//! - **D3, its job.** Unless it is cut already, the job is cut: ready and waiting instances are
+//!   cancelled at once, the others when they would become ready; running and preempted instances go
+//!   on, unless they begin to wait (W6), at their key, to their end. The job ends when no instance
+//!   of the job is left, with [`JobOutcome::Failed`].
 //! - **D4, other jobs.** Nothing changes for them: jobs in flight go on, and the next jobs are
 //!   released as ever, on the same grid.
-//! - **D5, deadlines.** A deadline that has passed before the instant of the fault is a miss. No
-//!   later deadline of the job is a miss, and the run of consecutive misses stays as it is.
+//! - **D5, deadlines.** A deadline that has passed before the instant of the fault is a miss,
+//!   unless the job was cut before. No later deadline of the job is a miss, and the run of
+//!   consecutive misses stays as it is.
 //! - **D6, one instant.** Several faults of one instant count in the order in which the driver
 //!   reports them; the first fault not survived ends the DAG.
 //! - **D7, others.** Nothing changes for other DAGs, except that cores are free for them.
@@ -112,8 +117,8 @@ use crate::policy::{JobOutcome, OnFault};
 /// step skips. Reporting them takes no longer than the releases of a few DAGs.
 pub const SKIPS_A_STEP: usize = 32;
 
-/// The time from one step reporting skips to the next, in nanoseconds. Meanwhile all cores are left
-/// to the instances.
+/// The time from one step reporting skips to the next, in nanoseconds. Meanwhile the reports leave
+/// all cores to the instances.
 pub const SKIPS_EVERY_NS: u64 = 100_000;
 
 /// A phase of a DAG's life.
@@ -135,8 +140,8 @@ pub const SKIPS_EVERY_NS: u64 = 100_000;
 ///               +-------+
 /// ```
 ///
-/// 1. A pause, any number of times: [`Request::Pause`](crate::lifecycle::Request::Pause), or a
-///    request for a mode, if the DAG is only in other modes.
+/// 1. A pause, any number of times: [`Request::Pause`](crate::lifecycle::Request::Pause), a request
+///    for a mode, if the DAG is only in other modes, or a pause stated for the beginning (L4).
 /// 2. The end of the pause: [`Request::Resume`](crate::lifecycle::Request::Resume), or a mode is
 ///    entered with the DAG in it.
 /// 3. A closing: [`Request::Close`](crate::lifecycle::Request::Close), also as part of a shutdown
@@ -153,11 +158,12 @@ pub enum DagPhase {
     /// Releases its jobs.
     #[default]
     Running,
-    /// Skips its due jobs until it is resumed (P1 to P5).
+    /// Skips its due jobs until it is resumed, closed or ended (P1 to P5).
     Paused,
     /// Releases no further job; jobs in flight go on to their end (C1 to C5).
     Closed,
-    /// A fault or a request has ended the DAG: nothing of it starts any more (E1 to E8).
+    /// A fault or a request has ended the DAG, or the DAG is of another cluster: nothing of it
+    /// starts any more (E1 to E8).
     Ended,
 }
 
@@ -203,7 +209,8 @@ impl DagSnapshot {
         }
     }
 
-    /// Reports whether the DAG will release no further job, whatever comes.
+    /// Reports whether the DAG is closed, ended, or over at its limit of jobs: it will release no
+    /// further job, whatever comes.
     pub fn is_final(&self) -> bool {
         self.is_over || self.phase >= DagPhase::Closed
     }

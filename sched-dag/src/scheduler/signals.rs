@@ -8,14 +8,14 @@
 //!   r(k) = max(a, r(k-1) + T), job 0 at max(a, O). So a signal that comes early is delayed.
 //!   Releases are never less than T apart, whatever sends the signals.
 //! - **S2, one is kept.** While a signal's job is not yet due, or is due and waits for an older job
-//!   to end, further signals are *dropped*, and counted. So a burst of signals costs two jobs, and
-//!   constant memory.
+//!   to end, further signals are *dropped*, and counted. So a burst of signals costs at most two
+//!   jobs, and constant memory.
 //! - **S3, from there on as ever.** The deadline is r(k) + D; overrun policy, keys, joins and
 //!   misses are as for a periodic job. A signal at the instant of a completion may release at that
 //!   instant: signals come after completions and before releases.
-//! - **S4, the end.** Signals beyond the limit of jobs, and to an ended DAG, are dropped. A
-//!   sporadic DAG without limit is over whenever nothing of it is in flight and no signal is kept:
-//!   it keeps no run going.
+//! - **S4, the end.** Signals beyond the limit of jobs, and to a closed or ended DAG, are dropped.
+//!   A sporadic DAG without limit is over whenever nothing of it is in flight and no signal is
+//!   kept: it keeps no run going.
 //!
 //! For the analysis a sporadic DAG is a DAG with period T. The tests that answer for sporadic DAGs
 //! hold for every pattern of releases at least T apart, as in the sporadic model of the papers

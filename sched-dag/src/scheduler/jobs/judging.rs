@@ -1,9 +1,9 @@
 //! Checking jobs against the deadlines of their sinks (R4).
 //!
 //! To *judge* a job by a deadline means to find out whether any sinks with the deadline are late.
-//! For each relative deadline, jobs are judged in the order of their numbers, each once: a job in
-//! flight when the deadline has passed, or when the job ends; a waiting job, none of whose sinks
-//! can have finished, when the deadline has passed. A cut counts as the judgement of a job.
+//! For each relative deadline, jobs are judged in the order of their numbers, each at most once: a
+//! job in flight when the deadline has passed, or when the job ends; a waiting job, none of whose
+//! sinks can have finished, when the deadline has passed. A cut counts as the judgement of a job.
 //!
 //! The progress of the sinks shows which are late, as long as each sink is looked at before another
 //! instant begins. So a sink ending after an unnoticed deadline is judged at once, and counts as
