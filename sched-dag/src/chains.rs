@@ -96,11 +96,12 @@
 //!
 //! # Which outputs count
 //!
-//! Outputs count up to the first instant where the next job of a DAG of the chain would have been
-//! due and did not come, because the DAG had ended: from then on, sampled values only get older.
-//! During and after a pause, an output does not count while any value on its way back dates from
-//! before the pause. The time between two outputs does not count if the last DAG paused between
-//! them. Outputs going back to no job, such as the first outputs of a run, do not count.
+//! Outputs count up to the first instant where the next job of a periodic DAG of the chain would
+//! have been due and did not come, because the DAG had ended, was closed or had reached its limit
+//! of jobs: from then on, sampled values only get older. During and after a pause, an output does
+//! not count while any value on its way back dates from before the pause. The time between two
+//! outputs does not count if the last DAG paused between them. Outputs going back to no job, such
+//! as the first outputs of a run, do not count.
 //!
 //! Let outputs m and m+1 follow each other and go back to jobs s(m) and s(m+1). The data age of m
 //! is f(m+1) - r(s(m)). If s(m+1) > s(m), this is also the reaction time to an input after the
@@ -112,11 +113,12 @@
 //! # Samples
 //!
 //! An instance samples when it starts, and a value becomes visible when its writer's instance is
-//! complete. The journal has an event for each, in the order of their occurrence under the
-//! scheduler's lock. So the sampled value is the value of the writer's last finish before the
-//! start. On a machine, the function is called a few instructions after the start was written; if a
-//! writer finishes in between, its value counts as too late. In a replay, samples are the recorded
-//! samples, no matter which writers have finished before.
+//! complete. The journal has an event for each, in the order of their occurrence under the lock of
+//! the cluster's scheduler; between clusters, the time decides. So the sampled value is the value
+//! of the writer's last finish before the start. On a machine, the function is called a few
+//! instructions after the start was written; if a writer finishes in between, its value counts as
+//! too late. In a replay, samples are the recorded samples, no matter which writers have finished
+//! before.
 
 use alloc::collections::BTreeMap;
 use alloc::vec;

@@ -30,7 +30,8 @@ ids! {
     SubtaskId;
     /// A subtask, by position among the subtasks of all DAGs of one commit.
     Vertex;
-    /// A processor, by position among the processors of the scheduler.
+    /// A processor, by position among the processors of a cluster's scheduler, or, in the events of
+    /// a whole run, of the machine.
     CoreId;
     /// A cluster of cores, by position among the clusters of one commit.
     ClusterId;
@@ -43,7 +44,8 @@ ids! {
 pub struct Instance {
     /// The DAG task.
     pub dag: DagId,
-    /// The job, counted from 0 on the DAG's nominal release grid.
+    /// The job, counted from 0: on the nominal release grid of a periodic DAG, by signals of a
+    /// sporadic DAG.
     pub job: u64,
     /// The subtask.
     pub subtask: SubtaskId,

@@ -10,10 +10,10 @@
 //!
 //! # Order
 //!
-//! Events are in the order in which the scheduler learnt of them: among the events of one instance,
-//! of one job and of one core, each event comes after all its causes. Their times need not ascend:
-//! on a machine a function returns before the scheduler hears of it, and another core may come
-//! between.
+//! Events are in the order in which the scheduler of their cluster learnt of them: among the events
+//! of one instance, of one job and of one core, each event comes after all its causes. Their times
+//! need not ascend: on a machine a function returns before the scheduler hears of it, and another
+//! core may come between.
 
 use core::fmt;
 use core::str::FromStr;
@@ -30,11 +30,12 @@ pub struct Event {
     /// The core of the event, or the core that made the scheduler's step; for a
     /// [`Request`](EventKind::Request) the core that shall switch.
     pub core: CoreId,
-    /// The DAG.
+    /// The DAG; 0 for an event of the whole run.
     pub dag: DagId,
-    /// The job.
+    /// The job; 0 for an event of a whole DAG, the number of the mode for
+    /// [`Entered`](EventKind::Entered).
     pub job: u64,
-    /// The subtask; `None` for an event of a whole job.
+    /// The subtask; `None` for an event of a whole job, of a DAG or of the run.
     pub subtask: Option<SubtaskId>,
 }
 
@@ -167,13 +168,13 @@ events! {
     Skipped = "skipped", Job;
     /// A job starts no further instance.
     Aborted = "aborted", Job;
-    /// A job's deadline has passed, and it is not complete.
+    /// The first of a job's deadlines to be missed has passed: a sink has not finished.
     Missed = "missed", Job;
     /// No instance of a job is left.
     Completed = "completed", Job;
     /// An instance waits for nothing any more but a core.
     Ready = "ready", Instance;
-    /// An instance will not run.
+    /// An instance will not run, or not run on after a wait: its job is cut.
     Cancelled = "cancelled", Instance;
     /// A core shall run the instance instead of its present instance.
     Request = "request", Instance;
@@ -189,7 +190,8 @@ events! {
     Ended = "ended", Core;
     /// A signal came: a sporadic DAG's job is due now, or as soon as its distance allows.
     Signalled = "signalled", Job;
-    /// A signal came while another was kept for the job, or no job was left.
+    /// A signal came while another was kept for the job, or the DAG was closed, ended or at its
+    /// limit of jobs.
     Dropped = "dropped", Job;
     /// A sporadic DAG's job that is being released was due: the event's time is the nominal
     /// release, which no grid tells.
@@ -200,8 +202,8 @@ events! {
     /// A fault has ended the instance and cut its job, and its subtask goes on with another
     /// function.
     Restarted = "restarted", Instance;
-    /// A DAG is paused: it releases no job from now on. As with the next two kinds, the event's job
-    /// is 0 and means nothing.
+    /// A DAG is paused: it releases no job until it is resumed. As with the next two kinds, the
+    /// event's job is 0 and means nothing.
     Off = "off", Dag;
     /// A DAG is resumed: jobs due from now on are released.
     On = "on", Dag;

@@ -27,7 +27,7 @@ pub trait DagKey {
     ///
     /// # Panics
     ///
-    /// If there is no such DAG, which is a mistake of the caller.
+    /// If there is no such DAG, which is a mistake of the caller. But a [`DagId`] is not checked.
     fn find_in(&self, task_set: &TaskSet) -> DagId;
 }
 
@@ -39,7 +39,8 @@ pub trait SubtaskKey {
     ///
     /// # Panics
     ///
-    /// If there is no such subtask, which is a mistake of the caller.
+    /// If there is no such subtask, which is a mistake of the caller. But a [`SubtaskId`] is not
+    /// checked.
     fn find_in(&self, dag: &Dag) -> SubtaskId;
 }
 
@@ -110,7 +111,7 @@ impl TaskSet {
     ///
     /// # Panics
     ///
-    /// If there is no such DAG.
+    /// If there is no such DAG. But a [`DagId`] is not checked.
     ///
     /// See [`DagKey`].
     #[track_caller]
@@ -124,7 +125,7 @@ impl Dag {
     ///
     /// # Panics
     ///
-    /// If there is no such subtask.
+    /// If there is no such subtask. But a [`SubtaskId`] is not checked.
     ///
     /// See [`DagKey`].
     #[track_caller]

@@ -14,7 +14,8 @@ const LONGEST: usize = 200;
 type Row = [u8; LONGEST + 1];
 
 /// Returns the allowed name nearest to `word`, if near enough to be the intended name: at most a
-/// third of the name's own length away, where a distance of 1 is always near enough.
+/// third of the name's own length away, where a distance of 1 is always near enough. Words and
+/// names longer than 200 characters match nothing.
 ///
 /// ```
 /// assert_eq!(sched_dag::nearest("lidra", &["camera", "lidar"]), Some("lidar"));

@@ -18,17 +18,19 @@ pub enum Activation {
     /// The clock: job k is released at O + kT.
     #[default]
     Periodic,
-    /// Signals ([`Request::Signal`](crate::lifecycle::Request::Signal)): one job each, but never
-    /// two releases less than T apart, and none before O. T is then the minimum inter-arrival time.
+    /// Signals ([`Request::Signal`](crate::lifecycle::Request::Signal)): at most one job each,
+    /// never two releases less than T apart, and none before O. T is then the minimum inter-arrival
+    /// time.
     Sporadic,
 }
 
 /// Whether a started instance may lose its core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Preemption {
-    /// At every instant the instances with the smallest keys run.
+    /// At every instant the instances with the smallest keys run, but a started instance of a
+    /// non-preemptive subtask keeps its core.
     Enabled,
-    /// A started instance keeps its core until it finishes.
+    /// A started instance keeps its core until it finishes, fails or begins a wait.
     Disabled,
 }
 
@@ -46,11 +48,12 @@ pub struct Priority(pub u32);
 /// means that J jobs are in flight.
 ///
 /// Under every policy jobs are released in the order of their numbers. A job released late keeps
-/// its nominal release time, and so its deadline. A miss is noticed when the deadline passes, even
-/// for a job still waiting.
+/// its nominal release time, and so its deadline. A miss is noticed when the deadline has passed,
+/// even for a job still waiting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum OverrunPolicy {
-    /// The release waits until it is not blocked. Any number may wait, in constant memory.
+    /// The release waits until it is not blocked. Any number may wait, in constant memory; of a
+    /// sporadic DAG at most one.
     #[default]
     Queue,
     /// The release does not happen and is counted. Nothing ever waits.
@@ -58,9 +61,9 @@ pub enum OverrunPolicy {
     /// The oldest job in flight that is not cut yet, by an abort or a fault, is aborted, and the
     /// release waits until it is not blocked.
     ///
-    /// An aborted job starts no further instance. Started instances go on, and when no instance of
-    /// the job is left, the job is out of flight. If all jobs in flight are cut already, the
-    /// oldest waiting release is skipped.
+    /// An aborted job starts no further instance, and its waiting instances are cancelled. The
+    /// other started instances go on, and when no instance of the job is left, the job is out of
+    /// flight. If all jobs in flight are cut already, the oldest waiting release is skipped.
     Abort,
 }
 
@@ -103,15 +106,15 @@ impl FaultLimit {
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum JobOutcome {
-    /// All subtasks have finished by the deadline.
+    /// All subtasks have finished, each sink by its deadline.
     Met,
-    /// All subtasks have finished, the last one after the deadline.
+    /// All subtasks have finished, some sink after its deadline.
     Missed,
     /// The job was aborted.
     Aborted,
     /// A fault of an instance has cut the job, and the DAG goes on.
     Failed,
-    /// The DAG was ended while the job was in flight.
+    /// The DAG was ended while the job was in flight and not cut.
     DagEnded,
 }
 

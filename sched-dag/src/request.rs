@@ -18,7 +18,7 @@ pub enum Request {
     End(DagId),
     /// Another set of DAGs runs.
     Enter(ModeId, ModeEntry),
-    /// The run ends: no DAG releases a further job.
+    /// The run ends: no DAG releases a further job, except DAGs with recorded inputs (L6).
     ShutDown,
     /// The run begins. Not for functions: a driver makes the request, before any other request.
     Begin,

@@ -26,7 +26,7 @@ pub struct DagSpec {
     /// The time of the first nominal release; for a sporadic DAG the earliest possible time.
     pub offset_ns: u64,
     /// The most jobs that may be in flight. `None`: enough for the deadline, `ceil(D / T)` jobs and
-    /// one more.
+    /// one more; only one if subtasks share a state.
     pub in_flight: Option<u32>,
     /// The policy for a release beyond `in_flight`.
     pub overrun: OverrunPolicy,

@@ -9,7 +9,8 @@
 //!
 //! - **T1, in place.** An entry starts only on its core, when all entries before it on the list
 //!   have started or been passed, and when the innermost begun entry there has a smaller depth;
-//!   then as soon as the entry is ready (R2). Anything else running on the core gives way at once.
+//!   then as soon as the entry is ready (R2). Anything else running on the core gives way at once,
+//!   unless it keeps its core.
 //! - **T2, voids.** An entry is void if its job does not exist, was skipped, or was cut before the
 //!   entry started. A void entry is passed where it might start.
 //! - **T3, nested.** An entry that finishes leaves its core to the next entry, if that may start by
@@ -71,7 +72,8 @@ pub struct TableEntry {
     pub job: i64,
     /// The number of entries in which the entry is nested.
     pub depth: u32,
-    /// The latest start after the beginning of the lap, in nanoseconds, less than the lap.
+    /// The latest start after the beginning of the lap, in nanoseconds, less than the lap. 0 if the
+    /// WCETs are not known.
     pub start_ns: u64,
     /// The time from there to the latest finish, in nanoseconds: the WCETs of the entry and of all
     /// entries nested in it. 0 if they are not known.

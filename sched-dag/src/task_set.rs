@@ -6,10 +6,10 @@
 //! # How many instances of a DAG can be suspended at once: each keeps a stack
 //!
 //! Only a started, preemptible instance is ever suspended, and a subtask has at most one started
-//! instance at a time (R2). No two started instances of the same job precede one another, so their
-//! number is at most the width of the graph. The width is at most the number of chains into which
-//! the graph can be cut (R. P. Dilworth, Annals of Mathematics 51, 1950). Chains are found
-//! greedily, in a single pass that need not find the fewest.
+//! and unfinished instance at a time (R2). No two such instances of the same job precede one
+//! another, so their number is at most the width of the graph. The width is at most the number of
+//! chains into which the graph can be cut (R. P. Dilworth, Annals of Mathematics 51, 1950). Chains
+//! are found greedily, in a single pass that need not find the fewest.
 //!
 //! An aborted job, or a job cut by a survived fault, makes room for the next job while its
 //! instances go on; then the number of jobs in flight is no limit.
@@ -96,9 +96,9 @@ pub struct Subtask {
 }
 
 impl TaskSet {
-    /// Makes a DAG lose no job, for a replay: due releases queue, whatever overrun policy the DAG
-    /// has stated. The DAG has only the given jobs, as in its recording; earlier jobs are not
-    /// released.
+    /// Makes a DAG lose no job to an overrun, for a replay: due releases queue, whatever overrun
+    /// policy the DAG has stated. The DAG has only the given jobs, as in its recording, up to its
+    /// stated limit; earlier jobs are not released.
     pub fn replay(&mut self, dag: DagId, jobs: Range<u64>) {
         let dag = &mut self.dags[dag.index()];
         dag.overrun = OverrunPolicy::Queue;
@@ -273,7 +273,8 @@ impl Dag {
     }
 
     /// Returns the longest time between the nominal releases of two consecutive jobs of a periodic
-    /// DAG, not counting jobs lost to survived faults, while the DAG is not paused.
+    /// DAG, not counting jobs lost to survived faults, as long as the DAG is not paused and no job
+    /// is skipped or aborted.
     pub fn renewal_ns(&self) -> u64 {
         let lost_in_a_row = match self.on_fault {
             OnFault::EndDag => 0,
@@ -370,7 +371,7 @@ impl Subtask {
         &self.name
     }
 
-    /// Returns the worst-case execution time, if the app gave one.
+    /// Returns the worst-case execution time, if the app states one or a file has an observed one.
     pub const fn wcet_ns(&self) -> Option<u64> {
         self.wcet_ns
     }
@@ -445,7 +446,8 @@ impl Subtask {
         self.priority
     }
 
-    /// Reports whether a started instance keeps its core until it finishes.
+    /// Reports whether a started instance keeps its core until it finishes, fails or begins a wait,
+    /// even if preemption is enabled.
     pub const fn is_non_preemptive(&self) -> bool {
         self.non_preemptive
     }

@@ -1,8 +1,8 @@
 //! The driver in virtual time: a [`Scheduler`] run without a machine, or one for each cluster.
 //!
-//! Time jumps from event to event. The work of the cores comes from a [`Workload`], asked once for
-//! each instance, at its start, for its execution time. The workload may run the function of the
-//! instance's [body](SubtaskBody) to find out.
+//! Time jumps from event to event. The work of the cores comes from a [`Workload`], asked for the
+//! execution time of each instance at its start, and again after each wait. The workload may run
+//! the function of the instance's [body](SubtaskBody) to find out.
 //!
 //! An instance with an execution time of 0 finishes at the instant of its start, after the dispatch
 //! of the start. Another dispatch at the same instant follows, and so on until nothing happens any
@@ -11,11 +11,12 @@
 //! Clusters share a clock: everything ending at one instant ends in all clusters before anything
 //! starts in any of them.
 //!
-//! A workload may let an instance fail at the end of its execution time, which ends the DAG or
-//! costs the job. At one instant, completions come before failures, and failures in the order of
-//! their instances.
+//! A workload may let an instance fail at the end of its execution time, or instead of beginning a
+//! wait, which ends the DAG or costs the job. At one instant, completions come before failures, and
+//! failures in the order of their instances.
 //!
-//! After [`VirtualTime::new`] nothing is allocated here.
+//! Once a run is made, it allocates nothing here, except for the journal of
+//! [`VirtualTime::recording`].
 //!
 //! ```
 //! use std::sync::Arc;
@@ -179,14 +180,15 @@ impl<B: SubtaskBody> VirtualTime<B> {
         run
     }
 
-    /// Returns the events so far, of all clusters.
+    /// Returns the events so far, of all clusters; none unless the run is
+    /// [recording](Self::recording).
     pub fn events(&self) -> Vec<Event> {
         self.run_so_far().journal().events().collect()
     }
 
     /// Runs until every job has ended.
     ///
-    /// For a DAG without a limit of jobs that is the end of time; see
+    /// For a periodic DAG without a limit of jobs that is the end of time; see
     /// [`run_until`](Self::run_until).
     pub fn run(&mut self, workload: &mut impl Workload<B>) -> RunOutcome {
         self.run_until(u64::MAX, workload)
@@ -350,7 +352,7 @@ pub trait Workload<B = Instance> {
     fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
     /// Reports whether an instance fails, instead of finishing, at the end of the execution time.
-    /// The failure ends the DAG, or drops the job. Called once for each instance, at its end, and
+    /// The failure ends the DAG, or cuts the job. Called once for each instance, at its end, and
     /// before each begin of a wait.
     fn fails(&mut self, _instance: Instance) -> bool {
         false
@@ -370,7 +372,8 @@ pub trait Workload<B = Instance> {
     /// wait.
     fn waits(&mut self, _wait: WaitId, _now_ns: u64) {}
 
-    /// Called when a job is released, skipped or completed, or a DAG is ended.
+    /// Called when a job is released, skipped or completed, an instance is cancelled, or a DAG is
+    /// ended.
     fn hear(&mut self, _notice: &DriverNotice) {}
 
     /// Takes a request made now by a completion or a fault.

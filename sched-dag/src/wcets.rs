@@ -117,8 +117,9 @@ fn record(line: &str) -> Option<WcetRecord<'_>> {
 ///
 /// # Errors
 ///
-/// The first line that is no record; the first record naming a subtask missing in the DAG; or the
-/// line of the DAG of this name, if the file has it only with another graph.
+/// The first line that is no record, or states a WCET of 0; the first record naming a subtask
+/// missing in the DAG; or the line of the DAG of this name, if the file has it only with another
+/// graph.
 pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
     let own = graph_hash(spec);
     let (mut margin_percent, mut is_own, mut was_found, mut foreign) = (0, false, false, None);

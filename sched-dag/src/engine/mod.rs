@@ -3,20 +3,22 @@
 //!
 //! A platform holds the engine under one lock, or alone. Through its [`PlatformPort`] the platform
 //! reports the time, starts a body on a core, and reaches other clusters. A [`SubtaskBody`] runs
-//! the instances of a subtask. Each event is one call: [`complete`](Engine::complete),
-//! [`fail`](Engine::fail), or [`step`](Engine::step) for everything else. Then the platform brings
-//! the cores [concerned](PlatformPort::retarget) by the step to their targets:
-//! [`next`](Engine::next) gives a core its next instance, [`suspend`](Engine::suspend) takes an
-//! instance away.
+//! the instances of a subtask. Each event is one call, such as [`complete`](Engine::complete),
+//! [`fail`](Engine::fail), [`wake`](Engine::wake), or [`step`](Engine::step) for everything without
+//! a call of its own. Then the platform brings the cores [concerned](PlatformPort::retarget) by the
+//! step to their targets: [`next`](Engine::next) gives a core its next instance,
+//! [`suspend`](Engine::suspend) takes an instance away.
 //!
 //! # Guarantees
 //!
 //! - The cost of a fault, the effect of requests and the choice of the next instance are decided
 //!   here, for all platforms alike.
 //! - The journal is in the order of the decisions. A [start](PlatformPort::start) is recorded
-//!   before the function begins.
-//! - After [`Engine::of_clusters`] nothing is allocated here, and every step is bounded except for
-//!   the releases and deadlines passed since the last step.
+//!   before the function begins, except in virtual time, where a workload may run the function to
+//!   find its execution time.
+//! - After [`Engine::of_clusters`] nothing is allocated here, except by a growing journal, and
+//!   every step is bounded except for the releases and deadlines passed, and the signals come from
+//!   other clusters or from outside, since the last step.
 
 mod run;
 
@@ -50,7 +52,8 @@ pub struct Engine<B: SubtaskBody, P> {
     pub task_set: Arc<TaskSet>,
     /// Requests of the run on their way to the scheduler.
     pub requests: PendingRequests,
-    /// The bodies whose functions a fault has ended for good.
+    /// The bodies whose functions a fault has ended for good, as far as the platform has taken them
+    /// back.
     pub lost: Vec<B>,
     /// By vertex, the function to take over after a fault.
     alternates: Box<[Option<B::Alternate>]>,
@@ -191,8 +194,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.scheduler.decisions()
     }
 
-    /// Takes note that a core has finished an instance. If `is_alone`, the completion may be the
-    /// whole instant, and the core may go on without a step.
+    /// Takes note that a core has finished an instance, or that the instance's turn has ended in a
+    /// wait. If `is_alone`, the completion may be the whole instant, and the core may go on without
+    /// a step.
     #[inline(always)]
     pub fn complete<C: PlatformPort<B>>(
         &mut self,
@@ -486,7 +490,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
     }
 
-    /// Takes a core's instance away, if there is one, and returns the core waiting for it.
+    /// Takes a core's instance away, if there is one, and returns the core waiting for it, if any.
     pub fn suspend(&mut self, core: CoreId, now_ns: u64, parked: P) -> Option<CoreId> {
         let vertex = self.placement.detach(core.index())?;
         self.note(EventKind::Suspend, core, vertex, now_ns);
@@ -567,8 +571,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 }
 
-/// The code of one subtask, as seen by the engine. Each subtask has one body, because it has one
-/// started instance at a time (R2).
+/// The code of one subtask, as seen by the engine. Each subtask has one body, because it has at
+/// most one started and unfinished instance at a time (R2).
 pub trait SubtaskBody {
     /// A function to take over after a fault.
     type Alternate: Alternate;
@@ -717,7 +721,8 @@ pub trait PlatformPort<B> {
     /// Called when the target of a core may have changed.
     fn retarget(&mut self, _core: CoreId) {}
 
-    /// Called when an event of a [heard](Self::HEARS) kind was recorded.
+    /// Called for each event of a [heard](Self::HEARS) kind, and each
+    /// [`Cancelled`](EventKind::Cancelled), even if the journal has no room.
     fn hear(&mut self, _notice: &DriverNotice) {}
 }
 

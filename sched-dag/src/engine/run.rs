@@ -197,8 +197,8 @@ impl Run {
     }
 
     /// Returns the statistics of all jobs and instances, including jobs whose events made way for
-    /// later ones. Returns `None` if some events were not recorded, because of `trace_events=0` or
-    /// the console's `trace off`.
+    /// later ones. Returns `None` if some events were neither kept nor counted, mostly because of
+    /// `trace_events=0` or the console's `trace off`.
     pub fn times(&self) -> Option<&RunTally> {
         let tally = || self.journal.statistics(&self.task_set, FINEST);
         self.times.get_or_init(tally).as_ref()
@@ -284,7 +284,8 @@ impl Run {
 
     /// Returns every breach of the model's rules R1 to R4, of the stated number of waits (W1), of
     /// the order of each instance's events, and of the limit of one instance at a time on each
-    /// core. Durations are never breaches, because the machine decides them.
+    /// core, as far as the events kept show. Durations are never breaches, because the machine
+    /// decides them.
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         self.judge(&mut |_| ()).into_iter()
     }

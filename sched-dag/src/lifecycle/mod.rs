@@ -6,16 +6,18 @@
 //! instance (R3), never before. The scenarios of the rules, in `tests/scenarios/lifecycle.txt`,
 //! bear their numbers:
 //!
-//! - **L1, when.** A request takes effect at the instant of the completion, after all completions
-//!   and faults of that instant and before its releases. A failing instance makes no requests.
+//! - **L1, when.** Within a cluster, a request takes effect at the instant of the completion, after
+//!   all completions and faults of that instant and before its releases. A failing instance makes
+//!   no requests.
 //! - **L2, in which order.** Requests of one instant are served in the order of their completions.
 //!   Requests of one instance are served in the order in which its subtask states what it uses,
 //!   each once.
 //! - **L3, pausing.** Pausing or resuming a DAG follows P1 to P5: jobs in flight go on, due jobs
 //!   are skipped, the grid stays. A DAG may pause itself: the job in hand goes on.
 //! - **L4, the beginning.** A DAG may be paused from time 0 on, before its first release.
-//! - **L5, the end.** A shutdown closes every DAG (C1 to C5) at one instant, so the run is over
-//!   when nothing is in flight any more. Later requests have no effect.
+//! - **L5, the end.** A shutdown closes every DAG without recorded inputs (C1 to C5), all DAGs of a
+//!   cluster at one instant, so the run is over when nothing is in flight any more. Later pauses,
+//!   resumptions and modes have no effect.
 //! - **L6, replays.** The effect of a request on a DAG with recorded inputs is in the recording:
 //!   the jobs that were skipped. In a replay requests do not touch such a DAG.
 //!

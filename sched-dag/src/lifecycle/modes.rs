@@ -5,9 +5,9 @@
 //! mode runs in all. The scenarios of the rules, in `tests/scenarios/modes.txt`, bear their numbers
 //! (M7 has its test in `tests/it/modes.rs`):
 //!
-//! - **M1, what is on.** A run begins in mode 0. When a mode is entered, its DAGs are resumed, and
-//!   all DAGs only in other modes are paused (P1 to P5). DAGs that are on in both the old and the
-//!   new mode notice nothing.
+//! - **M1, what is on.** A run with modes begins in mode 0. When a mode is entered, its DAGs are
+//!   resumed, and all DAGs only in other modes are paused (P1 to P5). DAGs that are on in both the
+//!   old and the new mode notice nothing.
 //! - **M2, at once.** The mode is entered at the instant of the request. Jobs in flight of leaving
 //!   DAGs go on to their ends, next to the jobs of joining DAGs.
 //! - **M3, when idle.** The leaving DAGs are paused at the request. The mode is entered at the
@@ -24,7 +24,7 @@
 //!   for the DAG (L6).
 //!
 //! A change of mode costs a pause or a resumption of each DAG of some mode, in a single step of the
-//! scheduler. While a change waits, each step looks at the leaving DAGs.
+//! scheduler. While a change waits, each step of the modes' cluster looks at the leaving DAGs.
 
 use alloc::vec::Vec;
 

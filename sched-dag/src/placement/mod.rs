@@ -1,18 +1,18 @@
 //! The actual places of instances, and the scheduler's targets.
 //!
-//! The scheduler decides at one instant what each core runs: its *target*. The cores follow a
-//! little later, when their interrupt arrives: the instance a core actually has is its *current*
-//! instance. In between, anything may happen: the current instance finishes before it could be
-//! preempted; another core wants the instance before the first core has given it up; the target
-//! changes again. So each core compares target and current instance whenever possible, and only the
-//! *place* of an instance is authoritative.
+//! The scheduler decides at one instant what each core runs: its *target*. The cores of a machine
+//! follow a little later, when the request reaches them, in virtual time at once: the instance a
+//! core actually has is its *current* instance. In between, anything may happen: the current
+//! instance finishes before it could be preempted; another core wants the instance before the first
+//! core has given it up; the target changes again. So each core compares target and current
+//! instance whenever possible, and only the *place* of an instance is authoritative.
 //!
 //! A subtask has at most one started instance at a time (R2), so places are kept by subtask, and a
 //! subtask's [`Vertex`] identifies the instance. The body rests in the table, or is with a core, or
 //! lies on the stack of a suspended context.
 //!
-//! Drivers whose cores follow later share the placement, under their one lock: the kernel and
-//! Linux.
+//! Drivers whose cores follow later share a cluster's placement, under the lock of that cluster:
+//! the kernel and Linux.
 
 use alloc::boxed::Box;
 
@@ -21,7 +21,7 @@ use crate::ids::{CoreId, Vertex};
 /// The place of a subtask's body.
 #[derive(Debug)]
 enum BodyState<Body, Parked> {
-    /// In the table: no instance of the subtask has started.
+    /// In the table: no instance of the subtask has started and not ended.
     Resting(Body),
     /// With the core currently running the body's instance.
     Running,
@@ -29,14 +29,14 @@ enum BodyState<Body, Parked> {
     Waiting(Body),
     /// On the stack of a context not running.
     Suspended(Parked),
-    /// Not here: the instance was ended, or another scheduler has the body.
+    /// Not here: the instance was ended, another scheduler has the body, or none was put there yet.
     Lost,
 }
 
 /// The next work of a core without a current instance.
 #[derive(Debug, PartialEq, Eq)]
 pub enum NextWork<Body, Parked> {
-    /// There is nothing for the core to do.
+    /// There is nothing for the core to do, at least until another core has given the target up.
     Nothing,
     /// The core starts an instance of a subtask.
     Start(Vertex, Body),
@@ -126,7 +126,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Notes that core `core`'s current instance was ended, and returns its vertex. The body stays
-    /// on the stack of a context never resumed.
+    /// on the stack of a context never resumed, unless the caller has taken it back.
     pub fn lose(&mut self, core: usize) -> Option<Vertex> {
         let vertex = self.detach(core)?;
         *self.body_state(vertex) = BodyState::Lost;
@@ -139,7 +139,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         *self.body_state(vertex) = BodyState::Resting(body);
     }
 
-    /// Takes the body of a subtask out, if no instance of the subtask has started.
+    /// Takes the body of a subtask out, if it rests: no instance of the subtask has started and not
+    /// ended.
     pub fn take(&mut self, vertex: Vertex) -> Option<Body> {
         let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Lost) {
@@ -297,7 +298,8 @@ impl<Body, Parked> Placement<Body, Parked> {
         some(self.seats[core].current)
     }
 
-    /// Returns the body of a subtask without a started instance.
+    /// Returns the body of a subtask if it rests: no instance has started and not ended, and the
+    /// body is not lost.
     pub fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
         match self.body_state(vertex) {
             BodyState::Resting(body) => Some(body),

@@ -71,7 +71,8 @@ pub struct SchedulerOptions {
     /// Whether a started instance may lose its core. With [`Preemption::Enabled`], non-preemptive
     /// subtasks still keep theirs.
     pub preemption: Preemption,
-    /// The number of cores, at least 1.
+    /// The number of cores, at least 1: of the whole machine, or of one cluster where a
+    /// [scheduler](crate::Scheduler::options) returns the options.
     pub cores: u32,
 }
 

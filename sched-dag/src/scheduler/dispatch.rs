@@ -1,8 +1,9 @@
 //! The dispatch (R5): the choice of the instances running from this instant on.
 //!
-//! Idle cores first take ready instances in the order of their keys, so no instance is preempted
-//! while a core is idle. Then, as long as the smallest ready key is smaller than the largest key
-//! that runs and may be preempted, both change places.
+//! Cores in tables and groups of cores come first, where there are any (the module `groups`). Then
+//! idle cores take ready instances in the order of their keys, so no instance is preempted while a
+//! core is idle. Last, as long as the smallest ready key is smaller than the largest key that runs
+//! and may be preempted, both change places.
 //!
 //! Afterwards the running instances satisfy R5: the non-preemptible ones, and of all others the
 //! instances with the smallest keys. No core is named in more than one exchange, since each
@@ -158,7 +159,8 @@ impl Scheduler {
     }
 }
 
-/// The result of a completion by [`Scheduler::pass_on`].
+/// The result of a completion by [`Scheduler::pass_on`], or of a wait by
+/// [`Scheduler::wait_shortly`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use = "the core has to carry it out"]
 pub enum HandOff {
@@ -167,8 +169,8 @@ pub enum HandOff {
     To(Vertex, Decision),
     /// The core is idle, and nothing else changes.
     Idle,
-    /// The core is idle, and the instant is not over: begin it again at the same time, and end it
-    /// with a dispatch.
+    /// The core is idle, or was to run another instance already, and the instant is not over: begin
+    /// it again at the same time, and end it with a dispatch. A wait never leaves an instant open.
     Open,
 }
 
@@ -192,7 +194,7 @@ impl Scheduler {
     ///
     /// # Panics
     ///
-    /// If no instance of the vertex has started, or it has ended before.
+    /// If no instance of the vertex has started, or it waits or has ended before.
     #[inline(always)]
     pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, Unwritten) {
         // Cores may report their times in another order than that of their clock readings: time

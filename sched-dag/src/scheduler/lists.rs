@@ -9,8 +9,8 @@
 //!
 //! Between two instants no core's next entry may start, and none may be passed, except where an
 //! instance keeps its core. Only three events change this, and *touch* a core: its next entry
-//! becomes ready; the instance running there ends; or jobs are skipped or cut, which touches all
-//! cores.
+//! becomes ready; the instance running there ends, or begins a wait; or jobs are skipped or cut,
+//! which touches all cores.
 //!
 //! # Begun for a moment
 //!

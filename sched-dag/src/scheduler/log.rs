@@ -15,7 +15,8 @@ use crate::kept::Journal;
 pub struct DriverNotice {
     /// The event.
     pub event: Event,
-    /// The nominal release of the job, or its deadline, in nanoseconds.
+    /// The nominal release of the job, or its deadline, in nanoseconds; `None` for an event with
+    /// neither.
     pub at_ns: Option<u64>,
 }
 

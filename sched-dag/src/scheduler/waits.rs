@@ -7,9 +7,9 @@
 //!
 //! - **W1, waiting.** From the end of a segment to the end of its wait the instance is not eligible
 //!   and holds no core. Waits do not queue: each instance has a timer and a limit of its own.
-//! - **W2, the end.** A wait ends with its answer, and at its limit at the latest; an answer at the
-//!   instant of the limit still counts. At that instant the instance is eligible again, with the
-//!   old key, on any core allowed to execute the DAG.
+//! - **W2, the end.** Unless its job is cut (W6), a wait ends with its answer, and at its limit at
+//!   the latest; an answer at the instant of the limit still counts. At that instant the instance
+//!   is eligible again, with the old key, on any core allowed to execute the DAG.
 //! - **W3, not a finish.** A wait releases no edge, completes no job, and the subtask's next
 //!   instance stays behind the waiting instance (R2 to R4).
 //! - **W4, one instant.** At one instant the ending segments come first, then the ending waits,
