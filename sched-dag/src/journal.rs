@@ -1,9 +1,10 @@
 //! The journal: the events of a run, each recorded once.
 //!
-//! A driver writes an [`Event`] at each moment: the kernel with its cores' clocks, virtual time and
-//! host threads with the scheduler's time. All later statements about a run are computed from these
-//! events: the times of jobs and instances, breaches of the rules and statistics by
-//! [`law`](crate::law), the lines of a trace, the drawings of a viewer.
+//! A driver writes an [`Event`] at each moment: the kernel with its cores' clocks, virtual time
+//! with the scheduler's time, Linux with its clock or, for a start, with the scheduler's time. All
+//! later statements about a run are computed from these events: the times of jobs and instances,
+//! breaches of the rules and statistics by [`law`](crate::law), the lines of a trace, the drawings
+//! of a viewer.
 //!
 //! [`EventKind`] is the only list of event words. This module prints and reads them, and packs an
 //! event into three [words](Event::words) of 64 bits and unpacks it.

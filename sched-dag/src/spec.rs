@@ -84,9 +84,9 @@ impl DagSpec {
 
 /// A state shared by subtasks of one DAG, as described by its app.
 ///
-/// Users of a state do not run at the same time unless all of them only read. The verification
-/// orders the users and adds precedence edges to enforce the order. It also allows only one job in
-/// flight, so that jobs keep the order, too.
+/// Two users of a state do not run at the same time unless both only read. The verification orders
+/// the users, and adds precedence edges between users that may not overlap. It also allows only one
+/// job in flight, so that jobs keep the order, too.
 #[derive(Clone, Debug, Default)]
 pub struct StateSpec {
     /// The name used in messages.

@@ -61,7 +61,8 @@ pub struct ProvenBounds {
 pub struct RunCounts {
     /// The origin of release times, on the clock read by functions.
     pub epoch_ns: u64,
-    /// The number of memory allocations between the start of the run and its last completion.
+    /// The number of memory allocations between the start of the run and its last completion; 0
+    /// where nobody counts.
     pub allocations: u64,
     /// The number of acquisitions of the schedulers' locks in that time, modulo 2^32; 0 where
     /// nobody counts.
@@ -327,7 +328,7 @@ impl Run {
     }
 
     /// Returns the number of memory allocations between the start of the run and its last
-    /// completion.
+    /// completion; 0 where nobody counts.
     pub const fn allocations(&self) -> u64 {
         self.counts.allocations
     }

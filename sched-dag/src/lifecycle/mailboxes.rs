@@ -7,7 +7,8 @@
 //! in the step in which the receiver takes the letter, before the releases of that step. Sending a
 //! letter never waits, because the room for letters is allocated at commit:
 //!
-//! - Signals are counted, so none is lost.
+//! - Signals are counted, so none is lost on the way; the receiver may still drop a signal (S2,
+//!   S4).
 //! - Of a pause and a resumption of one DAG waiting together, the later counts. The same holds for
 //!   modes. An end counts more than a closing.
 //! - Of two answers to waits of one subtask, the answer to the later wait counts.
