@@ -4,7 +4,9 @@
 //! processor-time clock is a system call, so instances do not read it at their start. Instead, the
 //! release thread looks at least once per shortest budget, and begins counting when it first sees
 //! an instance. So an instance ends after its budget, and later by at most the shortest budget of
-//! all plus 20 us. The instance's thread cannot be ended: it is demoted for good.
+//! all plus 20 us, if the release thread runs in time and the instance keeps its core. After a
+//! preemption, counting may begin anew. The instance's thread cannot be ended: it is demoted for
+//! good.
 //!
 //! An instance that waits may go on in another thread. So, for waiting subtasks, each worker reads
 //! its clock at both ends of a turn, and adds up the instance's time. At the end of a turn the

@@ -14,7 +14,7 @@ use crate::team::Team;
 use crate::{clock, sys};
 
 /// The handle of a committed run. The release thread of the DAG's cluster carries out requests at
-/// once. After the run, requests do nothing.
+/// once, or at time 0 of a run that has not begun. After the run, requests do nothing.
 ///
 /// ```
 /// use std::time::Duration;
@@ -153,7 +153,7 @@ impl Control {
         self.office.send_of_all(Request::Close);
     }
 
-    /// Puts the calling thread before all computing threads.
+    /// Puts the calling thread before all computing threads, if the run's threads have levels.
     pub fn raise(&self) {
         if let Some(levels) = self.office.levels {
             levels.bring(sys::thread(), Role::Release);

@@ -2,7 +2,8 @@
 //!
 //! The edge has a lock of its own. Threads take the edge's lock under a cluster's lock; functions
 //! asking for the time and replayed sources take it briefly. A thread without a real-time level
-//! sends the waiting data, so no instance waits for a file.
+//! sends the waiting data, so no instance waits for a file. The thread has a level only while it
+//! copies events out of the journals.
 
 use std::cell::Cell;
 use std::io::{self, Write};

@@ -2,11 +2,11 @@
 //!
 //! | level | threads |
 //! |---|---|
-//! | top | the release thread |
+//! | top | the release threads, and threads after `Control::raise` |
 //! | top - 1 | a worker reporting an end after its demotion |
 //! | top - 2 | workers running the scheduler's choice |
 //! | top - 3 | demoted workers: their instances were preempted |
-//! | none | abandoned workers: their instances have exceeded their budgets |
+//! | none | abandoned workers: their instances have exceeded their budgets or cannot unwind |
 //!
 //! The four levels are neighbours, below the level 50 of Linux's threaded interrupt handlers. Our
 //! `sched_ext` policy has the same four.

@@ -4,9 +4,10 @@
 //! A *worker* is a thread running instances. Each core of the machine has one *active* worker,
 //! pinned to the core's processor. The worker calls functions in place: when a completion hands its
 //! core the next instance, the same thread goes on. The *release thread* sleeps until the
-//! scheduler's next event. When an instance loses its core, its worker is *demoted* to a lower
-//! level of SCHED_FIFO, and a *spare* worker takes the core over. `docs/linux.md` lists the setup
-//! steps, and says which thread may delay which other.
+//! scheduler's next event, in case no idle worker handles the event first. When an instance loses
+//! its core, its worker is *demoted* to a lower level of SCHED_FIFO or of our `sched_ext` policy,
+//! and a *spare* worker takes the core over. `docs/linux.md` lists the setup steps, and says which
+//! thread may delay which other.
 //!
 //! When the cores are divided into clusters, each cluster has its own scheduler, lock, workers,
 //! journal and release thread. The release thread stays on the cluster's processors.
@@ -20,10 +21,11 @@
 //!   Linux has switched. [`dispatch_violations`](sched_dag::engine::Run::dispatch_violations)
 //!   checks R5 within a stated bound.
 //! - From the commit on, releases, preemptions and completions allocate nothing. A completion
-//!   concerning only its own core makes no system calls except to read clocks.
-//! - No thread holds the scheduler's lock below the level of the computing threads.
-//! - If the program unwinds, a panic in a function ends only that function's DAG, whatever its
-//!   destructors do.
+//!   concerning only its own core makes no system calls except to read clocks, or to wake a
+//!   sleeping sender of datagrams.
+//! - No thread of a run holds the scheduler's lock below the level of the computing threads.
+//! - If the program unwinds, a panic in a function ends only that function's DAG, or costs one of
+//!   its jobs ([`Dag::survive_faults`](fass::Dag::survive_faults)), whatever its destructors do.
 //! - However suddenly the program ends, no thread stays at a raised level.
 //!
 //! # Limits

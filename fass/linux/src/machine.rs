@@ -2,9 +2,9 @@
 //!
 //! # Wires on Linux: from any readable file, and to any writable one
 //!
-//! Each wire has two threads without a real-time level. They wait where the run's threads never do:
-//! one in a read, the other for a millisecond whenever nothing is to be sent. So bytes may arrive
-//! and leave late while the cores are busy, but delay nobody.
+//! Each wire connected by [`Linux::connect`] has two threads without a real-time level. They wait
+//! where the run's threads never do: one in a read, the other for a millisecond whenever nothing is
+//! to be sent. So bytes may arrive and leave late while the cores are busy, but delay nobody.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::AsFd;
@@ -33,7 +33,7 @@ use crate::{clock, sys};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mechanism {
     /// Levels of SCHED_FIFO. An instance chosen to run goes before all normal programs, and more
-    /// urgent instances preempt it.
+    /// urgent instances preempt it, where the terms and its subtask permit.
     Fifo,
     /// Our `sched_ext` policy, the paper's mechanism. The order is the same as with
     /// [`Fifo`](Self::Fifo), but a store sets it instead of a system call. The policy has to be
@@ -92,8 +92,9 @@ impl fmt::Display for StartError {
 
 impl std::error::Error for StartError {}
 
-/// Returns the model's core for the calling thread, counted within its cluster; `None` outside of
-/// functions of a run.
+/// Returns the core, counted within its cluster, for the calling thread; `None` outside of
+/// functions of a run. If the thread was preempted and goes on elsewhere, the answer may be the
+/// former core.
 pub fn own_core() -> Option<u32> {
     with_own_worker(Worker::seat).flatten().map(|core| core.0)
 }
@@ -109,11 +110,11 @@ pub fn processors() -> u32 {
 }
 
 impl Linux {
-    /// Takes the first `cores` processors available to this program, and checks for settings
-    /// harmful to real time ([`warnings`](Self::warnings)).
+    /// Takes the first `cores` processors available to this program. With SCHED_FIFO or
+    /// `sched_ext`, also checks for settings harmful to real time ([`warnings`](Self::warnings)).
     ///
-    /// If the program may not use SCHED_FIFO, the machine works as with [`Mechanism::Normal`], and
-    /// commits account for that.
+    /// If SCHED_FIFO is requested and the program may not use it, the machine works as with
+    /// [`Mechanism::Normal`], and commits account for that.
     ///
     /// # Errors
     ///
@@ -270,9 +271,9 @@ impl Linux {
         self.set(|threads| threads.allocations = count)
     }
 
-    /// Makes the kernel end this program, by SIGKILL, when one of its threads has run at a
-    /// real-time level for `time` without ever waiting. For tests, and wherever an error must not
-    /// make a computer unusable.
+    /// Makes the kernel end this program, by SIGKILL, when one of its threads has run at a level of
+    /// SCHED_FIFO for `time` without ever waiting. Threads of the other mechanisms have no such
+    /// level. For tests, and wherever an error must not make a computer unusable.
     ///
     /// # Errors
     ///
@@ -307,7 +308,7 @@ impl Linux {
     ///
     /// # Panics
     ///
-    /// If the signal's DAG is not committed.
+    /// If the signal's DAG is not committed, or its run is over.
     pub fn raise_on_input(&self, signal: &Signal, file: &impl AsFd) -> io::Result<()> {
         let target = signal.target();
         let Some((_, dag)) = target else {
@@ -318,8 +319,9 @@ impl Linux {
         control.raise_on_input(dag, sys::Arrivals::of(file)?)
     }
 
-    /// Runs the committed DAGs until each has ended all its jobs. Releases count from the instant
-    /// at which all threads are ready.
+    /// Runs the committed DAGs until each is over: all its jobs have ended, or it was closed or
+    /// ended, or it is sporadic without a limit of jobs and has no signal pending. Releases count
+    /// from the instant at which all threads are ready.
     ///
     /// # Errors
     ///
@@ -363,8 +365,8 @@ impl Drop for Linux {
 const ROOM_BYTES: usize = 8 << 20;
 
 impl Linux {
-    /// Keeps a record of the commits and runs to come, with recorded values, under the name of an
-    /// app. The file grows while a run goes on.
+    /// Keeps a record of the commits and runs to come, under the name of an app, with the recorded
+    /// values of the first of these commits. The file grows while a run goes on.
     ///
     /// ```no_run
     /// use std::fs::File;
@@ -404,7 +406,8 @@ impl Linux {
         }
     }
 
-    /// Makes the next run replay a recording. The replay may begin at the given job of a DAG, or
+    /// Makes the run of the next commit replay a recording. A later commit of the program is
+    /// refused: a recording is of one commit. The replay may begin at the given job of a DAG, or
     /// earlier.
     pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
         let bytes = recording;

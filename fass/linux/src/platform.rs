@@ -38,7 +38,7 @@ pub(crate) static HOST: Host = Host {
     launched: Mutex::new(None),
 };
 
-/// The memory of which a journal may take a quarter, in bytes.
+/// The memory, in bytes, of which the journals of all clusters together may take a quarter.
 const JOURNAL_BYTES: usize = 1 << 30;
 
 impl Host {
@@ -251,7 +251,7 @@ impl Deref for Run {
     }
 }
 
-/// Starts the threads of a committed plan, waits until all its jobs have ended, and returns the
+/// Starts the threads of a committed plan, waits until all its DAGs are over, and returns the
 /// results. Releases count from `epoch_ns`, or from 1 ms after the threads are ready.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);

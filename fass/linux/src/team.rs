@@ -6,11 +6,11 @@
 //! # The release thread
 //!
 //! The release thread is the clock of the scheduler. Each cluster has one, on its own processors.
-//! The thread sleeps until the scheduler's next event, at an absolute time, so releases keep to the
-//! nominal grid however late one of them was. Idle workers should come first (`look_out`). If all
-//! cores are busy, the release thread comes in time, and preempts. Other threads wake it earlier
-//! with a request, or if the next event has moved forward. The release thread makes the step and
-//! calls the workers, but runs no instances.
+//! It sleeps until the next event or look at budgets, at an absolute time, so releases keep to the
+//! nominal grid however late one was. Idle workers should come first (`look_out`). If all cores are
+//! busy, the release thread comes in time, and preempts. (Polling workers handle all timed events.)
+//! Other threads wake it earlier with a request, or if the next event has moved forward. The
+//! release thread makes the step and calls the workers, but runs no instances.
 
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;

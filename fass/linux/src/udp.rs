@@ -1,9 +1,10 @@
 //! Datagrams: packets of a wire go to a peer, and packets of peers arrive at the wire's port.
 //!
-//! Each wire has a socket, bound to all addresses of this computer, and a thread waiting for
-//! datagrams. Another thread sends for all wires. A completion wakes the sender, by an exchange
-//! and, while the sender sleeps, by a system call. Neither thread has a real-time level, as with
-//! bytes. A [protocol](Protocol) takes the place of a wire, in front of its own wires.
+//! Each connection has a socket, bound to all addresses of this computer, and a thread waiting for
+//! datagrams. Another thread sends for all connections. A completion sending a packet wakes the
+//! sender, by an exchange and, while the sender sleeps, by a system call. Neither thread has a
+//! real-time level, as with bytes. A [protocol](Protocol) takes the place of a wire, in front of
+//! its own wires.
 
 use std::fmt;
 use std::io;
@@ -64,7 +65,8 @@ impl Linux {
     /// an instance](fass::shared::Sender::to), or else the latest peer. To be called after the
     /// commit and once a wire.
     ///
-    /// A packet carries 1,472 bytes at most. The wire's link is up during the connection.
+    /// A sent packet carries 1,472 bytes at most; the wire limits the received ones. The wire's
+    /// link is up during the connection.
     ///
     /// ```
     /// use std::time::Duration;

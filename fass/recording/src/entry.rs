@@ -32,7 +32,8 @@ crate::recordable! {
     pub struct DagHeader {
         /// The DAG's name.
         pub name: String,
-        /// The hash of the DAG's names and edges; 0: the values were not recorded in a run.
+        /// The hash of the DAG's names and edges; 0: the DAG has no recorded topics, or the values
+        /// were not recorded in a run.
         pub graph: u64,
     }
 
@@ -173,10 +174,11 @@ pub struct Entry<'v> {
     pub place: u16,
     /// The job.
     pub job: u64,
-    /// The nominal release of the job, in nanoseconds from the start of the run.
+    /// The nominal release of the job, in nanoseconds from the start of the run; if unknown, the
+    /// time of the event.
     pub release_ns: u64,
-    /// The time of the event. For values: the completion of the instance that wrote or sampled
-    /// them.
+    /// The time of the event. For values: the completion of the instance that wrote or found them,
+    /// or its fault.
     pub at_ns: u64,
     /// The value's bytes, if there is a value.
     pub value: &'v [u8],
@@ -350,7 +352,7 @@ crate::recordable! {
         pub edges: Vec<(u32, u32)>,
         /// The sinks with their relative deadlines.
         pub sinks: Vec<(u32, u64)>,
-        /// The proven bound on the DAG's response time.
+        /// The proven bound on the DAG's response time, if there is one.
         pub bound_ns: Option<u64>,
         /// The topics.
         pub topics: Vec<CommittedTopic>,
@@ -370,7 +372,7 @@ crate::recordable! {
         pub priority: u32,
         /// Whether a started instance keeps its core.
         pub is_non_preemptive: bool,
-        /// The WCET, if stated.
+        /// The WCET, if stated or observed.
         pub wcet_ns: Option<u64>,
     }
 

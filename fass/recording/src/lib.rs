@@ -1,8 +1,10 @@
 //! Recordings: values crossing the edge of a run, as bytes with schemas, and files of such values.
 //!
-//! The results of a DAG of functions follow from the DAG's inputs. So a *recording*, a file of the
-//! values returned by sources, of found samples, and of the fate of jobs, is enough to compute
-//! every value again. This crate has the parts for writing values down:
+//! The results of a DAG of functions follow from the DAG's inputs and from what its functions
+//! remember. So a *recording*, a file of the values returned by sources, of found samples and
+//! states, of answers of devices, of told times, and of the fate of jobs, is enough to compute
+//! every value again, from job 0 on, or from a job with all states recorded. This crate has the
+//! parts for writing values down:
 //!
 //! - [`Recordable`]: a type whose values convert to bytes and back; [`recordable!`] makes an app's
 //!   struct recordable;

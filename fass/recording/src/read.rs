@@ -82,7 +82,7 @@ impl<'b> Recording<'b> {
     }
 
     /// Returns the number of entries for lost values. If the number is 0 and the recording is not
-    /// [cut](Self::is_cut), the recording is complete.
+    /// [cut](Self::is_cut), no entry is missing. (Journals may have lost events all the same.)
     ///
     /// See [`Writer`](crate::Writer).
     pub const fn lost(&self) -> u64 {

@@ -131,7 +131,8 @@ impl Sink for fn(&[u8]) {
     }
 }
 
-/// Writes a recording piece by piece. After the header, entries and events allocate nothing.
+/// Writes a recording piece by piece. After the header, entries and events allocate nothing, unless
+/// the sink does.
 ///
 /// ```
 /// use recording::{Header, Recording, Stream};

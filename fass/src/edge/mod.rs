@@ -2,18 +2,19 @@
 //!
 //! A *tape* takes events from the core executing a completion, and provides places into which
 //! instances write their values; it allocates nothing and waits for nothing. The *drain* turns the
-//! tape into a file whenever a core has time. A *replay* lends recorded values, and compares
-//! computed values with them. An *echo* keeps the latest value of a topic for people to look at.
-//! Without any of these, the edge may keep the inputs of the last jobs, in case an instance fails.
+//! tape into a file whenever core 0 has time, or in a thread on Linux. A *replay* lends recorded
+//! values, and compares computed values with them. An *echo* keeps the latest value of a topic for
+//! people to look at. Without any of these, the edge may keep the inputs of the last jobs, in case
+//! an instance fails.
 //!
-//! A platform reaches all this through the parameters of
+//! A machine and Linux reach all this through the parameters of
 //! [`Platform::open_channels`](crate::platform::Platform::open_channels), so an image without a
 //! recorded topic contains none of this code.
 //!
 //! The [`Edge`] of a platform's runs knows the mode requested on the command line, and owns the
-//! parts carrying it out. A platform has one edge, behind a lock of its own. Most work under that
-//! lock is done under the scheduler's lock, too. The drain is lent to the sender, so sending holds
-//! neither lock.
+//! parts carrying it out. A machine or Linux has one edge, behind a lock of its own; virtual time
+//! has another edge for each of its machines. Most work under that lock is done under the
+//! scheduler's lock, too. The drain is lent to the sender, so sending holds neither lock.
 
 mod echo;
 mod excerpt;
@@ -57,14 +58,15 @@ pub enum EdgeMode {
     Replay {
         /// A recording.
         bytes: &'static [u8],
-        /// The job of a DAG to be computed, if not the first. The replay begins with it or before.
+        /// The job of a DAG to be computed, if not the first recorded one. The replay begins with
+        /// it or before.
         from: Option<(&'static str, u64)>,
     },
     /// Keep the inputs of the last jobs, and hand them out if one fails.
     Latest {
         /// The name of the recorded app.
         app: &'static str,
-        /// The number of jobs kept of each DAG.
+        /// The number of jobs kept of each DAG, 64 at most.
         jobs: u32,
     },
 }

@@ -256,7 +256,8 @@ impl fmt::Debug for LineOf {
 /// The least room for a value, in bytes.
 const ROOM: usize = 4096;
 
-/// A value of a recorded topic, given to the platform when the writer's instance is complete.
+/// A recorded value: of a topic, a sample, a state or the answers of a device, given to the
+/// platform when the instance that wrote or found it is complete, or, for a finding, has failed.
 ///
 /// ```
 /// fn show(value: &fass::edge::RecordedValue<'_>) {
@@ -273,7 +274,7 @@ pub struct RecordedValue<'v> {
     pub channel: u16,
     /// The job.
     pub job: u64,
-    /// The time of the instance's completion, on the clock of [`crate::now_ns`].
+    /// The time of the instance's completion or fault, on the clock of [`crate::now_ns`].
     pub completed_ns: u64,
     /// The value; `None` if there was no room for it.
     pub bytes: Option<&'v [u8]>,

@@ -1,8 +1,9 @@
 //! The log: lines for people, written by functions while they run.
 //!
-//! [`log!`](crate::log!) copies a *line* into a ring of fixed size, and continues. The call neither
-//! allocates, waits nor formats text: the platform does the rest, and [takes](LogLine::take) lines
-//! when it has nothing else to do. If the ring is full, the new line is left out and counted.
+//! On a machine and on Linux, [`log!`](crate::log!) copies a *line* into a ring of fixed size, and
+//! continues. There the call neither allocates, waits nor formats text: the platform does the rest,
+//! and [takes](LogLine::take) lines when it has nothing else to do. If the ring is full, the new
+//! line is left out and counted. Virtual time has no ring, and keeps all lines for its report.
 //!
 //! # Guarantees
 //!

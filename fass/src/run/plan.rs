@@ -331,8 +331,9 @@ impl SubtaskCode {
     ///
     /// # Panics
     ///
-    /// - If the function panics. The body cannot be run again.
-    /// - If the body panicked before.
+    /// - If the function panics. The body cannot be run again, unless it is
+    ///   [replaced](Self::replace).
+    /// - If the body panicked before, and was not replaced.
     /// - If an input of `job` is missing, because a predecessor is not complete.
     /// - If an output finds no free slot, because the inputs of a cancelled instance were not
     ///   [discarded](Self::discard).

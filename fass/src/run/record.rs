@@ -1,9 +1,10 @@
 //! A recorded topic: writing its values down, and giving them back in a replay.
 //!
-//! A recorded topic has a *tap* between its writer and its readers. The tap looks at each value
-//! when the writer's function has returned, and writes the value down; the writer's completion
-//! passes the record to the platform. In a replay a source has another body, which asks the
-//! platform for the values of the job, and sends them.
+//! Where somebody wants its values, a recorded topic has a *tap* between its writer and its
+//! readers. The tap looks at each value when the writer's function has returned, and writes the
+//! value down; the writer's completion passes the record to the platform. In a replay a source of
+//! recorded topics has another body, which asks the platform for the values of the job, and sends
+//! them.
 //!
 //! A sample of such a topic is written down when the subtask takes it, and goes to the platform
 //! when the instance is complete, or has failed: without the sample nobody could compute its fault

@@ -274,7 +274,7 @@ impl<T> ResettableState<T> {
         self.others.set(values.map(SharedCell::new).collect());
     }
 
-    /// Returns the present value. There is one for each survived fault.
+    /// Returns the present value. Besides the first, there is one for each survived fault.
     #[inline]
     pub(crate) fn present(&self) -> &SharedCell<T> {
         match self.resets.load(Ordering::Acquire) {

@@ -1,16 +1,16 @@
 //! A subtask as a future: the loop of the paper's figure 4.
 //!
-//! [`create_subtask`] turns a function into a single future for the subtask's whole life, polled
-//! once for each instance. In each poll the future receives all inputs, calls the function, sends
-//! all outputs, and comes to rest at the next `recv_all`. Nothing leaves before the function has
-//! returned (R3).
+//! [`create_subtask`] turns a function that does not wait (the others have `waiting`) into a single
+//! future for the subtask's whole life, polled once for each instance. In each poll the future
+//! receives all inputs, calls the function, sends all outputs, and comes to rest at the next
+//! `recv_all`. Nothing leaves before the function has returned (R3).
 //!
 //! The figure generates subscribers and publishers in the future's first poll. Here they are
 //! generated before the future is made: otherwise a source might publish before a later subtask
 //! listens, and that subtask's topics would be one job behind forever.
 //!
-//! An untyped subtask works like a typed one, with tokens for values. It has no future, since it
-//! has nothing to wait for.
+//! An untyped subtask works like a typed one, with tokens for values. Here it has no future, since
+//! its function takes no inputs to wait for.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;

@@ -1,10 +1,10 @@
 //! The edge of a run: records values, or takes them from a recording.
 //!
 //! A *replay* does not call recorded sources, but takes their recorded values. Subtasks get their
-//! recorded samples and clock readings, and signals come at their recorded times. No job is lost on
-//! the way: releases queue, and a fault cuts the same instances as in the recorded run. A job
-//! without recorded values and a cut instance are passed over, without calls of their functions.
-//! All other recorded values are compared.
+//! recorded samples, answers of devices and clock readings, and signals come at their recorded
+//! times. No job is lost on the way: releases queue, and a fault cuts the same instances as in the
+//! recorded run. A job without recorded values and a cut instance are passed over, without calls of
+//! their functions. All other recorded values are compared.
 
 use std::cell::RefCell;
 
@@ -70,10 +70,11 @@ impl Kept {
 
 impl VirtualTime {
     /// Replays a recording. The values of recorded sources ([`Dag::record`](fass::Dag::record))
-    /// come from the recording instead of calls, and so do samples and clock readings. Jobs without
-    /// recorded values are passed over, and only recorded signals come, at their times. To be
-    /// called before the commit. The commit is refused if the recording has another graph or other
-    /// types, contains a source not recorded now, or has lost a source's value.
+    /// come from the recording instead of calls, and so do samples, recorded answers of devices and
+    /// clock readings. Jobs without recorded values are passed over, and only recorded signals
+    /// come, at their times. To be called before the commit. The commit is refused if the recording
+    /// has another graph, other types or other release times, if other sources are recorded now, or
+    /// if the recording has lost a source's value.
     ///
     /// Values written by other subtasks to recorded topics are compared, and so are recorded
     /// states: [`Report::compared`](crate::Report::compared) counts those, and

@@ -44,7 +44,7 @@ pub struct SubtaskShown {
     pub gives: Vec<Passed>,
 }
 
-/// A value passed between subtasks.
+/// A value that a subtask took or gave.
 ///
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@
 //! with `fass::execute_for`, else its subtask's WCET, or the time set by [`VirtualTime::silent`]
 //! instead. Without any of these a call takes no time. Simulating a second of a DAG's life takes
 //! about a millisecond, and every run of the same DAGs gives the same events at the same
-//! nanosecond.
+//! nanosecond, as long as the functions themselves do the same.
 //!
 //! Virtual time is the place to test an app: build the DAGs with the app's own code, commit them,
 //! [`run`](VirtualTime::run), and look into the [`Report`].
@@ -16,7 +16,7 @@
 //! - The schedule follows rules R1-R5 of the task model. [`Report::violations`] checks the rules
 //!   over the recorded events.
 //! - A panic in a function fails the run, and so the test. With [`VirtualTime::contain_panics`] the
-//!   panic ends its DAG instead, and is reported.
+//!   panic ends its DAG or costs a job instead, and is reported.
 //! - Machines belong to threads: tests running in parallel, each with its own [`VirtualTime`], do
 //!   not disturb one another.
 //!
@@ -24,9 +24,9 @@
 //!
 //! - Functions run one after another, on one thread. Races between functions that share data behind
 //!   the scheduler's back do not show here.
-//! - An instance's function runs at the instant of its start, and all at once. If the instance is
-//!   preempted in virtual time, its function has long returned; `fass::now_ns` inside the function
-//!   counts as if there were no preemption.
+//! - An instance's function runs at the instant of its start, and all at once; an async function
+//!   runs up to its next wait. If the instance is preempted in virtual time, the call has long
+//!   returned; `fass::now_ns` inside the function counts as if there were no preemption.
 //! - The kernel's own overheads are zero. (The commit's answers can include overheads:
 //!   [`VirtualTime::overheads`]. Interrupts can be [late](VirtualTime::late).)
 //! - Everything is recorded, so memory grows with the length of a run.
@@ -237,7 +237,8 @@ impl VirtualTime {
     }
 
     /// Raises a signal from outside at a time of the run, counted from the start of scheduling; at
-    /// once if the time has passed. To be called after the commit.
+    /// once if the time has passed. To be called after the commit. In a replay, does nothing: only
+    /// recorded signals come.
     ///
     /// ```
     /// use std::time::Duration;
@@ -269,9 +270,10 @@ impl VirtualTime {
         self.machine.raise_at(nanoseconds(time), target);
     }
 
-    /// Runs until every job of every DAG has ended, and reports everything since the commit. (If
-    /// DAGs have no last job, the run ends when a function shuts it down, or never.) If no call has
-    /// taken any time, prints a warning on standard error ([`Report::took_no_time`]).
+    /// Runs until every job of every DAG has ended and no further signal comes, and reports
+    /// everything since the commit. (If a periodic DAG has no last job, the run ends when a
+    /// function shuts it down, or never; if no function may do so, the run is refused.) If no call
+    /// has taken any time, prints a warning on standard error ([`Report::took_no_time`]).
     ///
     /// # Panics
     ///
@@ -310,9 +312,9 @@ impl VirtualTime {
         result.unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Runs until a job has ended, or a later job of the DAG, and returns the recorded inputs and
-    /// outputs of the job's subtasks (see [`Dag::record`](fass::Dag::record)). May be called again
-    /// to go on.
+    /// Runs until a job or a later one of the DAG has ended or is skipped, or the run is over, and
+    /// returns the recorded inputs and outputs of the job's subtasks (see
+    /// [`Dag::record`](fass::Dag::record)). May be called again to go on.
     ///
     /// # Errors
     ///

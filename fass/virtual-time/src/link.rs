@@ -67,7 +67,7 @@ pub struct LinkOptions {
     /// The shortest travel time of a packet, 2 ns or more.
     pub delay: Duration,
     /// The largest additional travel time of a packet, drawn at random. So packets may be
-    /// overtaken.
+    /// overtaken, unless the link keeps their order.
     pub jitter: Duration,
     /// Prevents overtaking: each packet arrives with the packet before, at the earliest.
     pub keeps_order: bool,

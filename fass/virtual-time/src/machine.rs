@@ -12,8 +12,8 @@
 //!
 //! The driver is `sched_dag::virtual_time`, the only loop in virtual time. The driver owns the
 //! engine with the bodies and the journal, and asks for the execution time of each instance at its
-//! start. [`Calls`] answers by running the instance's real body and adding up the executed time. A
-//! [`RunError`] says why a run could not go on.
+//! start and after each wait. [`Calls`] answers by running the instance's real body and adding up
+//! the executed time. A [`RunError`] says why a run could not go on.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -557,12 +557,13 @@ pub enum RunError {
     /// Nothing has been committed on this thread since the machine was made, or an earlier run has
     /// failed.
     NothingToRun,
-    /// A run to the end was requested, but this DAG has no end.
+    /// A run to the end was requested, but this DAG has no end, and no function may shut the run
+    /// down.
     Endless {
         /// The DAG.
         dag: DagLabel,
     },
-    /// A subtask's function panicked, and the machine was not told to
+    /// A subtask's function panicked or exceeded its budget, and the machine was not told to
     /// [contain](crate::VirtualTime::contain_panics) panics. No function runs afterwards.
     Panicked {
         /// The DAG.

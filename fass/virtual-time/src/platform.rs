@@ -63,7 +63,8 @@ pub(crate) fn make_current() -> Rc<Machine> {
 impl VirtualTime {
     /// Returns the record of everything run since the commit: the model, the values of the topics
     /// named by [`Dag::record`](fass::Dag::record), signals, skipped or cut jobs, and the events of
-    /// the schedule with their times. Empty if nothing was committed.
+    /// the schedule with their times; after [`keep_latest`](Self::keep_latest), only the inputs of
+    /// the last jobs. Empty if nothing was committed, or a run has failed.
     ///
     /// See [`Dag::record`](fass::Dag::record).
     pub fn recording(&self) -> Vec<u8> {

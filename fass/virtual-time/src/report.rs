@@ -45,8 +45,9 @@ pub struct Report {
     pub instances: Vec<InstanceRecord>,
     /// The released jobs, in the order of their releases.
     pub jobs: Vec<JobRecord>,
-    /// The [contained](crate::VirtualTime::contain_panics) panics, in the order in which their
-    /// functions ran; none without containment.
+    /// The [contained](crate::VirtualTime::contain_panics) panics, exceeded budgets and [injected
+    /// faults](crate::VirtualTime::fault), in the order in which their functions ran; none without
+    /// containment.
     pub panics: Vec<PanicRecord>,
     /// By DAG, whether a subtask has fallen back on its second function.
     pub(crate) degraded: Vec<bool>,
@@ -324,7 +325,8 @@ impl<'r> DagReport<'r> {
 pub struct InstanceRecord {
     /// The instance.
     pub instance: Instance,
-    /// The total execution time, in nanoseconds, known once the instance has started.
+    /// The total execution time, in nanoseconds, known once the instance has started; for a waiting
+    /// subtask, the time of the turns so far.
     pub execution_ns: u64,
     pub(crate) times: law::InstanceRecord,
 }
@@ -357,12 +359,13 @@ impl Deref for JobRecord {
     }
 }
 
-/// A contained panic: it ended its DAG or cost a job, and the run went on.
+/// A contained panic, exceeded budget or injected fault: it ended its DAG or cost a job, and the
+/// run went on. In a replay, the recorded cuts state the cost.
 ///
 /// See [`contain_panics`](crate::VirtualTime::contain_panics).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PanicRecord {
-    /// The instance whose function panicked.
+    /// The failed instance.
     pub instance: Instance,
     /// The panic's message.
     pub message: String,

@@ -22,7 +22,7 @@ pub(crate) struct Settings {
     pub(crate) late: Late,
     /// The failing calls.
     pub(crate) faults: Vec<Fault>,
-    /// Whether a panic of a function ends only its DAG.
+    /// Whether a panic of a function ends only its DAG, or costs one of its jobs.
     pub(crate) contains_panics: bool,
     /// The number of jobs whose inputs are kept, unless everything is kept.
     pub(crate) most_jobs: Option<u32>,

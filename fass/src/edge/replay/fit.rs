@@ -21,7 +21,9 @@ impl Replay {
     ///
     /// # Errors
     ///
-    /// Returns a message if the recording is of other DAGs or types, or lacks values of a source.
+    /// Returns a message if the recording is of other DAGs, types or release times, or of other
+    /// sources, has lost a source's value, has no inputs of the DAG to begin with, or has too many
+    /// jobs.
     pub fn fit(&mut self, own: &Header, task_set: &TaskSet) -> Result<(), String> {
         for (number, recorded) in self.header.dags.iter().enumerate() {
             let remedy = "commit the DAGs that were recorded, in their order";
@@ -150,7 +152,8 @@ impl Replay {
         self.passed = Arc::new(SkippedInstances { dags, jobs, cuts });
     }
 
-    /// Makes sure that time releases each job at its recorded time.
+    /// Makes sure that time releases each job of a periodic DAG with recorded inputs at its
+    /// recorded time.
     fn check_releases(&self, task_set: &TaskSet) -> Result<(), String> {
         for ((place, job), value) in &self.values {
             let dag = self.header.channels[usize::from(*place)].dag;

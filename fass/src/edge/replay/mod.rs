@@ -3,13 +3,13 @@
 //!
 //! A function failing because of its inputs fails again. In a replay, functions lack their memory
 //! of unrecorded jobs, so a fault caused by that memory does not occur again. Nor does a fault of a
-//! source, which is not called, or of a budget.
+//! recorded source, which is not called, or of a budget.
 //!
 //! # Replays on a machine
 //!
 //! Only recorded signals release sporadic DAGs. No signal is raised before its time, or before the
 //! previous signal has led to a release. So no signal is dropped where functions take longer than
-//! in the recorded run. Core 0 raises the signals in its spare time.
+//! in the recorded run. Core 0 in its spare time, or a thread on Linux, raises the signals.
 
 mod fit;
 

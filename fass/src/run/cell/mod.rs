@@ -3,11 +3,11 @@
 //!
 //! # The slot ring
 //!
-//! Here an *edge* is a topic as one of its readers sees it. Each edge is a ring of J *slots*, J
-//! being the number of jobs the DAG may have in flight, up to the next power of two; so a job
-//! always finds a free slot. A ring has exactly one [`Writer`] and one [`Reader`]. Neither can be
-//! cloned, and all their methods take `&mut self`; so at any time at most one thread acts for each
-//! side.
+//! Here an *edge* is a topic as one of its readers sees it. Each edge is a ring of at least J
+//! *slots*, J being the number of jobs the DAG may have in flight; so a job always finds a free
+//! slot, if the inputs of cancelled instances are given up. A ring has exactly one [`Writer`] and
+//! one [`Reader`]. Neither can be cloned, and all their methods take `&mut self`; so at any time at
+//! most one thread acts for each side.
 //!
 //! The slot of a job carries no meaning; the job number identifies a value. One slot is *near*: the
 //! only slot if one job may be in flight, and otherwise the first to be tried. Both ends go round
