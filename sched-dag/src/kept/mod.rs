@@ -3,20 +3,23 @@
 //! (If the cores are divided into clusters, each cluster keeps its own journal, and the run's
 //! journal merges all of them.)
 //!
-//! Every event except a core's clock is read and written under the scheduler's lock. So the list is
-//! in the order in which the scheduler learnt of the events, and needs neither atomics nor a lock
-//! of its own. Events are written once as they happen and read after the run: [`law`](crate::law)
-//! then computes all times, breaches of the rules and statistics from the journal.
+//! On several cores, every event except a core's clock is read and written under the lock of the
+//! cluster's scheduler. So the list is in the order in which the scheduler learnt of the events,
+//! and needs neither atomics nor a lock of its own. Events are written once as they happen, and
+//! mostly read after the run (views copy them during the run): [`law`](crate::law) then computes
+//! all times, breaches of the rules and statistics from the journal.
 //!
 //! # Memory
 //!
-//! The memory is taken at commit: as much as the events of all jobs can need. (A newly ready
-//! instance preempts at most one other instance, so an instance has at most six events, and five
-//! more for each wait.) If this is more than a quarter of the free memory, the journal takes only
-//! the quarter, since the times computed after the run take up to half as much again. If there is
-//! no last job, the need is unknown, and a fixed number of events takes its place. When the journal
-//! is full, the oldest event makes way for each new event. The [`RunTally`] first counts the oldest
-//! event, so statistics cover the whole run.
+//! Unless the journal grows, its memory is taken at commit: as much as the events of all jobs can
+//! need, within a stated limit. (A newly ready instance preempts at most one other instance, so an
+//! instance has at most six events, and five more for each wait.) If this is more than a quarter of
+//! the free memory, the journal takes only the quarter, since the times computed after the run take
+//! up to half as much again. If some DAG has no last job, the need is unknown, and a fixed number
+//! of events takes its place. Signals that are dropped come on top, in any number. When the journal
+//! is full, the oldest event makes way for each new event, until the journal is closed. The
+//! [`RunTally`] first counts the oldest event, so statistics cover the whole run, unless recording
+//! was off for a time.
 //!
 //! Times are nanoseconds since the run's epoch.
 
@@ -88,7 +91,7 @@ impl Journal {
         }
     }
 
-    /// Closes the journal: later events are not written down.
+    /// Closes the journal: later events are neither written down nor counted as lost.
     pub fn close(&mut self) {
         self.events.shrink_to_fit();
         self.is_closed = true;
@@ -172,7 +175,7 @@ impl Journal {
         }
     }
 
-    /// Reports whether events are recorded.
+    /// Reports whether events are recorded; false for a growing journal still without events.
     pub const fn is_recording(&self) -> bool {
         self.events.capacity() > 0
     }
@@ -264,9 +267,9 @@ impl Journal {
     /// cluster's first core. Without memory for both journals, the other's events count as lost.
     ///
     /// Each journal is in the order in which its scheduler learnt of the events, and the merge
-    /// keeps this order: of the two next events, the earlier goes first. No event depends on an
-    /// event of another cluster, since each DAG and each core is in one cluster; so any order
-    /// between them tells the same run.
+    /// keeps this order: of the two next events, the earlier goes first. No rule compares events of
+    /// two clusters, since each DAG and each core is in one cluster; so any order between them
+    /// tells the same run. (A signal sent to another cluster counts from its arrival there.)
     #[inline(never)]
     pub fn absorb(&mut self, other: Self, cluster: ClusterId, first_core: u32) {
         let mut merged = Vec::new();
@@ -299,7 +302,8 @@ impl Journal {
     }
 }
 
-/// Returns the maximum number of events in a run; `None` if there is no last job.
+/// Returns the maximum number of events in a run, apart from dropped signals; `None` if a DAG has
+/// no last job, or if the number overflows.
 fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
     let of_dag = |dag: &Dag| {
         // Released, due, queued or skipped, aborted, missed, completed, signalled.

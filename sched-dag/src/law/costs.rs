@@ -1,12 +1,12 @@
 //! The cost of the platform's own work in a run: two figures from its journal.
 //!
 //! An instance is *owed* a core as long as R5 says to run it and it does not run: from its
-//! readiness, or from the finish of the preempting instance, until its first (or next) instruction.
-//! In theory this takes no time. On a machine the time covers all the platform's work between two
-//! instances: the interrupt, the scheduler's step, the journal, the hand-off to another core, the
-//! switch of contexts, the alarm of a budget. So the longest time owed is an upper bound for the
-//! cost of each such moment, however its parts share the cost. The time before a readiness is the
-//! release's *lateness*, from the nominal to the actual release.
+//! readiness, or from the finish or wait of the instance before it on its core, until its first (or
+//! next) instruction. In theory this takes no time. On a machine the time covers all the platform's
+//! work between two instances: the interrupt, the scheduler's step, the journal, the hand-off to
+//! another core, the switch of contexts, the alarm of a budget. So the longest time owed is an
+//! upper bound for the cost of each such moment, however its parts share the cost. The time before
+//! the readiness of a source is the release's *lateness*, from the nominal to the actual release.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -24,7 +24,7 @@ pub struct MeasuredCosts {
     pub owed_ns: u64,
     /// The number of released jobs.
     pub releases: u64,
-    /// The longest time from a nominal to an actual release.
+    /// The longest time from a nominal to an actual release, of periodic jobs that were not queued.
     pub late_ns: u64,
 }
 

@@ -8,10 +8,10 @@
 //!
 //! A [`Histogram`] counts values in *buckets*, in a fixed amount of memory. Values below 2^b are
 //! exact; above, each doubling of the value is divided into 2^b buckets of equal width. So a bucket
-//! is at most 1/2^b of its values wide. A percentile is the largest value of its bucket: never too
-//! small, and too large by that part at most, with b = 5 by 3.2 %. The count, the minimum and the
-//! maximum are exact. Values from 2^40 on, 18 minutes in nanoseconds, share the last bucket,
-//! represented by the maximum.
+//! is at most 1/2^b of its values wide, except for the last. A percentile is the largest value of
+//! its bucket, or the maximum if smaller: never too small, and below 2^40 too large by that part at
+//! most, with b = 5 by 3.2 %. The count, the minimum and the maximum are exact. Values from 2^40
+//! on, 18 minutes in nanoseconds, share the last bucket, represented by the maximum.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -120,12 +120,12 @@ impl Distribution {
         found.map_or(self.max(), |(ns, _)| ns)
     }
 
-    /// Returns the smallest sample, or 0.
+    /// Returns the smallest sample, or 0 without samples.
     pub fn min(&self) -> u64 {
         self.min_ns.unwrap_or(0)
     }
 
-    /// Returns the middle sample, or 0.
+    /// Returns the middle sample, the lower one of two, or 0 without samples.
     pub fn median(&self) -> u64 {
         self.per_mille(500)
     }
@@ -135,7 +135,7 @@ impl Distribution {
         self.per_mille(990)
     }
 
-    /// Returns the largest sample, or 0.
+    /// Returns the largest sample, or 0 without samples.
     pub fn max(&self) -> u64 {
         self.values.last().map_or(0, |(ns, _)| *ns)
     }

@@ -13,8 +13,9 @@ use crate::task_set::TaskSet;
 impl RunRecord {
     /// Computes the times from a journal's events, given in their order.
     ///
-    /// If the oldest events are lost (`is_whole` is false), the record holds only the jobs due
-    /// after the first remaining event: no event of these jobs is missing.
+    /// If the oldest events are lost (`is_whole` is false), the record begins, for each DAG, with
+    /// the first released job due after the first remaining event: no event of such jobs is
+    /// missing.
     ///
     /// Returns `None` if there is no memory for so many jobs.
     pub fn of_events(

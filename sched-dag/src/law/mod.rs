@@ -74,16 +74,18 @@ pub struct JobRecord {
     pub cut_ns: Option<u64>,
     /// Whether a fault has cut the job while its DAG went on.
     pub has_failed: bool,
-    /// When the scheduler noticed that the deadline had passed with the job incomplete.
+    /// When the scheduler noticed that a deadline of the job, or of one of its sinks, had passed
+    /// unmet.
     pub missed_ns: Option<u64>,
     /// When no instance of the job was left.
     pub ended_ns: Option<u64>,
-    /// How the job ended; `None` if it had not ended by the end of the record.
+    /// How the job ended; `None` if it had not ended by the end of the record, or was skipped.
     pub outcome: Option<JobOutcome>,
 }
 
 impl JobRecord {
-    /// Returns the time from the nominal release to the end, or `None` unless both are known.
+    /// Returns the time from the nominal release to the end, also of a job that was cut, or `None`
+    /// unless both are known.
     pub fn response_time_ns(&self) -> Option<u64> {
         Some(self.ended_ns?.saturating_sub(self.release_ns?))
     }
@@ -174,7 +176,7 @@ impl RunRecord {
     }
 
     /// Returns the number of the first recorded job of a DAG. This is not the DAG's own first job
-    /// if the memory did not hold all jobs.
+    /// if the oldest events are lost.
     ///
     /// # Panics
     ///
@@ -241,7 +243,7 @@ impl RunRecord {
     }
 
     /// Returns when a job was complete (R4): the latest finish of its subtasks. Returns `None` if a
-    /// subtask has not finished.
+    /// subtask has not finished, as in most jobs that were cut, or if the job is not recorded.
     pub fn completion_ns(&self, dag: DagId, job: u64) -> Option<u64> {
         let instances = self.instances(dag, job).iter();
         latest(instances.map(|instance| instance.finish_ns))

@@ -1,6 +1,7 @@
 //! R5: did the right instances run?
 //!
-//! At every instant, the rule says which instances *should* run. With m cores, these are
+//! At every instant, the rule says for each cluster which instances *should* run. With m cores in
+//! the cluster, these are
 //!
 //! - the started instances that keep their cores;
 //! - on each other core, the entry of its table that is due (T1, T3);

@@ -1,4 +1,4 @@
-//! Statistics of a run of any length, in memory allocated before the run begins.
+//! Statistics of a run of any length, in memory allocated before the first event is taken.
 //!
 //! A [`RunTally`] takes each event of a journal once, in order, and forgets each job at its end.
 //! The tally keeps a [`Histogram`] of each of the following times, and the times of the jobs in
@@ -12,7 +12,8 @@
 //! - *Execution time*, of a subtask's instances: from the start to the finish, without suspensions
 //!   and waits. Execution times above the WCET are counted, too.
 //!
-//! Only complete jobs count in a DAG's response time; a job that was cut does not.
+//! Only complete jobs count in a DAG's response time; a job that was cut does not. Instances count
+//! even in jobs that were cut, if they started or finished.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -204,7 +205,8 @@ impl RunTally {
 }
 
 impl DagTally {
-    /// Returns the longest response time of a complete job, and the job's number.
+    /// Returns the longest response time of a complete job, and the job's number; zeros without
+    /// one.
     pub const fn longest(&self) -> (u64, u64) {
         self.longest
     }
@@ -298,7 +300,8 @@ impl DagTally {
     }
 }
 
-/// Returns the sinks whose response times differ from the DAG's.
+/// Returns the sinks whose response times may differ from the DAG's: all, or none if there is only
+/// one.
 fn judged_sinks(dag: &Dag) -> &[SubtaskId] {
     match dag.sinks() {
         [_] => &[],

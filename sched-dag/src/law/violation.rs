@@ -29,18 +29,18 @@ texts! {
         Release = "R1 release";
         /// R2: an instance is ready exactly when all its conditions have been met.
         AndJoin = "R2 join";
-        /// R3: a finish releases all instances waiting for it, at once.
+        /// R3: a finish releases all instances waiting for nothing else, at once.
         CompletionBoundary = "R3 completion boundary";
         /// R4: a job is complete with its last instance, and meets its deadline or not.
         JobCompletion = "R4 completion";
-        /// R5: the instances with the smallest keys run.
+        /// R5: of the instances that may use a core, those with the smallest keys run.
         Dispatch = "R5 dispatch";
         /// T1 to T4: a core runs the entries of its table, and members in the time left over.
         Table = "T1 table";
         /// W1 and W2: an instance takes the waits stated by its subtask, each within its limit.
         Waiting = "W1 waiting";
-        /// An instance becomes ready, starts and finishes once, is suspended and resumed in turns,
-        /// and is on one core at a time.
+        /// An instance becomes ready, starts and finishes at most once, is suspended and resumed in
+        /// turns, and is on one core at a time.
         OneLife = "one life";
         /// A core runs one instance at a time.
         OneCore = "one core";

@@ -8,17 +8,18 @@
 //!
 //! R4: a job is complete with the last of its instances: all instances must be over, and the
 //! completion belongs to the scheduler step in which the last instance ends, within the tolerance.
-//! The same is true of a job that was aborted, or cut short by the end of its DAG. The next section
-//! says when a job is late.
+//! The same is true of a job that was aborted or cut by a fault. If its DAG was ended, instances
+//! may be left. The next section says when a job is late.
 //!
 //! # R4: when a job is late
 //!
-//! A job has missed a deadline if and only if a sink finishes later than the sink's own deadline. A
+//! A job has missed a deadline if and only if a sink has not finished by the sink's own deadline. A
 //! core may finish in time while another core is just noticing the miss: this is a breach only
 //! beyond the tolerance. Where times are exact, a miss is noticed at once: with several sinks,
 //! right after the first deadline not met by its sink.
 //!
-//! Lateness is not judged for a job that was aborted, or cut short by the end of its DAG.
+//! No miss is demanded of a job that was aborted, cut by a fault, or cut short by the end of its
+//! DAG.
 //!
 //! # R2 and R3: what an instance waits for, and what makes it ready
 //!

@@ -4,8 +4,8 @@
 //! The judge takes the events in their order, where each event comes after all its causes, and
 //! compares each event with the state known so far. An event not yet seen has not happened,
 //! whatever time it carries. Complete jobs are forgotten once nothing waits for them any more, and
-//! jobs that are due and waiting are kept as runs ([`backlog`]). So the judge needs memory for the
-//! jobs in flight only.
+//! jobs that are due and waiting are kept as runs ([`backlog`]). So the judge mostly needs memory
+//! for the jobs in flight only.
 //!
 //! Words. A *step* of the scheduler is identified by its core and by the core's last machine event
 //! before the step. (A completion's step begins with a machine event, never between two of them.) A
@@ -18,10 +18,11 @@
 //!
 //! # One life of each instance, and one instance on each core
 //!
-//! *One life*: an instance becomes ready once, starts once and only when ready, is suspended only
-//! on the core where it runs, resumed only when suspended, and finishes once, on the core where it
-//! runs. So an instance is on one core at a time. An instance is cancelled only if its job was cut.
-//! An event of an instance never has an earlier time than the instance's event before.
+//! *One life*: an instance becomes ready at most once, starts at most once and only when ready, is
+//! suspended only on the core where it runs, resumed only when suspended or after a wait, and
+//! finishes at most once, on the core where it runs. So an instance is on one core at a time. An
+//! instance is cancelled only if its job was cut or its DAG ended. An event of an instance never
+//! has an earlier time than the instance's event before.
 //!
 //! *One core*: an instance on a core is the core's *occupant*. The occupant must be gone before the
 //! next instance starts or is resumed there.
