@@ -1,19 +1,19 @@
 //! The commit's own clusters: heavy DAGs own cores and lend the time left there, or each DAG that
 //! needs several cores gets cores of its own and the others share single cores.
 //!
-//! Under static priorities the cores are divided by [`lend`](super::lend()) if the result proves
-//! all DAGs. Otherwise this is federated scheduling (papers below). Under other policies federated
-//! scheduling comes first, and a table for all DAGs comes second, if federated scheduling does not
-//! prove all.
+//! Under static priorities with preemption the cores are divided by [`lend`](super::lend()) if the
+//! result proves all DAGs. Otherwise this is federated scheduling (papers below). Under other
+//! policies federated scheduling comes first, and, with preemption, a table for all DAGs comes
+//! second, if federated scheduling does not prove all.
 //!
 //! A DAG is *heavy* if a job is more work than one core does by its deadline, or by the next
 //! release if earlier, or if subtasks wait. It gets a cluster of as many cores as its multi-path
 //! bound needs, or of fewer with a table. The other DAGs are *light*. Clusters of one core each
 //! take them, the densest first, each on the core with the least sum of densities (worst fit), so
-//! every core keeps some room. A core takes light DAGs up to a sum of 1: enough for EDF, but no
-//! proof for static priorities. If a DAG ends up without cores, all DAGs share all cores, provided
-//! such sharing proves each of them. Whatever the assignment, the analysis of each cluster has the
-//! last word.
+//! every core keeps some room. A core takes light DAGs up to a sum of 1: enough for preemptive EDF,
+//! but no proof for static priorities or without preemption. If a DAG ends up without cores, all
+//! DAGs share all cores, provided such sharing proves each of them. Whatever the assignment, the
+//! analysis of each cluster has the last word.
 //!
 //! # Federated scheduling: cores of its own for each DAG that needs several
 //!
@@ -99,8 +99,9 @@ texts! {
 ///
 /// # Errors
 ///
-/// The first DAG without cores: heavy and waiting DAGs in the order of the commit, then light DAGs,
-/// the densest first.
+/// The first DAG that states its cluster or cores, enters a lock without a longest section or
+/// cannot be analysed. Without one, the first DAG without cores: heavy and waiting DAGs in the
+/// order of the commit, then light DAGs, the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let dags = task_set.dags().iter();
     let all = of_cluster(settings, settings.cores, &mut dags.clone());

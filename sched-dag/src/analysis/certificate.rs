@@ -11,9 +11,10 @@
 //! Executions count as real numbers here, and whole numbers are a special case.
 //!
 //! Assumes a *fixed* set: all jobs are released, and none is paused, cut or aborted. A commit with
-//! a certificate refuses anything that would change the set. Charges of the platform lengthen
-//! executions, and releases may be late by as much (the jitter): a step of the scheduler sees a
-//! release together with all releases due no later.
+//! a certificate refuses DAGs that start paused, and subtasks that may pause a DAG, enter a mode or
+//! end the run. A fault may still change the set, and voids the bounds. Charges of the platform
+//! lengthen executions, and releases may be late by as much (the jitter): a step of the scheduler
+//! sees a release together with all releases due no later.
 
 use alloc::format;
 use alloc::string::String;

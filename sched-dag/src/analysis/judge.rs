@@ -24,7 +24,8 @@ use crate::task_set::{Dag, TaskSet};
 /// Bounds the response time of every DAG, as far as a test proves a bound.
 ///
 /// Clusters share no core, so each is a case of its own. A signal between clusters needs no term: a
-/// sporadic DAG counts as if signals came as fast as allowed.
+/// sporadic DAG counts as if signals came as fast as allowed. A lock shared between clusters is
+/// charged as if all cores of the machine entered it.
 #[must_use]
 pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult {
     let dags = task_set.dags();

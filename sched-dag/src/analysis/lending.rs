@@ -4,7 +4,8 @@
 //! A DAG is *heavy* if its volume exceeds the time until its deadline or the next release, too much
 //! for a single core; otherwise it is *light*. There are seven [attempts](LendingAttempt), and the
 //! first attempt to prove a bound for every DAG wins. In the first attempt all DAGs share all
-//! cores. In the next four:
+//! cores. The first five attempts fail at once if a DAG cannot be a member or has `D > T`, or if
+//! the policy looks at releases, as EDF does. In the second to the fifth:
 //!
 //! - *Owners*: heavy DAGs take the first free cores, in order of ascending slack `D - length`. Each
 //!   gets a table of one DAG, on the fewest cores on which its [list schedule](ListSchedule) ends

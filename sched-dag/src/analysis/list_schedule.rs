@@ -109,8 +109,8 @@ impl ListSchedule {
         }
     }
 
-    /// Lowers the limit of each core, from the last core to the first, as far as there are
-    /// schedules. All limits are `limit_ns` to begin with.
+    /// Lowers the limit of each core, from the last core to the first, as far as schedules are
+    /// found within a limited number of tries. All limits are `limit_ns` to begin with.
     ///
     /// The schedule may get longer, but never longer than `limit_ns`.
     pub fn squeezed(&self, task: &Task, limit_ns: u64) -> Self {

@@ -52,15 +52,17 @@
 //!
 //! - *Integers only*: times have 64 bits, products 128. Divisions round so that the result stays a
 //!   bound, and an overflow is an error or "not proven".
-//! - *No recursion*, and every loop has a limit. A limit reached means "not proven"
-//!   ([`NotProvenReason::Limit`]), never a guess. Run time is nearly linear in subtasks and edges
-//!   for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and quadratic in the number of DAGs.
+//! - *No recursion*, and every loop has a limit. A limit reached means a larger bound, the next
+//!   test, or "not proven" (often [`NotProvenReason::Limit`]), never a guess. Run time is nearly
+//!   linear in subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and quadratic
+//!   in the number of DAGs.
 //! - *Evidence*: the property test in `tests/it/analysis/` simulates thousands of random sets and
 //!   compares each observed response time with its bound.
 //!
 //! # Not guaranteed
 //!
-//! - An exceeded WCET voids the bounds of every DAG.
+//! - An exceeded WCET voids the bounds of every DAG of its cluster, and where clusters share locks,
+//!   of the other clusters, too.
 //! - The platform's own time is covered as far as [`Overheads`] says.
 //! - The cores must be identical and serve these DAGs only. If a commit divides the cores, each
 //!   cluster is analysed by itself.
@@ -135,7 +137,7 @@ pub struct AnalysisSettings {
     pub policy: Policy,
     /// Whether instances of preemptible subtasks may lose their core.
     pub preemption: Preemption,
-    /// The number of identical cores, all serving these DAGs.
+    /// The number of identical cores, in all clusters together, serving these DAGs only.
     pub cores: u32,
     /// Costs of the platform, added to each WCET.
     pub overheads: Overheads,
@@ -243,7 +245,8 @@ pub struct NotProven {
 }
 
 texts! {
-    /// Why a DAG is not proven to meet its deadlines. Lengths include overheads.
+    /// Why a DAG is not proven to meet its deadlines. Lengths include overheads, so a certain miss
+    /// is certain only when the overheads, too, take as long as stated.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum NotProvenReason {
         /// The DAG cannot be analysed: a WCET is missing or numbers overflow.
@@ -343,8 +346,8 @@ impl AnalysisResult {
 }
 
 impl NotProvenReason {
-    /// Reports whether deadlines are certain to be missed when every instance takes its WCET,
-    /// rather than merely not proven to be met.
+    /// Reports whether deadlines are certain to be missed when every instance takes its WCET with
+    /// all overheads, and jobs keep coming, rather than merely not proven to be met.
     pub const fn is_certain(&self) -> bool {
         matches!(
             self,

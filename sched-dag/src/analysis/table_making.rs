@@ -68,13 +68,13 @@ struct FamilyEntry {
 enum LapFailure {
     /// An entry of this DAG of the family is late by this many nanoseconds.
     Late(usize, i64),
-    /// The lap does not close.
+    /// The lap does not close, or the work left does not suffice.
     Open,
 }
 
 impl<'a> TableFamily<'a> {
-    /// Enters periodic DAGs as long as a lap has at most `limit` entries: first those that cannot
-    /// be members, then the densest.
+    /// Enters periodic DAGs as long as a lap has at most `limit` entries and no time exceeds
+    /// [`LONGEST_NS`]: first those that cannot be members, then the densest.
     pub(super) fn of(tasks: &'a [&'a Task], limit: usize) -> Self {
         let is_periodic = |&dag: &usize| tasks[dag].table_terms().offset_ns.is_some();
         let mut order: Vec<usize> = (0..tasks.len()).filter(is_periodic).collect();

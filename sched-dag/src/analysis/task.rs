@@ -264,7 +264,7 @@ impl Task {
         Ok(task)
     }
 
-    /// Returns the time between two releases, never 0.
+    /// Returns the period, or the least time between two releases of a sporadic DAG, never 0.
     pub const fn period_ns(&self) -> u64 {
         self.period_ns
     }
@@ -349,7 +349,8 @@ impl Task {
     }
 
     /// Returns by subtask the longest path up to and including the subtask: the finish after the
-    /// release, in nanoseconds, if every subtask takes its WCET and none waits for a core.
+    /// release, in nanoseconds, if every subtask takes its WCET, and none waits for a core or for
+    /// anything else.
     pub(super) fn finishes_ns(&self) -> Vec<u64> {
         let mut finishes_ns = self.wcets_ns().to_vec();
         for subtask in self.topological_order() {

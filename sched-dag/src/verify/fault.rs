@@ -188,10 +188,10 @@ worded! {
             "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
         /// A list of a core cannot be enforced; `list` names the core.
         CoreList { list: String, why: ListFault } = "core_list", "the list of {list}: {why}";
-        /// A DAG with an affinity to a core outside its cluster.
+        /// A DAG with an affinity to a core outside its cluster, or numbered 65,534 or higher.
         AffinityOutOfRange { dag: DagLabel, core: u32, cores: u32 } = "affinity_out_of_range",
             "{dag} has an affinity to core {core}, and {}", counted_from_0(*cores);
-        /// Two DAGs of a cluster share some of their cores, but not all.
+        /// Two DAGs of a cluster, both without a table, share some of their cores, but not all.
         AffinitiesOverlap { dag: DagLabel, other: DagLabel, core: u32 } = "affinities_overlap",
             "{other} and {dag} share core {core} and not all others (without an affinity a DAG has \
              every core); give both the same affinity, or no core in common";
@@ -299,8 +299,8 @@ worded! {
             "two DAGs are named `{}` (number {} and {}); rename one",
             first.name, first.id.0, second.id.0;
         /// The analysis is certain that the DAG cannot keep its deadlines when every instance takes
-        /// its WCET; `reason` says why, with the remedy. Comes from callers with an analysis, not
-        /// from [`verify`](crate::verify()), which has none.
+        /// its WCET, overheads included; `reason` says why, with the remedy. Comes from callers
+        /// with an analysis, not from [`verify`](crate::verify()), which has none.
         CertainMiss { dag: DagLabel, reason: String } = "certain_miss",
             "{dag} cannot keep its deadlines at its WCETs: {reason}";
     }
@@ -333,7 +333,7 @@ texts! {
         /// A DAG of the list states an affinity.
         HasAffinity { dag: DagLabel } =
             "{dag} has an affinity, and its lists say on which cores it executes; leave one out";
-        /// A sporadic DAG shares lists.
+        /// A sporadic DAG shares lists with other DAGs.
         Sporadic { dag: DagLabel } =
             "{dag} is sporadic, and other DAGs are in its lists; give it cores of its own, or no \
              list";

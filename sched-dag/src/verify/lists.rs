@@ -4,9 +4,9 @@
 //! a core of the machine, as in answers and pictures; the cluster follows from the core. Each other
 //! word is an *entry*: `DAG.SUBTASK`, by names or by numbers. `#N` gives the job, counted from the
 //! first release of a lap on (`#-1`: the last job of the lap before). Without `#N`, the entries of
-//! a subtask belong to jobs 0, 1, .. in turn. Entries in parentheses are nested in the entry before
-//! the parenthesis. `@START+LENGTH` gives the times in nanoseconds. Without times,
-//! [timed](TaskSet::timed) finds them.
+//! a subtask, all on one core, belong to jobs 0, 1, .. in turn. Entries in parentheses are nested
+//! in the entry before the parenthesis. `@START+LENGTH` gives the times in nanoseconds. Without
+//! times, [timed](TaskSet::timed) finds them.
 //!
 //! Lists with DAGs in common form one table. A table contains a DAG as a whole or not at all.
 

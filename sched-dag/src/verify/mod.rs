@@ -1,12 +1,15 @@
 //! The verification of DAGs at commit.
 //!
 //! After the verification nothing can be added, and the holder of the [`TaskSet`] may rely on
-//! everything it states. All faults of all DAGs are reported at once, so an app's author needs one
-//! run to see them. Warnings are reported separately and prevent nothing.
+//! everything it states. All faults of all DAGs are reported at once, so an app's author mostly
+//! needs one run to see them. Only if there are no others come derived priorities that do not fit,
+//! and then tables that cannot be enforced; and while a list cannot be read, the entries of all
+//! lists stay unchecked. Warnings are reported separately and prevent nothing.
 //!
 //! After a fault, each check goes on with the author's most likely intention. So one slip is one
-//! fault and hides no other. The whole verification takes time linear in subtasks, ports and edges,
-//! except for sorting numbers; there is no recursion.
+//! fault and hides no other. The verification of DAGs without faults takes time linear in subtasks,
+//! ports and edges, except for sorting numbers, and for states, locks, affinities and tables,
+//! supposed to be few. There is no recursion.
 //!
 //! Words: the *construction policy* says which shapes of graph are wanted. The default is the
 //! paper's policy: exactly one source and one sink, connected, and one writer per topic. The caller
@@ -58,7 +61,8 @@ pub struct RejectedDags {
 ///
 /// # Errors
 ///
-/// All faults of all DAGs, in the order of the DAGs.
+/// All faults found, in the order of the DAGs. A fault of the whole commit or in a list counts as
+/// one of the first DAG.
 pub fn verify<S: Borrow<DagSpec>>(
     specs: &[S],
     options: &CommitOptions,

@@ -1,17 +1,17 @@
 //! Makes the model from specs without faults.
 //!
-//! A DAG without priorities gets priorities derived from its graph. A subtask's *remaining path* is
-//! the longest path from its start to the end of the DAG, including its own WCET. The subtask with
-//! the longest remaining path comes first (the "highest level first" order; T. C. Hu, Operations
-//! Research 9, 1961, and, as upward rank, Topcuoglu, Hariri and Wu, IEEE TPDS 13, 2002); between
-//! equal paths, the order of registration decides. If the WCET of any subtask of the DAG is
-//! unknown, every subtask counts 1, and the number of subtasks on a path decides. Mixing known and
-//! invented times would favour the subtasks that happened to be measured.
+//! A DAG that does not give all its priorities gets priorities derived from its graph. A subtask's
+//! *remaining path* is the longest path from its start to the end of the DAG, including its own
+//! WCET, but no waits. The subtask with the longest remaining path comes first (the "highest level
+//! first" order; T. C. Hu, Operations Research 9, 1961, and, as upward rank, Topcuoglu, Hariri and
+//! Wu, IEEE TPDS 13, 2002); between equal paths, the order of registration decides. If the WCET of
+//! any subtask of the DAG is unknown, every subtask counts 1, and the number of subtasks on a path
+//! decides. Mixing known and invented times would favour the subtasks that happened to be measured.
 //!
 //! Between DAGs, derived priorities are deadline monotonic, as the fixed-priority tests assume: all
 //! subtasks of the DAG with the shorter relative deadline come before all subtasks of the other
-//! (then in the order of the commit). If only some DAGs have given priorities, derived priorities
-//! come after all given priorities.
+//! (equal ones in the order of the commit). If only some DAGs have given priorities, derived
+//! priorities come after all given priorities.
 
 use alloc::boxed::Box;
 use alloc::vec;

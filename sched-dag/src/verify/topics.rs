@@ -23,8 +23,9 @@
 //! readers between two updates stay parallel. All edges follow one order consistent with all paths,
 //! so the edges close no cycle.
 //!
-//! Jobs take turns as well: the commit allows one job in flight. Job k + 1 finds the states as job
-//! k left them.
+//! Jobs take turns as well: the commit allows one job in flight of a DAG with a shared state. (A
+//! state with a single user needs no limit, as R2 puts the user's instances in sequence.) Job k + 1
+//! finds the states as job k left them.
 //!
 //! The analysis sees nothing but a DAG with some more edges. There is no lock, so no subtask is
 //! ever blocked by a state and no priority is inverted.

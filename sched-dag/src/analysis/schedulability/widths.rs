@@ -11,7 +11,8 @@
 //! (`set`). A platform's costs are not covered: while a step hands an instance to a core, others
 //! wait for the step, so an instance does not have its core at once.
 //!
-//! Assumes: no core idles while a subtask is ready. Any order.
+//! Assumes: no core idles while a subtask is ready, and each core serves each DAG (no tables, no
+//! affinities). Any order.
 
 use alloc::vec::Vec;
 

@@ -33,7 +33,7 @@
 //! this is the last condition, so all instances waiting for nothing but one finish are released in
 //! one step. The rule leaves open which of two finishes is the last, for two cores may finish and
 //! then take the scheduler's lock in the other order. And the instance does become ready, within
-//! the tolerance.
+//! the tolerance, unless its job was cut or its DAG ended.
 
 use alloc::vec::Vec;
 
