@@ -10,7 +10,7 @@
 //! A *DAG* (or task) is released periodically, or by signals; each release is a *job*, counted from
 //! 0. A *subtask* is a function in the DAG: the function reads its argument tuple and writes its
 //! result tuple, one *topic* for each element. One execution of a subtask, for one job, is an
-//! *instance*. A *source* has no inputs and starts at the release; a *sink* has no outputs.
+//! *instance*. A *source* has no inputs and is ready at the release; a *sink* has no outputs.
 //! `docs/glossary.md` lists the project's own words.
 //!
 //! # A first DAG
@@ -69,31 +69,35 @@
 //!
 //! - A function runs after all values of its job have arrived, and gets exactly the values of that
 //!   job. Every value carries its job's number, and the reader finds the value by that number.
-//! - A function's results become visible after the function has returned, all at once. Sending
+//! - A function's results become visible after the function has returned, all at once. Sending them
 //!   never waits.
 //! - Functions share other data only by declared and typed objects: a [`State`](shared::State)
 //!   within a DAG, a [`Latest`](shared::Latest) value between DAGs, a [`Signal`](shared::Signal)
-//!   for releasing a DAG. The commit turns them into precedence, bounded staleness, or a minimum
-//!   distance of releases.
-//! - A function declares every influence on the run, too: pausing DAGs ([`Switch`](shared::Switch))
-//!   and ending the run ([`Shutdown`](shared::Shutdown)).
+//!   for releasing a DAG, a [`Lock`](shared::Lock) for data outside the DAGs. The commit turns them
+//!   into precedence, staleness (bounded for a periodic writer with a proven bound), a minimum
+//!   distance of releases, or blocking.
+//! - A function declares every influence on the run, too: pausing DAGs
+//!   ([`Switch`](shared::Switch)), entering modes ([`ModeSwitch`](shared::ModeSwitch)) and ending
+//!   the run ([`Shutdown`](shared::Shutdown)).
 //! - While DAGs run, data from and to the outside passes a [`Wire`](shared::Wire), a
-//!   [`Device`](shared::Device) or a [`Parameter`](shared::Parameter).
+//!   [`Device`](shared::Device), a [`Parameter`](shared::Parameter) or a
+//!   [`WallClock`](shared::WallClock).
 //! - A function may be async and wait before returning. The subtask declares the number of waits,
 //!   and a time limit for each. The function can wait for a time, a [`Device`](shared::Device) or a
 //!   [`Wire`](shared::Wire), and has no core meanwhile.
-//! - After the commit the crate allocates nothing and takes no lock. Edges do no locked
-//!   read-modify-write; states and latest values do one or two per use. (Functions and the `clone`
-//!   of their messages may still allocate or lock.)
-//! - [`finish_create_dags`] reports all faults at once. Given WCETs, the commit also bounds each
-//!   DAG's response time, or reports the lack of a proof
+//! - After the commit the crate allocates nothing and takes no lock, except the app's own
+//!   [`Lock`](shared::Lock)s and, for recorded values, the lock of the platform's edge. Edges do no
+//!   locked read-modify-write; states and latest values do one or two per use. (Functions and the
+//!   `clone` of their messages may still allocate or lock.)
+//! - [`finish_create_dags`] reports all faults of the verification at once. Given WCETs, the commit
+//!   also bounds each DAG's response time, or reports the lack of a proof
 //!   ([`Commit::answers`](commit::Commit::answers)).
 //!
 //! # Limits
 //!
 //! - The model does not cover data shared behind the scheduler's back (a mutex, a static); time
 //!   waited there is execution time.
-//! - A function that never returns holds its core forever.
+//! - A function that never returns needs a core forever, unless its budget ends it.
 //!
 //! # How the crate is built
 //!
@@ -102,7 +106,7 @@
 //! instance; or, for a function with waits, one future per instance, polled once per turn. The
 //! [`Platform`](platform::Platform) gets the [`Plan`](platform::Plan) and runs bodies on request of
 //! its scheduler. Values travel in rings with a slot for each job that may be in flight. The crate
-//! names no kernel and needs only `alloc`; its `unsafe` is in `run/cell`.
+//! names no kernel and needs only `alloc`; its `unsafe` is in `run/cell` and `run/wire`.
 //!
 //! `docs/paper.md` relates the paper's figures 3 and 4 to the code.
 #![cfg_attr(not(test), no_std)]
@@ -122,9 +126,9 @@ pub mod shared {
     //! |---|---|---|
     //! | [`State`] | subtasks of a DAG, from job to job | [`Dag::state`](crate::Dag::state) |
     //! | [`Latest`] value | DAGs | [`Dag::latest`](crate::Dag::latest) |
-    //! | [`Signal`] | a subtask or a driver, and a DAG | [`Dag::sporadic`](crate::Dag::sporadic) |
+    //! | [`Signal`] | any code raising it, and a DAG | [`Dag::sporadic`](crate::Dag::sporadic) |
     //! | [`Wire`] | DAGs and the outside: bytes in packets | [`Wire::new`] |
-    //! | [`Device`] | an asking subtask, and a driver | [`create_device`] |
+    //! | [`Device`] | an asking async subtask, and a driver | [`create_device`] |
     //! | [`Lock`]ed data | subtasks without a common edge | [`Lock::new`] |
     //! | [`Parameter`] | DAGs and people who tune them | [`Parameter::new`] |
     //! | [`WallClock`] | DAGs and the world's time | [`WallClock::new`] |

@@ -7,8 +7,8 @@
 //! Here a *section* is one call of [`Lock::with`]. Sections of one lock exclude each other, on all
 //! cores. In the kernel waiting cores take turns. An instance in a section keeps its core there, up
 //! to [`LONGEST_SECTION`], since otherwise it would block every core waiting for the lock; on Linux
-//! it may lose its core. A section thus delays all other work of its core. Hence a lock declares
-//! its [longest section](Lock::longest), and a subtask the number of sections it
+//! it may lose its core. In the kernel a section thus delays all other work of its core. Hence a
+//! lock declares its [longest section](Lock::longest), and a subtask the number of sections it
 //! [enters](Lock::entering); the analysis charges for both.
 //!
 //! # Guarantees
@@ -16,8 +16,8 @@
 //! - An instance fails before entering a section if its subtask does not declare the lock, or if
 //!   the instance has used up the declared sections.
 //! - While a lock has no longest section, no DAG on the cores of its users has a bound.
-//! - The [log](mod@crate::log) reports a section longer than declared: the bounds do not hold then.
-//!   A section longer than [`LONGEST_SECTION`] is preempted.
+//! - The [log](mod@crate::log) reports a section longer than declared and than any reported before:
+//!   the bounds do not hold then. A section longer than [`LONGEST_SECTION`] may be preempted.
 //!
 //! # Limits
 //!
@@ -40,7 +40,8 @@ use crate::run::cell::{ExclusiveCell, SetOnce};
 use crate::run::lock_words::LockWords;
 use crate::run::replaceable::Reset;
 
-/// The longest time for which a section may delay the preemption of its core: 1 ms.
+/// The longest time for which a section may delay the preemption of its core: 1 ms. (On Linux a
+/// section delays no preemption.)
 pub const LONGEST_SECTION: Duration = Duration::from_millis(1);
 
 /// Data for use by one instance at a time.
@@ -131,7 +132,8 @@ impl<T> Lock<T> {
         self
     }
 
-    /// Declares that each instance of a subtask enters at most `sections` sections.
+    /// Declares that each instance of a subtask enters at most `sections` sections. Several
+    /// declarations of one subtask add up.
     pub fn entering(&self, sections: u32) -> LockUse {
         let mut place = &self.first_user;
         let user = loop {

@@ -7,13 +7,13 @@
 //!
 //! # Guarantees
 //!
-//! - A job's value is the last one set before its source started. The value does not change during
-//!   the job: in each DAG one source reads the parameter, and other subtasks get the value along
-//!   edges.
+//! - A job's value is the last one set before the source reading it started. The value does not
+//!   change during the job: in each DAG one source reads the parameter, and other subtasks get the
+//!   value along edges.
 //! - A value outside the range is never set, nor one that is no number (a NaN, or a text).
 //! - Nobody waits: reading is one load.
-//! - The value is recorded and replayed with the source's results. During a replay, setting a
-//!   parameter has no effect.
+//! - Where the source's results are recorded, the value is replayed with them: then setting the
+//!   parameter during a replay has no effect on the DAG.
 
 use alloc::format;
 use alloc::string::String;

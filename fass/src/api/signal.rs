@@ -3,14 +3,19 @@
 //! A *sporadic* DAG has no period. Each job is released by a *signal*, and never earlier than one
 //! *minimum inter-arrival time* after the job before. The scheduler enforces this distance,
 //! whatever happens outside, so the DAG can be analysed like a periodic DAG with that period. One
-//! early signal waits; further early signals are dropped and counted
+//! signal waits until its job can be released; further signals meanwhile are dropped and counted. A
+//! paused DAG skips the job of a signal, and an ended DAG drops its signals
 //! (`sched-dag/src/scheduler/signals.rs` has the rules).
 //!
-//! Signals come from three places:
+//! Signals come from five places:
 //!
-//! - a subtask, of any DAG, with the signal declared at registration ([`Signal::raising`]). The
-//!   signal takes effect when the subtask's instance is complete (R3), not in mid-function;
-//! - the platform: a byte from a serial port, for example, or a test in virtual time;
+//! - a subtask, of any DAG of the commit, with the signal declared at registration
+//!   ([`Signal::raising`]). The signal takes effect when the subtask's instance is complete (R3),
+//!   not in mid-function, and not if the instance fails;
+//! - a question to a device served by the DAG
+//!   ([`Device::served_by`](crate::shared::Device::served_by)), as the wait for its answer begins;
+//! - a fault that ends a DAG ([`Dag::on_fault`]);
+//! - the platform: a byte from a serial port or a packet, for example, or a test in virtual time;
 //! - the app's code outside subtasks ([`Signal::raise`]).
 
 use alloc::boxed::Box;
@@ -88,7 +93,8 @@ pub struct Raiser<'a> {
 }
 
 impl Raiser<'_> {
-    /// Raises the signal: it takes effect once, when this instance is complete.
+    /// Raises the signal: it takes effect once, when this instance is complete. A failing instance
+    /// raises nothing.
     ///
     /// See [`Signal`].
     pub fn raise(&mut self) {
@@ -106,7 +112,7 @@ impl Signal {
     }
 
     /// Raises the signal now, from outside all subtasks. After the end of the DAG's run the call
-    /// does nothing.
+    /// does nothing, and neither in a replay: there the recording has the signals.
     ///
     /// # Panics
     ///
@@ -136,7 +142,7 @@ impl Signal {
     }
 
     /// Returns the arguments of [`Platform::raise`](crate::platform::Platform::raise): the number
-    /// of the plan and the DAG. Returns `None` before the commit.
+    /// of the plan and the DAG. Returns `None` before the DAG's commit.
     ///
     /// For platforms that raise signals.
     ///
@@ -155,10 +161,11 @@ impl Signal {
 
 impl Dag {
     /// Makes the DAG sporadic, with the least time between two releases, and returns its signal.
-    /// Subtasks of all DAGs can raise the signal, and so can code outside.
+    /// Subtasks of all DAGs of the commit can raise the signal, and so can code outside.
     ///
     /// See [`Signal`]. Without a limit of [`jobs`](Self::jobs) the DAG does not keep a run going:
-    /// the run ends after all other DAGs have ended.
+    /// the run can end when all other DAGs have ended, this DAG has no job in flight, and no signal
+    /// waits.
     #[track_caller]
     pub fn sporadic(&self, min_inter_arrival: Duration) -> Signal {
         self.open().set_sporadic(min_inter_arrival);
@@ -168,9 +175,10 @@ impl Dag {
     /// Sets a signal to be raised when a fault ends the DAG: a panic, an exception, an exceeded
     /// budget. The DAG released by the signal brings the system into a safe state; as a DAG it has
     /// its place in the schedule, and a bound. The signal is raised in the step that ends the
-    /// faulty DAG, and reaches another cluster as a letter; the release keeps its least distance
-    /// from the release before. The released DAG should sample nothing written by the faulty DAG,
-    /// since nobody renews those values any more.
+    /// faulty DAG; where clusters share no instant, it reaches another cluster as a letter.
+    /// Survived faults raise nothing; the release keeps its least distance from the release before.
+    /// The released DAG should sample nothing written by the faulty DAG, since nobody renews those
+    /// values any more.
     ///
     /// ```
     /// use core::time::Duration;

@@ -11,14 +11,16 @@
 //!   or, between subtasks without a path, the order of registration. Readers between two updates
 //!   may run at the same time. The commit adds the necessary precedence edges, and the analysis
 //!   sees them (`sched-dag/src/verify/topics.rs` has the rule).
-//! - Job k + 1 finds the value left by job k: a DAG whose subtasks share a state has one job in
-//!   flight. The commit then refuses a `Dag::in_flight` beyond 1.
+//! - Each job finds the value left by the jobs before, unless a survived fault has
+//!   [reset](State::reset_to) the value: a DAG whose subtasks share a state has one job in flight.
+//!   The commit then refuses a `Dag::in_flight` beyond 1.
 //! - No function waits for a state, so there is no blocking to account for, and no priority
 //!   inversion.
 //!
 //! # Limits
 //!
-//! - A subtask registered before the updater sees the value left by the job before.
+//! - A subtask registered before the updater, with no path from the updater to it, sees the value
+//!   left by the jobs before.
 //! - A recording contains a state only on request ([`State::record`]).
 //! - Jobs do not overlap as in a pipeline. Where they must, let one subtask own the state and send
 //!   the needed data along an edge.
@@ -170,8 +172,8 @@ impl<T: StateValue> State<T> {
     }
 
     /// Sets the function providing the state's value after a fault. Such a reset follows the fault
-    /// of a subtask using the state, where the DAG goes on ([`Dag::survive_faults`]). The commit
-    /// calls `make` once for each fault that the DAG may survive.
+    /// of a replaceable subtask using the state, where the DAG goes on ([`Dag::survive_faults`]).
+    /// The commit calls `make` once for each fault that the DAG may survive.
     ///
     /// See [`Dag::restarting`](crate::Dag::restarting).
     ///
@@ -240,7 +242,7 @@ impl<T: StateValue> State<T> {
         self.record_every(64)
     }
 
-    /// Records the state every `jobs` jobs.
+    /// Records the state every `jobs` jobs; 0 counts as 1.
     ///
     /// See [`record`](Self::record).
     ///

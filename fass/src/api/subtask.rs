@@ -10,14 +10,16 @@
 //!
 //! A function's tuples fix a graph at compile time, with at most 16 inputs and 16 outputs per
 //! subtask. A graph read from a file, or generated, has neither limit: its subtasks are *untyped*.
-//! An untyped subtask is a function of the job's number alone. Its edges are added one by one
-//! ([`Dag::precede`](crate::Dag::precede)), in any number, and carry no data.
+//! An untyped subtask is a function of the job's number, and of its uses if there are any. Its
+//! edges are added one by one ([`Dag::precede`](crate::Dag::precede)), in any number, and carry no
+//! data.
 //!
-//! Everything else is as for typed subtasks. The commit verifies the same graph of the same model.
-//! Each edge has a ring of slots, and a token passes through the ring for every job. An instance
-//! takes the tokens of *its* job from all predecessors before the function is called (R2), and
-//! gives its own token only after the function has returned (R3). So a platform starting an
-//! instance too early is detected, as with typed subtasks.
+//! Most other things are as for typed subtasks; but the function of an untyped subtask cannot be
+//! replaced after a fault. The commit verifies the same graph of the same model. Each edge has a
+//! ring of slots, and a token passes through the ring for every job. An instance takes the tokens
+//! of *its* job from all predecessors before the function is called (R2), and gives its own token
+//! only after the function has returned (R3). So a platform starting an instance too early is
+//! detected, as with typed subtasks.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -85,9 +87,9 @@ fn note_plain(draft: &mut DagDraft, subtask: usize) {
 }
 
 impl Dag {
-    /// Begins the registration of a source: a function without inputs, started by every release. A
-    /// separate call sets when the DAG is released: [`period`](Self::period) or
-    /// [`sporadic`](Self::sporadic).
+    /// Begins the registration of a source: a function without inputs, called for every released
+    /// job (in a replay, only if its topics are not recorded). A separate call sets when the DAG is
+    /// released: [`period`](Self::period) or [`sporadic`](Self::sporadic).
     ///
     /// See [`Subtask`].
     pub fn source<F, Ret>(&self, mut f: F) -> Subtask<'_>
