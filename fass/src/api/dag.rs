@@ -3,8 +3,8 @@
 //! A [`Dag`] is a handle of a DAG under construction. Registering a subtask takes a function, the
 //! names of the input and output topics, attributes, and the [uses](Dag::using) of shared objects.
 //! A subtask has no other properties, and registration runs nothing. Registration does not report
-//! faults either: the commit reports all of them at once
-//! ([`finish_create_dags`](crate::finish_create_dags)). The commit uses up the handle.
+//! faults of the DAG either: the commit reports all of them at once
+//! ([`finish_create_dags`](crate::finish_create_dags)). A successful commit uses up the handle.
 //!
 //! Construction happens on one thread; a `Dag` cannot leave the thread.
 
@@ -50,8 +50,9 @@ pub fn create_dag() -> Dag {
 ///
 /// # Panics
 ///
-/// Every method panics, at its caller's line, after the DAG's commit. The verified graph is the
-/// graph that runs, so a later addition would silently not run: a mistake in the program.
+/// Every method that changes the DAG panics, at its caller's line, after the DAG's commit; the
+/// methods that begin the registration of a subtask panic when it is registered. The verified graph
+/// is the graph that runs, so a later addition would silently not run: a mistake in the program.
 #[derive(Clone)]
 pub struct Dag {
     pub(crate) draft: Rc<RefCell<DagDraft>>,
@@ -65,7 +66,8 @@ impl Dag {
         self
     }
 
-    /// Sets the time from the start of scheduling to the first release; by default 0.
+    /// Sets the time from the start of scheduling to the first release, of a sporadic DAG to its
+    /// earliest first release; by default 0.
     #[track_caller]
     pub fn offset(&self, offset: Duration) -> &Self {
         self.open().set_offset(offset);
@@ -75,7 +77,7 @@ impl Dag {
     /// Sets the greatest number of jobs in flight at once, at least 1.
     ///
     /// The number is also the number of slots of every edge. By default the commit chooses enough
-    /// for the relative deadline.
+    /// for the relative deadline, and 1 for a DAG whose subtasks share a state.
     #[track_caller]
     pub fn in_flight(&self, jobs: u32) -> &Self {
         self.open().spec.in_flight = Some(jobs);
@@ -91,7 +93,7 @@ impl Dag {
     }
 
     /// Puts the DAG into a cluster, counted from 0: the DAG runs only on the cores of that cluster.
-    /// Where the machine's cores are divided, each DAG has to be in a cluster.
+    /// Where the platform states how its cores are divided, each DAG has to be in a cluster.
     ///
     /// Latest values and signals, shared between DAGs, may cross clusters.
     ///
@@ -144,8 +146,8 @@ impl Dag {
         self
     }
 
-    /// Sets the number of jobs to release; afterwards the DAG is finished. By default the DAG runs
-    /// without end.
+    /// Sets the number of jobs, skipped jobs included; afterwards the DAG is finished. By default
+    /// the DAG runs until a fault ends the DAG, or something ends the run.
     #[track_caller]
     pub fn jobs(&self, jobs: u64) -> &Self {
         self.open().spec.jobs = Some(jobs);
@@ -155,9 +157,10 @@ impl Dag {
     /// Demands a proof: the commit fails unless a test bounds the response time of this DAG by its
     /// relative deadline.
     ///
-    /// A proof needs the WCETs of all subtasks of the DAG, and of all DAGs that may delay the DAG.
-    /// Other DAGs of the commit need no proof of their own. Without the demand the commit only
-    /// reports the answer; see [`Commit::answers`](crate::commit::Commit::answers).
+    /// A proof needs the WCETs of all subtasks of the DAG, and of all DAGs that may delay the DAG,
+    /// and the longest sections of the locks used on its cores. Other DAGs of the commit need no
+    /// proof of their own. Without the demand the commit only reports the answer; see
+    /// [`Commit::answers`](crate::commit::Commit::answers).
     ///
     /// ```
     /// use core::time::Duration;
@@ -181,8 +184,8 @@ impl Dag {
         self
     }
 
-    /// Registers the source: a function without arguments, started by every release, at multiples
-    /// of `period` after the offset.
+    /// Registers a source: a function without arguments, called for every released job. Jobs are
+    /// due at multiples of `period` after the offset. The sources of a DAG have one period.
     ///
     /// `output_topics` names one topic for each element of `Ret`.
     ///
@@ -220,7 +223,7 @@ impl Dag {
         self.open().set_period(period, subtask);
     }
 
-    /// Registers a subtask between the source and the sink: a function from a tuple of inputs to a
+    /// Registers a subtask between a source and a sink: a function from a tuple of inputs to a
     /// tuple of outputs.
     ///
     /// `input_topics` names one topic for each element of `Args`, `output_topics` one for each
@@ -301,17 +304,17 @@ impl Dag {
             .register(attributes);
     }
 
-    /// Sets the time between two releases. Needed where no source states a period: for a DAG of
-    /// untyped subtasks, or with a [`source`](Self::source).
+    /// Sets the time between two nominal releases of a periodic DAG. Needed where no source states
+    /// a period: for a DAG of untyped subtasks, or with a [`source`](Self::source).
     #[track_caller]
     pub fn period(&self, period: Duration) -> &Self {
         self.open().replace_period(period);
         self
     }
 
-    /// Sets the time from a release to the deadline of the job, for a DAG of untyped subtasks. The
-    /// deadline holds for each sink without its own. (A typed sink states its own deadline,
-    /// possibly shorter.)
+    /// Sets the time from a nominal release to the deadline of the job, for example for a DAG of
+    /// untyped subtasks. The deadline holds for each sink without its own. (A typed sink states its
+    /// own deadline, possibly shorter.)
     #[track_caller]
     pub fn relative_deadline(&self, relative_deadline: Duration) -> &Self {
         self.open().set_dag_deadline(relative_deadline);

@@ -2,8 +2,8 @@
 //!
 //! DAGs have no edges between them, since their jobs do not correspond. Instead, a subtask can
 //! *sample* a topic of any DAG: at its start the subtask gets the latest value whose instance is
-//! complete, and waits for nothing. In ROS 2 terms: a timer callback looking at member variables
-//! filled by subscriptions.
+//! complete, if there is one, and waits for nothing. In ROS 2 terms: a timer callback looking at
+//! member variables filled by subscriptions.
 //!
 //! # Guarantees
 //!
@@ -15,8 +15,8 @@
 //! - *Never backwards.* Successive samples of one subtask come from ever later jobs, or from the
 //!   same job again. During an instance its sample does not change.
 //! - *Visible staleness.* A [`Sample`] contains the writer's job and the completion time of the
-//!   writer's instance. The greatest age of a value follows from the writer's bound
-//!   ([`Commit::staleness`](crate::commit::Commit::staleness)).
+//!   writer's instance. If the writer's DAG is periodic and has a proven bound, the greatest age of
+//!   a value follows from that bound ([`Commit::staleness`](crate::commit::Commit::staleness)).
 //!
 //! # Limits
 //!

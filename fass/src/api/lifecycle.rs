@@ -1,8 +1,9 @@
 //! Changes of a run by functions: pausing DAGs, changing modes, and ending the run.
 //!
 //! A subtask has to declare such changes at registration, as for raising a signal. A request by its
-//! function takes effect when the instance is complete (R3); the rules L1 to L6 are in
-//! `sched-dag/src/lifecycle/mod.rs`.
+//! function takes effect when the instance is complete (R3), not if the instance fails, and in
+//! another cluster possibly later. In a replay no request touches a DAG with recorded inputs. The
+//! rules L1 to L6 are in `sched-dag/src/lifecycle/mod.rs`.
 //!
 //! Modes are named sets of DAGs, of which one set runs at a time;
 //! `sched-dag/src/lifecycle/modes.rs` has the rules, M1 to M7.
@@ -42,8 +43,9 @@ pub struct SwitchUse {
 
 /// The handle with which a function pauses and resumes a DAG.
 ///
-/// A paused DAG releases no job: jobs due meanwhile are skipped, and keep their numbers and their
-/// places on the grid. Jobs in flight at the pause run to their end.
+/// A paused DAG releases no job: jobs due meanwhile are skipped, and keep their numbers and, in a
+/// periodic DAG, their places on the grid. In a sporadic DAG the jobs of signals are skipped. Jobs
+/// in flight at the pause run to their end.
 ///
 /// # Examples
 ///
@@ -150,7 +152,8 @@ pub struct Shutdown<'a> {
 }
 
 impl Shutdown<'_> {
-    /// Ends the run when this instance is complete. The request cannot be withdrawn.
+    /// Ends the run when this instance is complete. The function cannot withdraw the request; only
+    /// a failure of the instance makes it void.
     pub fn request(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
@@ -245,9 +248,10 @@ fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
 
 /// The modes of a run: sets of DAGs, of which one runs at a time.
 ///
-/// A DAG in some mode is paused in all other modes; a DAG in no mode runs in every mode. A run
-/// begins in the mode made first. Functions enter modes through their completions. Clones are
-/// handles of the same modes.
+/// A DAG may be in several modes, and is paused in all modes without it; a DAG in no mode runs in
+/// every mode. Where the cores are divided, all DAGs in modes are in one cluster. A run begins in
+/// the mode made first. Functions enter modes through their completions. Clones are handles of the
+/// same modes.
 ///
 /// # Examples
 ///
@@ -333,7 +337,8 @@ impl ModeSwitch<'_> {
     }
 
     /// Requests the mode when this instance is complete. From then on the DAGs paused by the new
-    /// mode release nothing, and the mode is entered when none of them has a job in flight.
+    /// mode release nothing, and the mode is entered when none of them has a job in flight, unless
+    /// a later request for a mode replaces this request.
     ///
     /// See [`Modes`].
     pub fn when_idle(&mut self) {

@@ -1,6 +1,7 @@
 //! The API for building DAGs: handles of DAGs, and of the objects used by subtasks.
 //!
-//! Calls are only recorded in a draft. Nothing is checked before the commit, and nothing runs.
+//! Calls are only recorded in a draft. Before the commit little is checked (a call that cannot be
+//! recorded panics, such as a change of a committed DAG), and nothing runs.
 
 /// Implements `Debug` for a handle: its type, and its object's name.
 macro_rules! shown_as {

@@ -47,15 +47,16 @@ impl Dag {
     ///
     /// A replay takes a source's recorded values instead of calling the source. So if one topic of
     /// a source is recorded, the commit refuses the DAG unless all topics of its sources are
-    /// recorded, and all topics sampled by its other subtasks. The values written by other subtasks
-    /// are compared in a replay. Values sampled from the topic are recorded, too, and a replay
-    /// gives them to the sampling subtasks. A recorded topic counts as read. `T` must be the
-    /// writer's type, checked by the commit; a [`Unique`](crate::Unique) cannot be recorded.
+    /// recorded, and, for its other subtasks, all topics sampled and all answers of devices. The
+    /// values written by other subtasks are compared in a replay. Values sampled from the topic are
+    /// recorded, too, and a replay gives them to the sampling subtasks. A recorded topic counts as
+    /// read. `T` must be the writer's type, checked by the commit; a [`Unique`](crate::Unique)
+    /// cannot be recorded.
     ///
     /// After its function has returned, a value is written into a buffer made at the commit. The
-    /// platform gets the value when the instance is complete. A value of more than 4 KiB, or of
-    /// more than twice the least size of its type if that is larger, is lost, and the recording
-    /// says so.
+    /// platform gets the value when the instance is complete; a failing instance gives no outputs.
+    /// A value of more than 4 KiB, or of more than twice the least size of its type if that is
+    /// larger, is lost, and the recording says so.
     ///
     /// ```
     /// use core::time::Duration;

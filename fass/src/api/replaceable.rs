@@ -24,7 +24,8 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 
 impl Dag {
     /// Lets the DAG go on after faults, within a limit: a fault costs only its job, where the
-    /// subtask has another function. Without this call a fault ends the DAG.
+    /// subtask has another function. Without this call, beyond the limit, or in any other subtask,
+    /// a fault ends the DAG.
     ///
     /// See [`restarting`](Self::restarting), and [`FaultLimit`] for the memory needed.
     #[track_caller]

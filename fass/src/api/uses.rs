@@ -26,8 +26,10 @@
 //! | [`Device::asking`](crate::shared::Device::asking) | `Asker<Q, A>` | a wait |
 //! | [`Lock::entering`](crate::shared::Lock::entering) | `()` | blocking |
 //!
-//! Several uses form a tuple of up to 8, and the function gets a tuple. Since the function borrows
-//! all of them for one call only, the function can keep nothing beyond the instance.
+//! Several uses form a tuple of up to 8, and the function gets a tuple. Since a function borrows
+//! most uses for one call only, the function cannot keep them beyond the instance. The ends of
+//! devices and of waiting wires belong to an async function's future instead; outside a turn of
+//! their subtask, asking by them is a fault.
 //!
 //! The methods of [`SubtaskBuilder`] are the same as those of [`Dag`]. Each wraps the given
 //! function. The wrapper begins the uses, lends them to the function for one call, and ends them.

@@ -5,14 +5,15 @@
 //! instant of its job, the answer of a [device](crate::shared::Device), bytes of a
 //! [wire](crate::shared::Wire::reading). A waiting instance has no core and no stack. The subtask
 //! declares the number of its waits and a limit for each ([`SubtaskAttributes::wait`]), so the
-//! response time is bounded, whatever a device does.
+//! response time can be bounded, whatever a device does.
 //!
 //! # Guarantees
 //!
-//! - Each job calls the function once. Its future is polled once per turn: at the start of the
-//!   instance, and after the end of each wait.
-//! - Nothing of an instance is visible before the function has returned (R3): no outputs, latest
-//!   values or signals.
+//! - Each job calls the function once, unless the job is cut before, or a replay takes recorded
+//!   results instead. Its future is polled once per turn: at the start of the instance, and after
+//!   the end of each wait.
+//! - No outputs, latest values or signals of an instance are visible before the function has
+//!   returned (R3). Only questions and written bytes leave earlier, each when its wait has begun.
 //! - A wait ends at its limit, even without an answer. Only declared waits are possible: see
 //!   [`WaitFault`](crate::WaitFault).
 //! - If a job is aborted, or lost by a fault, while it waits, its future is dropped, by the
@@ -37,7 +38,8 @@ use crate::draft::{NamedTopics, SubtaskAttributes};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 use crate::run::waiting::{defer, defer_untyped};
 
-/// The error of a wait whose device has not answered within the limit.
+/// The error of a wait whose device has not answered within the limit, or whose written bytes found
+/// no room.
 ///
 /// ```
 /// assert_eq!(fass::shared::TimedOut.to_string(), "the device has not answered in time");

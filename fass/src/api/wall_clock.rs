@@ -1,9 +1,10 @@
 //! Wall clocks: from the instants of a run to Unix time.
 //!
-//! Unix time is an instant, such as [`now_ns`](crate::now_ns), plus an *offset*. The machine sets
-//! the offset at first, and peers may correct the offset later. A *source* reads the offset when it
-//! starts, like a [parameter](crate::shared::Parameter), and sends the offset along edges: so a job
-//! has one offset, recorded and replayed with the source's results.
+//! Unix time is an instant, such as [`now_ns`](crate::now_ns), plus an *offset*. The app sets the
+//! offset at first, by the machine's own clock where there is one, and peers may correct the offset
+//! later. A *source* reads the offset when it starts, like a [parameter](crate::shared::Parameter),
+//! and sends the offset along edges: so a job has one offset, replayed with the source's results
+//! where those are recorded.
 //!
 //! No clock sets an offset by itself: an image without a wall clock contains no code for one. A run
 //! in virtual time has the Unix time set by its test, or none.

@@ -1,16 +1,16 @@
 //! Wires: how bytes come in and go out while DAGs run.
 //!
 //! Here a *wire* is a path for packets between a device, such as a serial port or a network card,
-//! and the functions of an app; a *packet* is a group of bytes that belong together. One source
-//! receives on a wire, and one subtask sends. Only the platform knows the device behind a wire, not
-//! the DAG: so the same functions run on the machine and, with bytes given by a test, in virtual
-//! time.
+//! and the functions of an app; a *packet* is a group of bytes that belong together. At most one
+//! subtask receives on a wire, a source or an async subtask, and at most one sends. Only the
+//! platform knows the device behind a wire, not the DAG: so the same functions run on the machine
+//! and, with bytes given by a test, in virtual time.
 //!
 //! # Guarantees
 //!
-//! - An instance of the receiver gets the packets that are complete at its start and that no
-//!   earlier instance has taken: the packets since the last job, each with the time of its last
-//!   byte. If the receiver is the source of a sporadic DAG, each packet raises the DAG's signal.
+//! - An instance of the receiver gets the packets that found room, are complete at its start and
+//!   have been taken by no earlier instance, each with the time of its last byte. If the receiver
+//!   is the source of a sporadic DAG, each packet raises the DAG's signal.
 //! - Bytes sent by an instance go out when the instance is complete (R3), all or nothing, in the
 //!   order of jobs: as one packet, unless the instance [ends](Sender::end_packet) several. A
 //!   failing instance sends nothing.
@@ -283,7 +283,8 @@ impl Wire {
     }
 
     /// Returns the state of the wire's link, readable by a DAG like any [`Parameter`]: `true` while
-    /// the cable is plugged in, and there is an address. A serial port always has a link.
+    /// the cable is plugged in, and there is an address. A serial port always has a link, and so
+    /// has a wire never connected.
     ///
     /// ```
     /// use fass::shared::Wire;

@@ -9,8 +9,9 @@
 //! - A read ends with the oldest packet not read before, or at its limit. A packet coming later
 //!   stays for the next read.
 //! - Written bytes go out when the wait has begun, not before. They still go out if the limit
-//!   passes first, or the instance fails after the wait.
-//! - A read takes no time if the packet is already there, and a write none if all bytes have gone.
+//!   passes first, or the instance fails after the wait has begun.
+//! - A read ends at once if the packet is already there, and a write if all bytes have gone; in a
+//!   replay of recorded reads or writes, after the recorded time.
 //!
 //! # Limits
 //!

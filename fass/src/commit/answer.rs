@@ -2,33 +2,36 @@
 //!
 //! Given WCETs, the commit asks `sched_dag::analysis` about the platform's model: its policy, its
 //! preemption, its cores and its overheads. The answer for a DAG is a *bound*, the greatest time of
-//! any job from its release to its completion, together with the test proving the bound; or the
-//! reason why there is no proof. *Not proven* is not *infeasible*: all tests are only sufficient.
+//! any completed job from its nominal release to its completion, together with the test proving the
+//! bound; or the reason why there is no proof. *Not proven* is not *infeasible*: all tests are only
+//! sufficient.
 //!
 //! # Consequences of an answer
 //!
 //! - By itself an answer has no consequence: DAGs without a proof are launched like others. An app
 //!   needing a proof says so with [`Dag::demand_proof`](crate::Dag::demand_proof); then the lack of
 //!   a proof is a fault.
-//! - A DAG *certain* to miss its deadlines at its WCETs is launched as well, with a warning. A WCET
-//!   may be far above the actual execution times, and the overrun policy handles overload, so a
-//!   certain miss is not necessarily a mistake. Two exceptions are always faults of the model: a
-//!   WCET of a single subtask beyond the deadline, and an overflow of times.
+//! - A DAG *certain* to miss its deadlines at its WCETs is launched as well, with a warning, unless
+//!   it demands a proof. A WCET may be far above the actual execution times, and the overrun policy
+//!   handles overload, so a certain miss is not necessarily a mistake. Two exceptions are always
+//!   faults of the model: a WCET of a single subtask beyond the deadline, and an overflow of times.
 //! - A DAG with a missing WCET is not analysed, and neither are the DAGs possibly delayed by such a
 //!   DAG; they are not proven. A WCET of 0 counts as missing.
 //!
 //! # How old a sampled value can be
 //!
-//! Let the writer's DAG have period T and a proven bound R. Take a sample at time t and the latest
-//! job k complete by then. Job k + 1, released T later, was not complete yet, and completes within
-//! R: t < r(k) + T + R. So the *staleness*, counted from the nominal release of the value's job, is
-//! less than T + R. T + R is also the term of one hop in the end-to-end bound of A. Davare et al.,
-//! Period Optimization for Hard Real-time Distributed Automotive Systems, DAC 2007
-//! (doi:10.1145/1278480.1278553).
+//! Let the writer's DAG have period T and a proven bound R. If the DAG survives faults, T is longer
+//! by one period for each job that faults may lose in a row. Take a sample at time t and the latest
+//! job k complete by then. The next job not lost, released at most T later, was not complete yet,
+//! and completes within R: t < r(k) + T + R. So the *staleness*, counted from the nominal release
+//! of the value's job, is less than T + R. T + R is also the term of one hop in the end-to-end
+//! bound of A. Davare et al., Period Optimization for Hard Real-time Distributed Automotive
+//! Systems, DAC 2007 (doi:10.1145/1278480.1278553).
 //!
 //! The bound holds from the writer's first completion on, and as long as jobs come: not after the
-//! last job of a DAG with a limit, nor while the DAG is paused or after its end. For a sporadic
-//! writer there is no such bound, because its signals may stay away.
+//! last job of a DAG with a limit, nor while the DAG is paused, up to the first job after the
+//! pause, nor after its end. For a sporadic writer there is no such bound, because its signals may
+//! stay away.
 
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
@@ -107,8 +110,9 @@ impl Commit {
     /// Bounds hold for the platform's policy, preemption and cores, with the platform's measured
     /// overheads added to the WCETs
     /// ([`RunConfig::overheads`](crate::platform::RunConfig::overheads)), and as long as no
-    /// instance executes for longer than its WCET. A DAG that is *not proven* may meet its
-    /// deadlines all the same.
+    /// instance executes for longer than its WCET, and no section of a lock takes longer than
+    /// declared. A bound that is based on a [certificate](crate::platform::RunConfig::certificate)
+    /// also ends with a fault. A DAG that is *not proven* may meet its deadlines all the same.
     ///
     /// ```
     /// # use core::time::Duration;
@@ -157,8 +161,8 @@ impl Commit {
         self.answers.witness(&self.task_set)
     }
 
-    /// Returns the greatest age of each sampled latest value, one entry for each sampling subtask,
-    /// in the order of the commit; see [`Staleness`].
+    /// Returns the greatest age of each sampled latest value, where it has a bound: one entry for
+    /// each sample declared by a subtask, in the order of the commit; see [`Staleness`].
     ///
     /// See [`Latest`](crate::shared::Latest) for an example.
     pub fn staleness(&self) -> &[Staleness] {
@@ -187,9 +191,10 @@ impl Commit {
     }
 }
 
-/// A chain of subtasks from a source to a sink, and the longest time of an effect along the chain.
-/// A chain crosses DAGs where a subtask samples a latest value. Made by [`Commit::chains`] and
-/// [`Commit::chains_between`]; measured after a run by the platform's `latencies`.
+/// A chain of subtasks, mostly from a source to a sink, and the longest time of an effect along the
+/// chain, where there is a bound. A chain crosses DAGs where a subtask samples a latest value. Made
+/// by [`Commit::chains`] and [`Commit::chains_between`]; measured after a run by the platform's
+/// `latencies`.
 ///
 /// [`sched_dag::chains`] defines the times, and proves the bounds.
 ///
@@ -257,7 +262,8 @@ impl Commit {
     }
 
     /// Returns the chains from one subtask to another, each subtask given as `dag/subtask`, by name
-    /// or number. The list is empty if there is no such subtask, or no path between the two.
+    /// or number; at most 1000. The list is empty if there is no such subtask, or no path between
+    /// the two.
     ///
     /// See [`EndToEnd`].
     pub fn chains_between(&self, from: &str, to: &str) -> Vec<EndToEnd> {
@@ -367,7 +373,8 @@ pub struct ClusterPlacement {
     pub why: Option<AssignmentReason>,
 }
 
-/// The table of a DAG: the cores executing its subtasks in a stated or chosen order.
+/// The table of a DAG: the cores executing its subtasks in an order stated by the app or chosen by
+/// the commit.
 ///
 /// ```
 /// use fass::commit::TablePlacement;
@@ -432,8 +439,8 @@ pub struct SinkAnswer {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Every job is complete within a bound not beyond the deadline, as long as no instance takes
-    /// longer than its WCET.
+    /// Every job not cut by a fault is complete within a bound not beyond the deadline, under the
+    /// conditions of [`Commit::answers`].
     Proven {
         /// The greatest time from a job's nominal release to its completion.
         bound: Duration,

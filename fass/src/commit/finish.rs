@@ -3,11 +3,12 @@
 //! A commit has five steps. Each step either succeeds for all DAGs or ends the commit:
 //!
 //! 1. *Verify.* All faults of all DAGs are collected, from this crate and from the model. If there
-//!    is any, nothing has happened; the handles are unchanged.
+//!    is any, nothing has happened; the handles are unchanged. This is so until step 4.
 //! 2. *Assign.* Where the platform leaves the division to the commit, or only a division gives a
 //!    demanded proof, the cores are divided among the DAGs.
 //! 3. *Answer.* The response times are bounded where possible, for the platform's model. The lack
-//!    of a demanded proof ends the commit like a fault.
+//!    of a demanded proof ends the commit like a fault; a certificate that cannot fix the set has
+//!    ended it before.
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
 
@@ -34,17 +35,18 @@ use crate::platform::{LaunchError, RunConfig};
 
 /// Verifies DAGs and hands them to the installed platform for scheduling.
 ///
-/// The commit ends construction: the DAGs can no longer be changed. The commit verifies the DAGs
-/// for the platform's policy and cores, with the paper's construction policy: one source, one sink,
-/// one writer per topic.
+/// A successful commit ends construction: the DAGs can no longer be changed. The commit verifies
+/// the DAGs for the platform's policy and cores, with the paper's construction policy: one source,
+/// one sink, one writer per topic (in each DAG).
 ///
 /// Given WCETs, the commit also answers about deadlines; see [`Commit::answers`].
 ///
 /// # Errors
 ///
-/// A [`CommitError`] with *every* fault of every DAG. Nothing runs then, and the app can still add
-/// to the handles and commit again, with one exception: after [`Fault::NotLaunched`] the functions
-/// are gone with the refused plan, and the DAGs must be built anew.
+/// A [`CommitError`] with *every* fault of every DAG found by the verification; or, if there is
+/// none, with the faults of a later step, such as a missing proof. Nothing runs then, and the app
+/// can still add to the handles and commit again, with one exception: after [`Fault::NotLaunched`]
+/// the functions are gone with the refused plan, and the DAGs must be built anew.
 ///
 /// # Examples
 ///
@@ -119,7 +121,8 @@ pub fn finish_create_dags_with(
 ///
 /// A word of a list is `DAG.SUBTASK`, or `DAG.SUBTASK#N` for job N of a lap; entries in parentheses
 /// may begin before the entry in front of them has ended. If one subtask of a DAG is in lists, all
-/// its subtasks have to be. On their cores, listed subtasks go before everything else.
+/// its subtasks have to be, on cores of one cluster. On their cores, listed subtasks go before
+/// everything else, except an instance that keeps its core (without preemption, or non-preemptive).
 /// `docs/dag-file.md` has the notation.
 ///
 /// # Errors
@@ -216,8 +219,8 @@ pub fn finish_create_dags_in_order(
     }
 }
 
-/// Fixes the set if there is a certificate, and reports success. Fails if a subtask may change the
-/// running DAGs, or a DAG starts paused.
+/// Fixes the set if there is a certificate, and reports success. With a certificate it fails if a
+/// subtask may change the running DAGs, or a DAG starts paused.
 fn fix(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) -> bool {
     let Some(certificate) = &terms.certificate else {
         return true;

@@ -1,7 +1,7 @@
 //! The fourth step of the commit: from verified DAGs to a plan.
 //!
 //! Edges get their rings, functions become bodies, signals learn their DAG, and parts tie
-//! themselves. Everything has been verified, so nothing can fail.
+//! themselves. Everything has been verified, so no fault can be found any more.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;

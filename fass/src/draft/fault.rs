@@ -1,8 +1,8 @@
 //! Reasons for refusing a commit, in words.
 //!
 //! Every fault states a fact, names the offender, and gives a remedy. The faults of the graph
-//! itself are [`sched_dag::DagFault`]s; the faults here are visible only to this crate: the shape
-//! of functions, durations, the platform.
+//! itself are [`sched_dag::DagFault`]s; most of the other faults are visible only to this crate:
+//! the shape of functions, durations, parts such as devices, the platform.
 
 use alloc::string::String;
 use alloc::vec;
@@ -71,15 +71,15 @@ worded! {
         DurationTooLong { dag: DagLabel, subtask: Option<SubtaskLabel>, what: &'static str } =
             "duration_too_long",
             "the {what} of {}{dag} is too long; give at most {} ns", part(subtask), u64::MAX;
-        /// Two sources of one DAG state different periods, in nanoseconds; `subtask` is the second
-        /// source.
+        /// A source states a period, in nanoseconds, other than the period given before by another
+        /// source or by [`Dag::period`](crate::Dag::period); `subtask` is this source.
         PeriodsDiffer { dag: DagLabel, subtask: SubtaskLabel, first_ns: u64, second_ns: u64 } =
             "periods_differ",
             "{subtask} gives {dag} a period of {:?} where {:?} were given before; a DAG has one \
              period, make two DAGs or give the same period",
             Duration::from_nanos(*second_ns), Duration::from_nanos(*first_ns);
-        /// One source of a DAG is periodic and another sporadic; `subtask` is the source registered
-        /// second.
+        /// A source of a sporadic DAG states a period, before or after the DAG was made sporadic;
+        /// `subtask` is this source.
         ActivationsDiffer { dag: DagLabel, subtask: SubtaskLabel } = "activations_differ",
             "{subtask} has a period, and its {dag} is sporadic, released by a signal; make two \
              DAGs, or leave one of the two out";
@@ -87,14 +87,14 @@ worded! {
         WcetsRefused { dag: DagLabel, fault: WcetFault } = "wcets_refused", "{fault}: {dag}";
         /// A part of a DAG is at fault, such as a signal, a device or a mode.
         Worded { code: &'static str, text: String } = of *code, "{text}";
-        /// The commit has to find the clusters, and a DAG gets no cores.
+        /// The commit has to divide the cores, and a DAG gets none, or lists of cores are stated.
         NotAssigned(error: LaunchError) = "not_assigned", "{error}";
         /// A certificate fixes the set, but something may change the running DAGs.
         NotFixed = "not_fixed",
             "a certificate fixes the set, but a subtask may pause a DAG, enter a mode or end the run, \
              or a DAG starts paused; leave that out, or the certificate";
         /// The DAG demands a proof of meeting its deadlines, and there is none; `unproven` has the
-        /// reason. Reported only if there are no other faults.
+        /// reason. Reported only if there are no faults other than missing proofs.
         NotProven { dag: DagLabel, unproven: UnprovenDag } = "not_proven",
             "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}";
         /// The graph or its attributes are at fault.

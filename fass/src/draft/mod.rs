@@ -1,10 +1,10 @@
 //! Drafts: registered DAGs before their commit.
 //!
-//! A draft accepts everything, and also remembers mistakes that a [`DagSpec`] cannot express:
-//! durations out of range, topic lists not fitting the function. The commit reports such mistakes
-//! together with all other faults. A subtask whose list does not fit keeps its topics in the spec,
-//! but with the type [`UnstatedType`], and the commit then takes the type from the topic's other
-//! end. So one mistake is not reported as several.
+//! A draft accepts almost everything, and also remembers mistakes that a [`DagSpec`] cannot
+//! express: durations out of range, topic lists not fitting the function. The commit reports such
+//! mistakes together with all other faults. A subtask whose list does not fit keeps its topics in
+//! the spec, but with the type [`UnstatedType`], and the commit then takes the type from the
+//! topic's other end. So one mistake is not reported as several.
 
 pub(crate) mod fault;
 pub(crate) mod part;
@@ -209,7 +209,7 @@ impl DagDraft {
     }
 
     /// Sets the relative deadline of a sink. A DAG without a deadline of its own has the longest
-    /// deadline of its sinks.
+    /// deadline stated by its sinks.
     #[inline(never)]
     pub(crate) fn set_sink_deadline(&mut self, deadline: Duration, sink: &SubtaskLabel) {
         let Some(deadline_ns) = self.convert(deadline, Some(sink), "relative deadline") else {
@@ -380,15 +380,16 @@ impl SubtaskAttributes {
 
     /// Sets the static priority; the *smaller* number is the higher priority.
     ///
-    /// Used under [`Policy::StaticPriority`](crate::Policy::StaticPriority). By default the commit
-    /// derives a priority from the graph.
+    /// Used under [`Policy::StaticPriority`](crate::Policy::StaticPriority). Either all subtasks of
+    /// a DAG have a priority, or none: then the commit derives the priorities, from the deadlines
+    /// between DAGs and from the graph within the DAG.
     pub fn priority(mut self, priority: u32) -> Self {
         self.priority = Some(priority);
         self
     }
 
     /// Sets the worst-case execution time: the longest execution of one instance, without preempted
-    /// time.
+    /// time. For a subtask with waits, the first call states the WCET up to the first wait.
     ///
     /// At most `u64::MAX` nanoseconds; a longer time is a fault at commit. After a call of
     /// [`wait`](Self::wait) the time is the WCET of the segment following that wait, and the
@@ -419,7 +420,7 @@ impl SubtaskAttributes {
 
     /// Sets the execution budget: if an instance executes for longer, preempted time not counted,
     /// the platform ends the instance as a fault, and its DAG as well, unless the DAG survives the
-    /// fault.
+    /// fault. (In virtual time only if the test contains panics.)
     ///
     /// Without a budget the platform may enforce a multiple of the [WCET](Self::wcet). At most
     /// `u64::MAX` nanoseconds; a longer budget is a fault at commit.
@@ -429,15 +430,16 @@ impl SubtaskAttributes {
     }
 
     /// Sets the size of the subtask's stack in bytes, from 16 KiB to 1 MiB; any other number is a
-    /// fault at commit. By default the kernel gives 64 KiB. All stacks of a commit are as large as
-    /// the largest; `measure=stacks` shows how much of its stack each subtask uses.
+    /// fault at commit. By default the kernel gives 64 KiB. Only the kernel uses the number. All
+    /// stacks of a commit are as large as the largest; `measure=stacks` shows how much of its stack
+    /// each subtask uses.
     pub fn stack_bytes(mut self, bytes: u64) -> Self {
         self.stack_bytes = Some(bytes);
         self
     }
 
-    /// Makes the subtask non-preemptive: a started instance keeps its core until it finishes,
-    /// although the platform preempts others.
+    /// Makes the subtask non-preemptive: a started instance keeps its core until it finishes, waits
+    /// or is ended by a fault, although the platform preempts others.
     pub fn non_preemptive(mut self) -> Self {
         self.non_preemptive = true;
         self

@@ -62,7 +62,8 @@ pub(crate) type Drafts = [Rc<RefCell<DagDraft>>];
 /// added by each DAG with a part of the kind.
 pub(crate) type CommitCheck = fn(&Drafts, &mut Vec<Fault>);
 
-/// Completes the plan of a commit, before the first DAG is tied; a part like a [`CommitCheck`].
+/// Completes the plan of a commit, before the first DAG is closed and tied; a part like a
+/// [`CommitCheck`].
 pub(crate) type Planner = fn(&Drafts, &mut Plan);
 
 type Tie = Box<dyn FnOnce(&mut TiedDag<'_>)>;

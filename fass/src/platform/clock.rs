@@ -22,7 +22,7 @@ pub enum Occupation {
     /// The processor computes until the time is over.
     Spin,
     /// The processor halts until the time is over, while the scheduler sees the instance run. So
-    /// more cores can be busy than the host has.
+    /// more cores can be busy than the host has. Virtual time does not distinguish the two.
     Hold,
 }
 
@@ -30,8 +30,8 @@ pub enum Occupation {
 ///
 /// Stands for computation still missing in an app, or for work whose time is being studied.
 /// Preempted time does not count. In virtual time the call takes exactly this time. A function
-/// without such a call takes its WCET there, unless the test sets another time, and without a WCET
-/// no time.
+/// without such a call takes its WCET there (with waits, the WCET of each segment), unless the test
+/// sets another time, and without a WCET no time.
 ///
 /// # Panics
 ///
@@ -69,7 +69,8 @@ pub fn execute_for(duration: Duration, how: Occupation) {
     expect_installed().execute_for(duration, how);
 }
 
-/// The clock in use: the platform's `now_ns`, unless the platform has named another clock.
+/// The clock in use: the platform's `now_ns`, unless the platform has named another clock, or the
+/// told time is recorded or replayed.
 static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&ASK_THE_PLATFORM);
 
 /// A function returning the time in nanoseconds, like [`now_ns`].
@@ -77,7 +78,8 @@ pub type Clock = fn() -> u64;
 
 pub(super) static ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
 
-/// Returns the platform's time in nanoseconds.
+/// Returns the platform's time in nanoseconds. Where the told time is recorded, a replay tells the
+/// functions of recorded DAGs the recorded time instead.
 ///
 /// # Panics
 ///

@@ -133,8 +133,8 @@ pub trait Platform: Sync {
 
     /// Returns the clock behind [`crate::now_ns`]; by default [`now_ns`](Self::now_ns) of the
     /// platform. A platform may name a clock with fewer instructions. `fass` asks at the
-    /// installation and after each launch. Where the [edge](Self::at_edge) records the time told to
-    /// functions, a clock of the edge is used instead.
+    /// installation and after each launch. Where the [edge](Self::at_edge) records or replays the
+    /// time told to functions, a clock of the edge is used instead.
     fn clock(&self) -> &'static Clock {
         &clock::ASK_THE_PLATFORM
     }
@@ -154,8 +154,8 @@ pub trait Platform: Sync {
     ///
     /// # Panics
     ///
-    /// If called by a subtask's function. The default panics in any case: then only subtasks raise
-    /// signals.
+    /// If called by a subtask's function. The default panics in any case: then only subtasks,
+    /// questions and faults raise signals.
     #[track_caller]
     fn raise(&self, _plan: u64, _dag: DagId) {
         panic!("this platform takes no signals from outside; raise them in subtasks");
@@ -422,13 +422,14 @@ fn missing() -> ! {
 ///
 /// A field is a number, a truth value, a character or a `'static` text. The line shows the time
 /// and, inside a subtask, the DAG, the subtask and the job of the calling instance. The caller goes
-/// on after a copy of some 300 bytes; somebody else shows the line soon afterwards.
+/// on after a copy of some 300 bytes; somebody else shows the line soon afterwards. On the machine
+/// and on Linux a new line is dropped, and counted, while 64 lines wait.
 ///
 /// A line is no result of its instance: the line appears even if the instance fails later.
 ///
 /// On the machine and on Linux the word `log=off|error|warn|info|debug` sets the level up to which
-/// lines are written, `info` by default. In virtual time all lines are written, into the report.
-/// Without a platform they go nowhere.
+/// lines are written, `info` by default. In virtual time the lines of all levels are written, into
+/// the report. Without a platform they go nowhere.
 ///
 /// # Examples
 ///

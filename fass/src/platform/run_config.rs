@@ -26,16 +26,17 @@ pub struct RunConfig {
     /// The scheduling policy, which decides what attributes are needed; whether a started instance
     /// may lose its core; and the number of processors running subtasks, at least 1.
     pub scheduler: SchedulerOptions,
-    /// The division of the processors into clusters. If the processors are divided, each DAG states
-    /// its cluster ([`Dag::cluster`](crate::Dag::cluster)).
+    /// The division of the processors into clusters. If the processors are divided here, each DAG
+    /// states its cluster ([`Dag::cluster`](crate::Dag::cluster)).
     pub clusters: CoreDivision,
     /// Whether the commit divides the processors
     /// ([`analysis::assign`](sched_dag::analysis::assign())).
     pub assigns: bool,
     /// The greatest cost of the platform's own work for an instance, as measured on the platform.
-    /// The commit adds the cost to each WCET before answering about deadlines
-    /// ([`Commit::answers`](crate::commit::Commit::answers)); nothing else depends on the cost.
-    /// Without measurements nothing is added: then WCETs have to include the cost.
+    /// The commit adds the cost to each WCET before dividing cores, making tables and answering
+    /// about deadlines ([`Commit::answers`](crate::commit::Commit::answers)); the run itself
+    /// depends on the cost only through them. Without measurements nothing is added: then WCETs
+    /// have to include the cost.
     ///
     /// ```
     /// use fass::commit::Overheads;
@@ -91,7 +92,8 @@ impl RunConfig {
     }
 
     /// Divides the cores into clusters of the given sizes, from core 0 on; an empty list leaves the
-    /// cores undivided. Each cluster schedules its own DAGs.
+    /// cores undivided. Each cluster schedules its own DAGs. The commit no longer divides the cores
+    /// by itself.
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {

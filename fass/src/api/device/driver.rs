@@ -65,7 +65,8 @@ impl Ticket {
 }
 
 impl<Q, A> DeviceDriver<Q, A> {
-    /// Takes the question waiting for its answer, unless there is none or it was taken before.
+    /// Takes the question waiting for its answer. Returns `None` if there is none, if it was taken
+    /// before, or if the asking end has just given it up.
     ///
     /// See [`Ticket`].
     pub fn question(&mut self) -> Option<(Ticket, Q)> {
@@ -98,8 +99,8 @@ impl<Q, A> DeviceDriver<Q, A> {
     ///
     /// # Errors
     ///
-    /// Gives `answer` back if the question has one already, or if no instance waits for one any
-    /// more.
+    /// Gives `answer` back if the question has one already, if the limit of the wait has passed, or
+    /// if no instance waits for an answer any more.
     pub fn answer(&mut self, ticket: Ticket, answer: A) -> Result<(), A> {
         let (cell, number) = (&self.cell, ticket.number);
         // Until this question is posted the answer's place belongs to the asking end, whose older
@@ -162,8 +163,8 @@ impl<Q, A> DeviceDriver<Q, A> {
         }
     }
 
-    /// Returns a word that changes with every question. On a platform with threads, a driver's
-    /// thread may sleep on the word.
+    /// Returns a word that changes with every question from now on. On a platform with threads, a
+    /// driver's thread may sleep on the word.
     ///
     /// ```
     /// let (_sonar, driver) = fass::shared::create_device::<(), u32>("sonar");

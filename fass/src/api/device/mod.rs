@@ -2,16 +2,17 @@
 //!
 //! A device has two ends. One subtask *asks*: the subtask is async, sends a question and waits for
 //! the answer, or until the limit of that wait. The other end belongs to the *driver*: a DAG of its
-//! own, a thread of Linux, or a test takes the question and answers. So the only influence of a
-//! device on a DAG is to end a wait before its limit.
+//! own, a thread of Linux, or a test takes the question and answers. So, besides the answer itself,
+//! the only influence of a device on a DAG is to end a wait before its limit.
 //!
-//! If the driver is a DAG, the questions themselves release the driver's jobs
+//! If the driver is a DAG, the questions themselves can release the driver's jobs
 //! ([`Device::served_by`]). The driver's time is then a part of the wait, and its faults stay in
 //! its own DAG.
 //!
 //! # Guarantees
 //!
-//! - The driver sees a question only after the wait for the answer has begun (R3).
+//! - The driver sees a question only after the wait for the answer has begun (R3). In a replay of
+//!   recorded answers the driver sees none.
 //! - An answer ends exactly the wait for which it was given, once. The driver gets back a second
 //!   answer, and one to a wait that is over or to a job that is gone.
 //! - Neither end waits for the other or takes a lock; and nothing is allocated.
@@ -352,12 +353,13 @@ impl<Q, A> Device<Q, A> {
     }
 
     /// Lets each question raise `signal`, which releases the driver's sporadic DAG. The signal is
-    /// raised in the step in which the wait for the answer begins. The driver answers at once, or
-    /// starts work leading to an answer later. Returns `true` if `signal` is the device's first
-    /// signal; later signals have no effect.
+    /// raised in the step in which the wait for the answer begins, and not in a replay; its DAG
+    /// still keeps the least distance of releases. The driver answers at once, or starts work
+    /// leading to an answer later. Returns `true` if `signal` is the device's first signal and
+    /// comes before the commit; otherwise the call has no effect.
     ///
-    /// Call the method before the commit; a later call has no effect. The commit must have the
-    /// signal's DAG, too.
+    /// Call the method before the commit of the asking DAG. The commit must have the signal's DAG,
+    /// too.
     ///
     /// ```
     /// use core::time::Duration;
@@ -397,13 +399,14 @@ impl<Q, A> Device<Q, A> {
 
 impl<Q, A: Recordable + Send + Sync + 'static> Device<Q, A> {
     /// Records the answers, where the platform records. Each answer is recorded with the time it
-    /// took, after the instance that got the answer is complete. A replay takes the recorded
-    /// answers instead of asking: its waits are as long as in the recorded run.
+    /// took, after the instance that got the answer is complete or has failed. A replay takes the
+    /// recorded answers instead of asking: its waits are as long as in the recorded run, and a wait
+    /// whose answer is missing in the recording lasts until its limit.
     ///
     /// Answers are recorded along with topics, so record topics of the DAG, too ([`Dag::record`]).
-    /// If a topic of a source is recorded, the commit demands a record of all answers to subtasks
-    /// other than sources. If the answers of a job take more than 4 KiB together, they are lost.
-    /// Call the method before the commit.
+    /// If a topic of a source is recorded, the commit demands a record of all answers to the DAG's
+    /// subtasks other than sources. If the answers of a job take more than 4 KiB together, they are
+    /// lost. Call the method before the commit.
     ///
     /// ```
     /// use core::time::Duration;
@@ -549,7 +552,7 @@ impl<Q, A> Asker<Q, A> {
 }
 
 impl<Q, A> PendingAnswer<'_, Q, A> {
-    /// Waits for a shorter time than the limit.
+    /// Waits for a shorter time than the limit. When polled, a longer time is a [`WaitFault`].
     ///
     /// ```
     /// use core::time::Duration;
