@@ -92,8 +92,7 @@ impl RunConfig {
     }
 
     /// Divides the cores into clusters of the given sizes, from core 0 on; an empty list leaves the
-    /// cores undivided. Each cluster schedules its own DAGs. The commit no longer divides the cores
-    /// by itself.
+    /// cores undivided. Each cluster schedules its own DAGs.
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {
