@@ -370,7 +370,7 @@ crate::recordable! {
         pub name: String,
         /// The subtask's priority; 0 is the highest.
         pub priority: u32,
-        /// Whether a started instance keeps its core.
+        /// Whether a started instance keeps its core, except in its waits.
         pub is_non_preemptive: bool,
         /// The WCET, if stated or observed.
         pub wcet_ns: Option<u64>,

@@ -2,11 +2,11 @@
 //!
 //! Values on edges need no holding back: the scheduler starts their readers only after the
 //! completion. The readers of latest values, signals and requests to the run as a whole do not wait
-//! for the completion. So the function only *prepares* such effects, and the platform publishes
-//! them when reporting the completion
-//! ([`SubtaskCode::complete`](crate::platform::SubtaskCode::complete)). The completion boundary
-//! (R3) thus applies to effects as well as to edges, also in virtual time, where a function has run
-//! long before the instance is complete.
+//! for the completion. So the function only *prepares* such effects. Questions to devices and bytes
+//! on wires go out at the next wait; the platform publishes all others when reporting the
+//! completion ([`SubtaskCode::complete`](crate::platform::SubtaskCode::complete)). The completion
+//! boundary (R3) thus applies to effects as well as to edges, also in virtual time, where a
+//! function has run long before the instance is complete.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

@@ -5,8 +5,8 @@
 //! changes the settings.
 //!
 //! Bytes arrive at their times, between the completions and the releases of the same instant, as
-//! signals do. Bytes sent by an instance are gone at its completion. No device is slow here, so an
-//! instance loses bytes only by sending more than its wire has room for.
+//! signals do. Bytes sent by an instance are gone at its completion, or at its next wait. No device
+//! is slow here, so an instance loses bytes only by sending more than its wire has room for.
 //!
 //! # Running a plan
 //!

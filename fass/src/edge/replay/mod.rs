@@ -281,7 +281,8 @@ impl Replay {
         (self.values.binary_search_by_key(&of, |(of, _)| *of)).ok()
     }
 
-    /// Reports whether the replay does not call the function of an instance.
+    /// Reports whether the replay passes an instance over: the instance was cut, or its job has no
+    /// recorded inputs.
     pub fn passes_over(&self, instance: Instance) -> bool {
         self.passed.has(instance)
     }
@@ -308,7 +309,8 @@ impl Replay {
         }
     }
 
-    /// Returns the findings so far; if the run is over, they include a value it has not computed.
+    /// Returns the findings so far; if the run is over, they include a value it has not computed,
+    /// or a recorded fault that has not occurred again.
     #[must_use]
     pub fn outcome(&self, is_over: bool) -> ReplayOutcome {
         let differs = self.divergence.as_ref().map(|(channel, job, place)| {

@@ -16,9 +16,10 @@
 //!
 //! # The way out
 //!
-//! The packets of an instance leave at its completion, all or none. The function puts its bytes
-//! into places ahead; the completion shows them, by a single store however many they are. If a
-//! packet finds no place, or is too long, all of them are lost.
+//! The packets of an instance leave at its completion, or those of a turn at the wait ending it,
+//! all or none. The function puts its bytes into places ahead; the completion or the wait shows
+//! them, by a single store however many they are. If a packet finds no place, or is too long, all
+//! of them are lost.
 
 use alloc::sync::Arc;
 use core::net::SocketAddrV4;
@@ -405,7 +406,7 @@ pub(crate) struct WireOutput {
     pub(crate) lost: EventCounter,
 }
 
-/// The packets of an instance before its completion.
+/// The packets of an instance before its completion or next wait.
 struct Staging {
     putter: Putter<PacketInPlace>,
     /// The numbers of whole packets, of bytes in the open packet after them, and of all bytes.
@@ -599,7 +600,7 @@ impl WireOutput {
     }
 }
 
-/// The effect of the sender's completion.
+/// The effect of the sender's completion, and of each of its waits.
 pub(crate) struct SendCompletion(pub(crate) Arc<WireOutput>);
 
 impl Effect for SendCompletion {
